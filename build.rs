@@ -29,7 +29,7 @@ fn commit() -> Option<String> {
     if Path::new(&log).exists() {
         println!("cargo::rerun-if-changed={log}");
     }
-    let sources = ["src", "shaders", "assets", "Cargo.toml", "Cargo.lock"];
+    let sources = ["src", "crates", "shaders", "assets", "Cargo.toml", "Cargo.lock"];
     for source in sources {
         println!("cargo::rerun-if-changed={source}");
     }

@@ -14,13 +14,12 @@ need_packages test
 step "format"
 cargo fmt --all --check
 
-step "lints: the science alone, then everything"
-cargo clippy --locked --no-default-features --all-targets -- -D warnings
-cargo clippy --locked --features ui-test --all-targets -- -D warnings
-cargo clippy --locked -p touch2touch-tuning --all-targets -- -D warnings
+step "lints: everything, then the command line without windows and model engines"
+cargo clippy --locked --workspace --features ui-test --all-targets -- -D warnings
+cargo clippy --locked --no-default-features -- -D warnings
 
 step "documentation"
-RUSTDOCFLAGS="-D warnings" cargo doc --locked --no-deps --document-private-items --features ui-test
+RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --document-private-items --features ui-test
 
 if [ -d "${TOUCH2TOUCH_SHARED:-../shared}" ]; then
   export REQUIRE_SHARED=1
@@ -28,11 +27,8 @@ else
   printf '\nNOT TRIED: tests on the reference data, which is not in %s\n' "${TOUCH2TOUCH_SHARED:-../shared}"
 fi
 
-step "tests: the science alone"
-cargo test --locked --no-default-features
-
-step "tests: tuning"
-cargo test --locked -p touch2touch-tuning
+step "tests: the science, the job without model engines, the tuning of networks"
+cargo test --locked -p touch2touch-core -p touch2touch-work -p touch2touch-tuning
 
 step "the ONNX Runtime library, fetched by the product itself"
 runtime_dir="$PWD/target/onnxruntime"
@@ -47,6 +43,6 @@ if [ -z "${VK_DRIVER_FILES:-}" ]; then
   driver=$(find /usr/share/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1)
   [ -z "$driver" ] || export VK_DRIVER_FILES="$driver"
 fi
-cargo test --locked --features ui-test
+cargo test --locked -p touch2touch -p touch2touch-work --features ui-test
 
 step "all passed"

@@ -8,9 +8,9 @@
 
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{Rgb, RgbImage};
-use touch2touch::domain::catalog;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
+use touch2touch_core::catalog;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
 
 const TILE: u32 = 128;
 const GAP: u32 = 3;

@@ -12,11 +12,11 @@ use std::path::PathBuf;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
-use touch2touch::domain::diffusion::{GaussianNoise, Tensor};
-use touch2touch::infer::bundle::{Bundle, Role};
-use touch2touch::infer::engine::{EngineChoice, Graph, Input, resolve};
-use touch2touch::io::npz;
-use touch2touch::io::pt::{Tensor as Array, Values};
+use touch2touch_core::diffusion::{GaussianNoise, Tensor};
+use touch2touch_work::infer::bundle::{Bundle, Role};
+use touch2touch_work::infer::engine::{EngineChoice, Graph, Input, resolve};
+use touch2touch_work::io::npz;
+use touch2touch_work::io::pt::{Tensor as Array, Values};
 
 /// An input of a graph, in the element types that graphs take.
 enum Owned {

@@ -46,7 +46,7 @@ use output::{PrintError, says};
 
 pub use output::Output;
 
-use crate::io::dataset::ToolScale;
+use touch2touch_work::io::dataset::ToolScale;
 
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
 ///
@@ -155,7 +155,7 @@ const PIPE_CLOSED: u8 = 141;
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
     output::start_log();
-    crate::infer::trial::by_this_program();
+    touch2touch_work::infer::trial::by_this_program();
     match parse(std::env::args_os()).and_then(run) {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
@@ -216,7 +216,7 @@ fn is_verb(word: &std::ffi::OsStr) -> bool {
 /// Refuses what is neither a folder nor a file nor the name of a built-in data set, before a window opens: most likely it
 /// is a mistyped verb.
 fn check_studio_path(path: &Path) -> anyhow::Result<()> {
-    use crate::io::dataset::BuiltIn;
+    use touch2touch_work::io::dataset::BuiltIn;
     let word = path.to_string_lossy();
     if path.exists() || BuiltIn::named(&word).is_some() {
         return Ok(());
@@ -282,7 +282,10 @@ fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
 }
 
 /// The pair called `name`, or the only one whose name has that in it.
-fn find_pair(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Result<crate::domain::dataset::PairId> {
+fn find_pair(
+    dataset: &touch2touch_work::io::dataset::Dataset,
+    name: &str,
+) -> anyhow::Result<touch2touch_core::dataset::PairId> {
     let pairs = &dataset.index.pairs;
     let exact = pairs.iter().position(|p| p.name == name);
     let similar: Vec<usize> = (0..pairs.len()).filter(|&i| pairs[i].name.contains(name)).collect();
@@ -295,7 +298,7 @@ fn find_pair(dataset: &crate::io::dataset::Dataset, name: &str) -> anyhow::Resul
             anyhow::bail!("{} pairs are called like {name:?}, such as {a} and {b}: say more of the name", similar.len())
         }
     };
-    Ok(crate::domain::dataset::PairId(at as u32))
+    Ok(touch2touch_core::dataset::PairId(at as u32))
 }
 
 /// At most `limit` of `len` positions, spread evenly.

@@ -23,8 +23,8 @@ use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Level;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::{PadId, lab};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::{PadId, lab};
 
 use double::{Bench, IMPRINT_SIZE};
 
@@ -165,8 +165,7 @@ fn progress_is_the_latest() {
     bench.send(PredictCommand::Generate);
     let (ticket, _) = bench.state.tasks.running.iter().next().unwrap();
     let ticket = *ticket;
-    bench
-        .send(Answer::Progressed(ticket, touch2touch::work::job::Progress { done: 3, total: 4, ..Default::default() }));
+    bench.send(Answer::Progressed(ticket, touch2touch_work::job::Progress { done: 3, total: 4, ..Default::default() }));
     assert_eq!(bench.state.tasks.running[&ticket].progress.fraction(), Some(0.75));
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());

@@ -11,10 +11,10 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::{GenerateSettings, Settings};
 use touch2touch::app::state::State;
-use touch2touch::domain::diffusion::Sampler;
-use touch2touch::domain::rig::lab;
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::work::bundles;
+use touch2touch_core::diffusion::Sampler;
+use touch2touch_core::rig::lab;
+use touch2touch_work::bundles;
+use touch2touch_work::infer::engine::EngineChoice;
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::run;

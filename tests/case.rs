@@ -10,21 +10,21 @@ use touch2touch::app::results::shown::Why;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim::{SimConfig, random_grasp, simulate};
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::io::case_file::{self, CaseContent};
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::bundles::{self, BundleInfo};
-use touch2touch::work::case::{CaseSetup, check, make, open};
-use touch2touch::work::job::JobCx;
-use touch2touch::work::labels::PairLabels;
-use touch2touch::work::mask::{MaskChoice, MaskSource};
-use touch2touch::work::models::Models;
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
+use touch2touch_work::bundles::{self, BundleInfo};
+use touch2touch_work::case::{CaseSetup, check, make, open};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::case_file::{self, CaseContent};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::PairLabels;
+use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::models::Models;
 
 /// The generator that ships, under another name: a bundle of one's own.
 fn own_generator(folder: &Path) -> BundleInfo {
@@ -104,7 +104,7 @@ fn a_case_of_a_model_of_ones_own_is_the_same_where_that_model_is_not() {
     let report = check(&opened, &opened.bundles(), &Models::new(None), &JobCx::unwatched()).unwrap();
     assert!(report.same, "{report:?}");
     let held = &opened.held.imprints[&(ImprintSource::Predicted, lab::RIGHT)];
-    let bits = |imprint: &touch2touch::domain::grid::DepthMap| imprint.map(|v| v.to_bits());
+    let bits = |imprint: &touch2touch_core::grid::DepthMap| imprint.map(|v| v.to_bits());
 
     // It brings its model: predicted again, with the same result.
     let state = studio(&file, there.path());

@@ -9,11 +9,11 @@ use std::process::Output;
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::hand::{AcceptedPose, HandPose};
-use touch2touch::domain::pose::Registration;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::{MaskStore, StoredReview};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::hand::{AcceptedPose, HandPose};
+use touch2touch_core::pose::Registration;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::{MaskStore, StoredReview};
 
 use crate::support::{self, run};
 
@@ -133,7 +133,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let counts = json(&exported);
     let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
     assert_eq!(total, 8, "two fingers of four pairs");
-    assert!(touch2touch::io::exchange::check_folder(&masks).problems.is_empty());
+    assert!(touch2touch_work::io::exchange::check_folder(&masks).problems.is_empty());
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn every_engine_is_measured_on_fresh_cases_and_drawn() {
     let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
     let engines = report["engines"].as_array().unwrap();
     assert!(engines.iter().any(|e| e["name"] == report["default"]), "{report}");
-    assert_eq!(engines.len(), <touch2touch::domain::pose::Registration as strum::IntoEnumIterator>::iter().count());
+    assert_eq!(engines.len(), <touch2touch_core::pose::Registration as strum::IntoEnumIterator>::iter().count());
     for engine in engines {
         for key in ["mean_deg", "median_deg", "success_5", "success_10", "gross_20", "median_ms", "p95_ms"] {
             assert!(engine[key].is_number(), "{key} of {engine}");
@@ -167,7 +167,7 @@ fn every_engine_is_measured_on_fresh_cases_and_drawn() {
     assert!(!report["front"].as_array().unwrap().is_empty());
     let svg = std::fs::read_to_string(out.with_extension("svg")).unwrap();
     assert!(engines.iter().all(|e| svg.contains(e["name"].as_str().unwrap())), "all names are in the picture");
-    let png = touch2touch::io::images::read_rgb(&out.with_extension("png")).unwrap();
+    let png = touch2touch_work::io::images::read_rgb(&out.with_extension("png")).unwrap();
     assert_eq!(png.size(), [1500, 930]);
 
     let whole =
@@ -189,9 +189,9 @@ fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     assert!(run(&["simulate", "--out", set_text, "--tools", tool, "--grasps", "1"], dir.path()).status.success());
     let meters = json(&run(&["pose", set_text, "--mask", "cad", "--json"], dir.path()));
     let file = set.join("tools_stls").join(format!("{tool}.stl"));
-    let mut mesh = touch2touch::io::stl::read(&file).unwrap().mesh;
+    let mut mesh = touch2touch_work::io::stl::read(&file).unwrap().mesh;
     mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
-    touch2touch::io::stl::write(&file, &mesh).unwrap();
+    touch2touch_work::io::stl::write(&file, &mesh).unwrap();
 
     let refused = run(&["pose", set_text, "--mask", "cad", "--json"], dir.path());
     assert_eq!(refused.status.code(), Some(1));
@@ -424,10 +424,10 @@ fn stored_predictions_get_a_row() {
 }
 
 /// A grasp of the simulator in the lab's layout, spoilt.
-fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch::domain::sample::DepthTouch)) {
-    use touch2touch::domain::catalog;
-    use touch2touch::domain::sim;
-    use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch_core::sample::DepthTouch)) {
+    use touch2touch_core::catalog;
+    use touch2touch_core::sim;
+    use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
     let tool = &catalog::tools()[0];
     let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
     let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());

@@ -5,20 +5,20 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::grid::{Grid, Mask};
-use touch2touch::domain::label::{Marks, Provenance};
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::domain::sim;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::exchange::{Format, MANIFEST, PARTS};
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::io::{images, npz};
-use touch2touch::work::export::{ExportChoice, ExportSetup, HandMasks, Which, export_masks};
-use touch2touch::work::import::{Import, ImportSetup, import_masks, plan_import};
-use touch2touch::work::job::{Cancel, JobCx, Progress};
-use touch2touch::work::labels::{Act, Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::{Grid, Mask};
+use touch2touch_core::label::{Marks, Provenance};
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_core::sim;
+use touch2touch_work::export::{ExportChoice, ExportSetup, HandMasks, Which, export_masks};
+use touch2touch_work::import::{Import, ImportSetup, import_masks, plan_import};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::exchange::{Format, MANIFEST, PARTS};
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::io::{images, npz};
+use touch2touch_work::job::{Cancel, JobCx, Progress};
+use touch2touch_work::labels::{Act, Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
 
 use crate::support::run;
 
@@ -218,10 +218,10 @@ fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
             let all = hand.mask.map(|_| true);
             *hand = HandMask::new(all, Provenance::Threshold { min_m: 0.001 });
             let column = Mask::from_fn(175, 140, |x, _| x == 5);
-            let rect = touch2touch::domain::label::Rect { x: 5, y: 0, width: 1, height: 140 };
+            let rect = touch2touch_core::label::Rect { x: 5, y: 0, width: 1, height: 140 };
             let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
             let anna = Provenance::hand("Anna");
-            marks.paint(mask, (&column, rect), touch2touch::domain::label::Paint::Contact, None, anna);
+            marks.paint(mask, (&column, rect), touch2touch_core::label::Paint::Contact, None, anna);
         }
         labels.save(name, &stored, &Deed::named("test")).unwrap();
     }
@@ -282,7 +282,7 @@ fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
     }
     let before = all(&dataset);
     let found = import(&dataset, &from(&folder));
-    let why = |list: &[touch2touch::work::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
+    let why = |list: &[touch2touch_work::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
     assert_eq!((found.same, found.total(), found.complete), (2, 0, false), "{found:?}");
     assert_eq!(found.unmatched.len(), 1);
     assert!(why(&found.unmatched)[0].contains("no pair and finger"), "{found:?}");

@@ -9,17 +9,17 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::keys::{DatasetSeq, PairKey, PredictionKey, TouchKey};
 use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
-use touch2touch::domain::grid::{Grid, RgbGrid};
-use touch2touch::domain::postprocess::RawPrediction;
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::infer::bundle::{Bundle, MANIFEST};
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::infer::generator::{GenerateError, Generator, Item, Observer};
-use touch2touch::work::bundles::BundleInfo;
-use touch2touch::work::job::JobCx;
-use touch2touch::work::models::{Models, Wanted};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
+use touch2touch_core::grid::{Grid, RgbGrid};
+use touch2touch_core::postprocess::RawPrediction;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::infer::generator::{GenerateError, Generator, Item, Observer};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::{Models, Wanted};
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")

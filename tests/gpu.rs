@@ -6,8 +6,6 @@ use std::sync::Arc;
 
 use futures_lite::future::block_on;
 use glam::{DAffine3, DVec2, DVec3};
-use touch2touch::domain::colormap::{ColorMap, Range};
-use touch2touch::domain::mesh::TriMesh;
 use touch2touch::gpu::context::COLOR_FORMAT;
 use touch2touch::gpu::edges::EdgeStyle;
 use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
@@ -20,6 +18,8 @@ use touch2touch::gpu::sheet::Sheet;
 use touch2touch::gpu::target::{Picture, Target};
 use touch2touch::gpu::view::{Camera, Plane, Preset};
 use touch2touch::gpu::{Gpu, GpuError, guides, shaders, wgpu};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::mesh::TriMesh;
 
 use crate::support;
 

@@ -4,12 +4,12 @@ use std::path::Path;
 use std::process::{Command, Output};
 
 use serde_json::Value;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::lab;
-use touch2touch::infer::bundle::{Bundle, Origin};
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::infer::generator::Generator;
-use touch2touch::io::dataset::Dataset;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::lab;
+use touch2touch_work::infer::bundle::{Bundle, Origin};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::infer::generator::Generator;
+use touch2touch_work::io::dataset::Dataset;
 
 /// Runs a copy of the program that lies alone in `home`, with nothing of this machine's settings.
 fn alone(home: &Path, args: &[&str]) -> Output {

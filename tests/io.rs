@@ -12,11 +12,11 @@ mod pt;
 use std::path::Path;
 
 use glam::{DAffine3, DQuat, DVec3};
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::grid::Grid;
-use touch2touch::domain::rig::lab as rig;
-use touch2touch::domain::sample::{ColorTouch, DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
-use touch2touch::domain::sensor::Intrinsics;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::rig::lab as rig;
+use touch2touch_core::sample::{ColorTouch, DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
+use touch2touch_core::sensor::Intrinsics;
 
 /// A touch with the sizes of the lab's and values that differ in every pixel, finger and image.
 fn touch(seed: f32) -> Sample {

@@ -9,22 +9,22 @@ use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::evaluation::Figure;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::Provenance;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
-use touch2touch::infer::bundle::Origin;
-use touch2touch::infer::store::Store;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::evaluate::{Evaluation, Report, Setup, evaluate, known};
-use touch2touch::work::job::{Cancel, JobCx};
-use touch2touch::work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Revision};
-use touch2touch::work::mask::{MaskChoice, MaskSource};
-use touch2touch::work::models::Models;
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::Figure;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::Provenance;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
+use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, known};
+use touch2touch_work::infer::bundle::Origin;
+use touch2touch_work::infer::store::Store;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Revision};
+use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::models::Models;
 
 fn write(root: &Path, grasps: std::ops::Range<u64>) {
     let tools = &catalog::tools()[..2];
@@ -58,7 +58,7 @@ fn models(folder: &Path) -> Models {
 fn run(data: &Path, setup: &Setup, cache: &Path) -> (Evaluation, u64) {
     let first = Arc::new(Mutex::new(None));
     let seen = first.clone();
-    let sink = move |progress: touch2touch::work::job::Progress| {
+    let sink = move |progress: touch2touch_work::job::Progress| {
         if progress.total > 0 {
             seen.lock().unwrap().get_or_insert(progress.total - progress.done);
         }

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use touch2touch::infer::bundle::{Bundle, MANIFEST, find};
+use touch2touch_work::infer::bundle::{Bundle, MANIFEST, find};
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
@@ -74,7 +74,7 @@ fn the_trainer_names_the_simulators_tools() {
     let text = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("training/baselines.py")).unwrap();
     let list = text.split_once("NAMES = (").unwrap().1.split_once(')').unwrap().0;
     let names: Vec<&str> = list.split('"').skip(1).step_by(2).collect();
-    let tools: Vec<&str> = touch2touch::domain::catalog::tools().iter().map(|t| t.name.as_str()).collect();
+    let tools: Vec<&str> = touch2touch_core::catalog::tools().iter().map(|t| t.name.as_str()).collect();
     assert_eq!(names, tools);
 }
 
@@ -209,14 +209,14 @@ fn bundles_are_found_once_and_broken_ones_reported() {
 mod running {
     use std::ops::ControlFlow;
 
-    use touch2touch::domain::diffusion::{GenerateConfig, Progress, Tensor};
-    use touch2touch::domain::grid::{Grid, RgbGrid};
-    use touch2touch::domain::postprocess::{RawPrediction, ShiftMode};
-    use touch2touch::infer::bundle::Role;
-    use touch2touch::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
-    use touch2touch::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
-    use touch2touch::infer::generator::{GenerateError, Generator};
-    use touch2touch::infer::mask::{MaskError, MaskModel};
+    use touch2touch_core::diffusion::{GenerateConfig, Progress, Tensor};
+    use touch2touch_core::grid::{Grid, RgbGrid};
+    use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
+    use touch2touch_work::infer::bundle::Role;
+    use touch2touch_work::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
+    use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
+    use touch2touch_work::infer::generator::{GenerateError, Generator};
+    use touch2touch_work::infer::mask::{MaskError, MaskModel};
 
     use super::*;
     use crate::support::left_out;
@@ -506,13 +506,6 @@ mod running {
         assert_eq!((recipe.bundle.as_str(), recipe.engine), (bundle.hash(), EngineKind::Rten));
         assert_eq!(recipe.config(), config());
     }
-}
-
-#[cfg(not(feature = "onnx"))]
-#[test]
-fn a_build_without_models_says_so() {
-    use touch2touch::infer::engine::{EngineChoice, EngineError, resolve};
-    assert!(matches!(resolve(EngineChoice::Auto), Err(EngineError::NotInThisBuild)));
 }
 
 /// The trial of a bundle in a second process, by the program itself.

@@ -5,22 +5,21 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::align::{AlignConfig, AlignReport, Ask, align};
-use touch2touch::domain::cloud::lift;
-use touch2touch::domain::contact::{
+use touch2touch_core::align::{AlignConfig, AlignReport, Ask, align};
+use touch2touch_core::cloud::lift;
+use touch2touch_core::contact::{
     LAB_CAD_DISTANCE_M, MaskBasis, cad_signed_distance, rest_and_top, settled_model, threshold,
 };
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::field::DistanceField;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::pose::{Registration, ToolModel, register};
-use touch2touch::domain::rig::{PerPad, lab};
-use touch2touch::domain::units::angle_error;
-use touch2touch::io::cases::{Case, CaseSet};
-use touch2touch::io::dataset::Dataset;
-use touch2touch::work;
-use touch2touch::work::cloud::contact_points;
-use touch2touch::work::imprint::measured;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::field::DistanceField;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::pose::{Registration, ToolModel, register};
+use touch2touch_core::rig::{PerPad, lab};
+use touch2touch_core::units::angle_error;
+use touch2touch_work::cloud::contact_points;
+use touch2touch_work::imprint::measured;
+use touch2touch_work::io::cases::{Case, CaseSet};
+use touch2touch_work::io::dataset::Dataset;
 
 use crate::support::shared;
 
@@ -154,7 +153,7 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         let masks: PerPad<Mask> = masks.collect();
         let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
         let registration = Registration::DistanceField.method();
-        let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth)).unwrap();
+        let pose = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth)).unwrap();
         let error = pose.error_rad.unwrap().to_degrees();
         eprintln!(
             "{}: {:.2} deg, error {error:.2} deg, {} points",
@@ -186,7 +185,7 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
     let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
     let (registration, truth) = (Registration::DistanceField.method(), sample.grasp_from_object);
-    let pose = work::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
+    let pose = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
     pose.map_or((f64::NAN, 0), |pose| (pose.error_rad.unwrap().to_degrees(), pose.num_points))
 }
 

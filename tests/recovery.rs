@@ -8,14 +8,14 @@ use std::sync::Arc;
 use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::domain::grid::{Grid, Mask, RgbGrid};
-use touch2touch::domain::label::Provenance;
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::images;
-use touch2touch::io::masks::{FOLDER, MaskStore};
-use touch2touch::work::error::TaskErrorKind;
-use touch2touch::work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review, Unsaved, recover, take_in};
+use touch2touch_core::grid::{Grid, Mask, RgbGrid};
+use touch2touch_core::label::Provenance;
+use touch2touch_core::rig::lab;
+use touch2touch_work::error::TaskErrorKind;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::images;
+use touch2touch_work::io::masks::{FOLDER, MaskStore};
+use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review, Unsaved, recover, take_in};
 
 /// A folder of two pairs of pictures.
 fn pictures(root: &Path) -> Dataset {
@@ -40,8 +40,8 @@ fn square(base: &PairLabels, x: usize) -> PairLabels {
         .unwrap_or_else(|| HandMask::new(Mask::filled(32, 32, false), Provenance::Nothing));
     let mut mask = (*hand.mask).clone();
     let touched = Mask::from_fn(32, 32, |a, b| (x..x + 4).contains(&a) && b < 4);
-    let rect = touch2touch::domain::label::Rect { x, y: 0, width: 4, height: 4 };
-    let paint = touch2touch::domain::label::Paint::Contact;
+    let rect = touch2touch_core::label::Rect { x, y: 0, width: 4, height: 4 };
+    let paint = touch2touch_core::label::Paint::Contact;
     Arc::make_mut(&mut hand.marks).paint(&mut mask, (&touched, rect), paint, None, Provenance::hand("Anna"));
     hand.mask = mask.into();
     labels.masks.insert(place, hand);

@@ -6,10 +6,10 @@ use serde_json::{Value, json};
 use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::domain::grid::RgbGrid;
-use touch2touch::domain::rig::Rig;
-use touch2touch::io::dataset::{Dataset, OpenError, RIG_JSON};
-use touch2touch::io::images;
+use touch2touch_core::grid::RgbGrid;
+use touch2touch_core::rig::Rig;
+use touch2touch_work::io::dataset::{Dataset, OpenError, RIG_JSON};
+use touch2touch_work::io::images;
 
 use crate::support::run;
 

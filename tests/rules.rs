@@ -3,14 +3,14 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
-use touch2touch::domain::catalog;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::Provenance;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+use touch2touch_core::catalog;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::Provenance;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
 
 use super::support::rust_files;
 
@@ -56,7 +56,7 @@ const RULES: [(u32, &str, &[&str]); 7] = [
 #[test]
 fn each_rule_has_its_tests() {
     let mut files = Vec::new();
-    for folder in ["src", "tests"] {
+    for folder in ["src", "crates", "tests"] {
         rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
     }
     let sources: Vec<String> = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();

@@ -14,15 +14,15 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Level;
-use touch2touch::domain::grid::{Grid, RgbGrid};
-use touch2touch::domain::postprocess::Picture;
-use touch2touch::domain::rig::{PadId, Rig, SensorKind, lab};
-use touch2touch::infer::bundle::{Bundle, Ends};
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::infer::generator::Generator;
-use touch2touch::io::dataset::{Dataset, RIG_JSON};
-use touch2touch::io::images;
-use touch2touch::work::bundles::BundleKind;
+use touch2touch_core::grid::{Grid, RgbGrid};
+use touch2touch_core::postprocess::Picture;
+use touch2touch_core::rig::{PadId, Rig, SensorKind, lab};
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::infer::bundle::{Bundle, Ends};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::infer::generator::Generator;
+use touch2touch_work::io::dataset::{Dataset, RIG_JSON};
+use touch2touch_work::io::images;
 
 use crate::support::run;
 
@@ -154,7 +154,7 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     let rig = digit_folder(&set);
     let dataset = Dataset::open(&set).unwrap();
     assert_eq!((&*dataset.rig, dataset.problems.len()), (&rig, 0), "{:?}", dataset.problems);
-    let sample = dataset.load(touch2touch::domain::dataset::PairId(0)).unwrap();
+    let sample = dataset.load(touch2touch_core::dataset::PairId(0)).unwrap();
     let thumb = PadId::default();
     assert_eq!(sample.pads.entries().map(|(pad, _)| pad).collect::<Vec<_>>(), [thumb]);
     let touch = sample.pad(thumb).unwrap();

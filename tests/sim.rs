@@ -3,11 +3,11 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
-use touch2touch::domain::catalog::{self, ToolSpec};
-use touch2touch::domain::grid::Grid;
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::domain::sample::{ColorTouch, DepthTouch, Sample};
-use touch2touch::domain::sim::{self, Grasp, SimConfig};
+use touch2touch_core::catalog::{self, ToolSpec};
+use touch2touch_core::grid::Grid;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_core::sample::{ColorTouch, DepthTouch, Sample};
+use touch2touch_core::sim::{self, Grasp, SimConfig};
 
 fn bubble_of(sample: &Sample, finger: PadId) -> &DepthTouch {
     sample.pad(finger).and_then(|t| t.depth()).expect("both fingers have a bubble")

@@ -12,18 +12,18 @@ use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strum::IntoEnumIterator as _;
-use touch2touch::domain::align::{
+use touch2touch_core::align::{
     AlignConfig, AlignError, AlignReport, LabIcpConfig, LabModel, align, closed_form, lab_icp,
 };
-use touch2touch::domain::cloud::{Lifted, lift};
-use touch2touch::domain::field::{DistanceField, FieldError};
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::grid::{DepthMap, Mask};
-use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::pose::{Registration, register};
-use touch2touch::domain::tool::{ToolError, ToolModel};
-use touch2touch::domain::units::{angle_error, scale_to_meters};
-use touch2touch::io::cases::{self, Case};
+use touch2touch_core::cloud::{Lifted, lift};
+use touch2touch_core::field::{DistanceField, FieldError};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::pose::{Registration, register};
+use touch2touch_core::tool::{ToolError, ToolModel};
+use touch2touch_core::units::{angle_error, scale_to_meters};
+use touch2touch_work::io::cases::{self, Case};
 
 /// A box with the given half sizes about `center`, closed, facing outwards.
 fn cuboid(center: DVec3, half: DVec3) -> TriMesh {

@@ -3,21 +3,21 @@
 use std::path::Path;
 use std::sync::Arc;
 
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::pose::{Registration, RegistrationChoice};
-use touch2touch::domain::sim;
-use touch2touch::infer::bundle::Origin;
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::bundles::{self, BundleInfo};
-use touch2touch::work::evaluate::{Setup, evaluate};
-use touch2touch::work::job::{Cancel, JobCx, Progress};
-use touch2touch::work::labels::ImprintSource;
-use touch2touch::work::mask::{MaskChoice, MaskSource};
-use touch2touch::work::models::Models;
-use touch2touch::work::sweep::{Dial, InForce, Outcome, Setting, Sweep, SweepSetup, sweep};
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::sim;
+use touch2touch_work::bundles::{self, BundleInfo};
+use touch2touch_work::evaluate::{Setup, evaluate};
+use touch2touch_work::infer::bundle::Origin;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::job::{Cancel, JobCx, Progress};
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::models::Models;
+use touch2touch_work::sweep::{Dial, InForce, Outcome, Setting, Sweep, SweepSetup, sweep};
 
 use crate::support::run;
 

@@ -6,23 +6,23 @@ use std::process::Stdio;
 use std::sync::Arc;
 
 use serde_json::Value;
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::label::{DrawTool, Drawing, Ground, Paint, Provenance};
-use touch2touch::domain::postprocess::ShiftMode;
-use touch2touch::domain::sim;
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::bundles::{self, BundleKind, find};
-use touch2touch::work::error::TaskErrorKind;
-use touch2touch::work::export::{HandMasks, LeftOut};
-use touch2touch::work::job::{Cancel, JobCx, Progress};
-use touch2touch::work::labels::{Deed, HandMask, ImprintOf, Labels, MaskPlace, Review};
-use touch2touch::work::models::Models;
-use touch2touch::work::train::{TrainChoice, TrainSetup, Trained, plan, train};
-use touch2touch::work::tuning::Tuning;
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::label::{DrawTool, Drawing, Ground, Paint, Provenance};
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::sim;
+use touch2touch_work::bundles::{self, BundleKind, find};
+use touch2touch_work::error::TaskErrorKind;
+use touch2touch_work::export::{HandMasks, LeftOut};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::job::{Cancel, JobCx, Progress};
+use touch2touch_work::labels::{Deed, HandMask, ImprintOf, Labels, MaskPlace, Review};
+use touch2touch_work::models::Models;
+use touch2touch_work::train::{TrainChoice, TrainSetup, Trained, plan, train};
+use touch2touch_work::tuning::Tuning;
 
 use crate::support::{command, run};
 
@@ -55,7 +55,7 @@ pub(crate) fn corrected(root: &Path, grasps: u64) {
 fn review(dataset: &Dataset, at: usize, review: Review) {
     let (labels, name) = (Labels::of(dataset), &dataset.index.pairs[at].name);
     let stored = labels.load(name).unwrap();
-    labels.save(name, &touch2touch::work::labels::PairLabels { review, ..stored }, &Deed::default()).unwrap();
+    labels.save(name, &touch2touch_work::labels::PairLabels { review, ..stored }, &Deed::default()).unwrap();
 }
 
 fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainSetup {
@@ -71,7 +71,7 @@ fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainS
     }
 }
 
-fn go(dataset: &Dataset, setup: &TrainSetup, cx: &JobCx) -> Result<Trained, touch2touch::work::error::TaskError> {
+fn go(dataset: &Dataset, setup: &TrainSetup, cx: &JobCx) -> Result<Trained, touch2touch_work::error::TaskError> {
     let masks = HandMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
     train(dataset, &masks, setup, &Models::new(None), cx)
 }
@@ -258,7 +258,7 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
     assert!(made.warnings.iter().any(|warning| warning.starts_with("nothing is left out")));
     // What was changed since and is not on the disk counts too.
     let changed =
-        BTreeMap::from([(name.clone(), touch2touch::work::labels::PairLabels { review: Review::Flagged, ..stored })]);
+        BTreeMap::from([(name.clone(), touch2touch_work::labels::PairLabels { review: Review::Flagged, ..stored })]);
     let planned = plan(&dataset, &HandMasks { labels: &labels, changed: &changed }, choice).unwrap();
     assert_eq!((planned.masks(), planned.left_out), (2, BTreeMap::from([(LeftOut::Flagged, 1)])));
 }

@@ -4,9 +4,9 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::pt::{PtItem, Tensor, read_dict, write_dict};
 
 use crate::support::run;
 

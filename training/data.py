@@ -25,7 +25,7 @@ RANGE_M = (-0.0188, 0.0264)
 MASK_RANGE_M = (-0.0116, 0.0225)
 
 
-# Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`src/domain/rig/lab.rs`).
+# Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`crates/core/src/rig/lab.rs`).
 WINDOWS_PX = ((78.5, 74.0), (69.5, 73.0))
 # Where a generator's picture has the window of either finger: nothing in a GelSlim image of an unknown sensor says which
 # finger it is of, so a network that drew each at its own place would have to draw the mean of both. Whole pixels from both.

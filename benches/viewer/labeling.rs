@@ -9,12 +9,12 @@ use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results::Results;
 use touch2touch::app::settings::{MaskTool, Workspace};
-use touch2touch::domain::catalog;
-use touch2touch::domain::grid::Grid;
-use touch2touch::domain::sim;
-use touch2touch::io::dataset::RIG_JSON;
-use touch2touch::io::images;
-use touch2touch::io::simulated::{Layout, pair_paths, write_pair, write_tools};
+use touch2touch_core::catalog;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::sim;
+use touch2touch_work::io::dataset::RIG_JSON;
+use touch2touch_work::io::images;
+use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 
 use super::window::{SIZE, Studio, median, own_ms, resident_mib};
 

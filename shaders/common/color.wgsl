@@ -1,4 +1,4 @@
-// Color maps, sRGB-encoded. CPU twin: src/domain/colormap.rs (a GPU test compares them).
+// Color maps, sRGB-encoded. CPU twin: crates/core/src/colormap.rs (a GPU test compares them).
 
 const NAN_COLOR: vec3<f32> = vec3<f32>(0.42, 0.42, 0.42);
 

@@ -18,8 +18,8 @@ use super::settings::state::versus::{Versus, VersusMode};
 use super::settings::state::{ColorRange, MaskSettings, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
 use super::workbench::state::{Layer, SceneTool, Section};
-use crate::domain::hand::HandAxis;
-use crate::domain::label::{CleanKind, Paint};
+use touch2touch_core::hand::HandAxis;
+use touch2touch_core::label::{CleanKind, Paint};
 
 /// The next or previous of a fixed set, going round.
 fn next_of<T: IntoEnumIterator + PartialEq>(current: &T) -> Option<T> {

@@ -10,8 +10,8 @@ use super::effect::Effect;
 use super::settings::{self, SettingsCommand, state::GenerateSettings};
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use crate::work::adapt::Adapted;
-use crate::work::bundles::BundleInfo;
+use touch2touch_work::adapt::Adapted;
+use touch2touch_work::bundles::BundleInfo;
 
 /// What can happen to the fit.
 #[derive(Clone, Copy, Debug)]

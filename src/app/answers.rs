@@ -14,17 +14,17 @@ use super::settings::state::Settings;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
 use super::{adapt, dial, evaluate, export, follow, labels, library, predict, settings, tasks, train, workbench};
-use crate::io::statistics::ShiftStatistics;
-use crate::work::adapt::Adapted;
-use crate::work::bundles::BundleInfo;
-use crate::work::error::{TaskError, TaskErrorKind};
-use crate::work::evaluate::Evaluation;
-use crate::work::import::Import;
-use crate::work::job::Progress;
-use crate::work::propose::Batch;
-use crate::work::sweep::Sweep;
-use crate::work::tool::UnitSet;
-use crate::work::train::Trained;
+use touch2touch_work::adapt::Adapted;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::error::{TaskError, TaskErrorKind};
+use touch2touch_work::evaluate::Evaluation;
+use touch2touch_work::import::Import;
+use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::job::Progress;
+use touch2touch_work::propose::Batch;
+use touch2touch_work::sweep::Sweep;
+use touch2touch_work::tool::UnitSet;
+use touch2touch_work::train::Trained;
 
 /// What the runtime answers.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@ use super::effect::Effect;
 use super::settings::{self, MaskSettings, SettingsCommand};
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use crate::work::sweep::{Dial, InForce, Setting, Sweep};
+use touch2touch_work::sweep::{Dial, InForce, Setting, Sweep};
 
 /// What can happen to the dial.
 #[derive(Clone, Copy, Debug)]

@@ -12,20 +12,20 @@ use super::services::DataSource;
 use super::settings::state::Settings;
 use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
-use crate::domain::sample::Sample;
-use crate::io::dataset::ToolUnit;
-use crate::work::adapt::{AdaptSetup, Adapted};
-use crate::work::bundles::BundleInfo;
-use crate::work::case::CaseSetup;
-use crate::work::error::TaskError;
-use crate::work::evaluate::{Evaluation, Setup};
-use crate::work::export::ExportChoice;
-use crate::work::figure::FigureSetup;
-use crate::work::import::ImportSetup;
-use crate::work::labels::{Deed, Unsaved};
-use crate::work::propose::BatchSetup;
-use crate::work::sweep::SweepSetup;
-use crate::work::train::TrainSetup;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::adapt::{AdaptSetup, Adapted};
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::case::CaseSetup;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::evaluate::{Evaluation, Setup};
+use touch2touch_work::export::ExportChoice;
+use touch2touch_work::figure::FigureSetup;
+use touch2touch_work::import::ImportSetup;
+use touch2touch_work::io::dataset::ToolUnit;
+use touch2touch_work::labels::{Deed, Unsaved};
+use touch2touch_work::propose::BatchSetup;
+use touch2touch_work::sweep::SweepSetup;
+use touch2touch_work::train::TrainSetup;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,9 +10,9 @@ use std::sync::Arc;
 use super::effect::Effect;
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use crate::work::evaluate::{Evaluation, Setup};
-use crate::work::job::Progress;
-use crate::work::queue::measured_only;
+use touch2touch_work::evaluate::{Evaluation, Setup};
+use touch2touch_work::job::Progress;
+use touch2touch_work::queue::measured_only;
 
 /// How often what was scored so far is looked up while all pairs are scored.
 const LOOKS: u64 = 24;

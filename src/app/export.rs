@@ -14,10 +14,10 @@ use super::settings::state::GenerateSettings;
 use super::state::State;
 use super::view::state::UiRequest;
 use super::{library, predict, settings};
-use crate::io::case_file;
-use crate::work::error::TaskError;
-use crate::work::export::ExportChoice;
-use crate::work::figure::FigureSetup;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::export::ExportChoice;
+use touch2touch_work::figure::FigureSetup;
+use touch2touch_work::io::case_file;
 
 /// What can happen to what is taken away.
 #[derive(Clone, Debug)]

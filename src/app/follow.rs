@@ -8,7 +8,7 @@ use super::services::Followed;
 use super::state::State;
 use super::tasks::state::Ticket;
 use super::{library, predict};
-use crate::work::error::TaskError;
+use touch2touch_work::error::TaskError;
 
 /// What can happen to following.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

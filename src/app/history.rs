@@ -6,9 +6,9 @@ use strum::IntoEnumIterator as _;
 
 use super::keys::{ImprintSource, Revision};
 use super::labels::state::{Document, HandMask, MaskPlace, Review};
-use crate::domain::hand::AcceptedPose;
-use crate::domain::label::PackedMask;
-use crate::work::labels::{Change, Past};
+use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::label::PackedMask;
+use touch2touch_work::labels::{Change, Past};
 
 /// A corrected mask in few bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -279,11 +279,11 @@ impl History {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::domain::grid::Mask;
-    use crate::domain::label::Provenance;
-    use crate::domain::predicted_id::PredictedId;
-    use crate::domain::rig::{PadId, lab};
-    use crate::work::labels::ImprintOf;
+    use touch2touch_core::grid::Mask;
+    use touch2touch_core::label::Provenance;
+    use touch2touch_core::predicted_id::PredictedId;
+    use touch2touch_core::rig::{PadId, lab};
+    use touch2touch_work::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> HandMask {
         let hand = HandMask::new(Mask::filled(8, 4, false), Provenance::Nothing);

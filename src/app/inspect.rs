@@ -6,9 +6,9 @@ pub use state::{BasinColor, Inspect, Inspected, Inspection, Pin};
 
 use super::keys::{ImprintSource, Request};
 use super::state::State;
-use crate::domain::align::basin::Plane;
-use crate::domain::frames::PlanarPose;
-use crate::work::error::TaskError;
+use touch2touch_core::align::basin::Plane;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_work::error::TaskError;
 
 /// What a person does with the time machine and the basin map.
 #[derive(Clone, Copy, Debug, PartialEq)]

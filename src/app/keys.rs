@@ -1,11 +1,11 @@
 //! Names of what is open and looked at, and the words that recipes are made of. The recipes themselves stand with their
 //! results in [`super::results`].
 
-pub use crate::domain::bits::{Bits, Bits64};
-pub use crate::domain::diffusion::{Preset, Sampler, Spacing};
-pub use crate::domain::postprocess::ShiftMode;
-pub use crate::work::labels::{ImprintSource, Revision};
-pub use crate::work::mask::MaskRecipe;
+pub use touch2touch_core::bits::{Bits, Bits64};
+pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
+pub use touch2touch_core::postprocess::ShiftMode;
+pub use touch2touch_work::labels::{ImprintSource, Revision};
+pub use touch2touch_work::mask::MaskRecipe;
 
 pub use super::results::Request;
 pub use super::results::basin::BasinKey;
@@ -18,11 +18,11 @@ pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
 pub use super::results::run::RunKey;
 pub use super::results::versus::{ApartKey, VersusKey};
-pub use crate::domain::pose::{Registration, RegistrationChoice};
+pub use touch2touch_core::pose::{Registration, RegistrationChoice};
 
-use crate::domain::dataset::PairId;
-use crate::domain::frames::PlanarPose;
-use crate::domain::rig::PadId;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::rig::PadId;
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]

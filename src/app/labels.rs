@@ -23,14 +23,14 @@ use super::keys::ImprintSource;
 use super::settings;
 use super::state::{Lookup, State};
 use super::tasks::state::Level;
-use crate::domain::grid::Mask;
-use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Seen, Sight};
-use crate::domain::rig::PadId;
-use crate::work::cloud::seen;
-use crate::work::error::TaskError;
-use crate::work::labels::{Act, Deed, note, system_person};
-use crate::work::propose::accepted;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Seen, Sight};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::cloud::seen;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::labels::{Act, Deed, note, system_person};
+use touch2touch_work::propose::accepted;
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]

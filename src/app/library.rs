@@ -21,13 +21,13 @@ use super::state::State;
 use super::tasks::state::Level;
 use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
-use crate::domain::dataset::PairId;
-use crate::domain::rig::PadId;
-use crate::io::dataset::ToolUnit;
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::error::TaskError;
-use crate::work::queue::QueueBy;
-use crate::work::tool::UnitSet;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::dataset::ToolUnit;
+use touch2touch_work::queue::QueueBy;
+use touch2touch_work::tool::UnitSet;
 
 /// What can happen to the data set and its list.
 #[derive(Clone, Debug)]

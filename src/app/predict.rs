@@ -7,9 +7,9 @@ use super::effect::Effect;
 use super::keys::PredictionKey;
 use super::settings;
 use super::state::{Absent, State};
-use crate::domain::rig::{PadId, Text};
-use crate::work::bundles::BundleKind;
-use crate::work::error::TaskError;
+use touch2touch_core::rig::{PadId, Text};
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::error::TaskError;
 
 /// What can happen to predictions.
 #[derive(Clone, Debug)]

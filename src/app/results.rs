@@ -12,7 +12,7 @@ use super::keys::{DatasetSeq, ImprintSource, PairKey, TouchKey};
 use super::services::SharedServices;
 use super::state::{Absent, Lookup, State};
 use super::wanted::Wanted;
-use crate::work::error::TaskError;
+use touch2touch_work::error::TaskError;
 
 pub mod ahead;
 pub mod ambiguity;

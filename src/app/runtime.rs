@@ -22,9 +22,9 @@ use super::services::SharedServices;
 use super::state::State;
 use super::tasks::state::Ticket;
 use super::view::state::UiRequest;
-use crate::io::caught::caught;
-use crate::work::job::{Cancel, Progress};
 use lanes::{Event, Lanes};
+use touch2touch_work::io::caught::caught;
+use touch2touch_work::job::{Cancel, Progress};
 
 /// The latest picture on the way of each touch, with the job that made it.
 type LatestPreviews = BTreeMap<TouchKey, (Ticket, Arc<Preview>)>;

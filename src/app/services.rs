@@ -13,32 +13,32 @@ use super::keys::{PredictionKey, TouchKey};
 use super::labels::state::{PairLabels, Review};
 use super::library::state::Place;
 use super::settings::state::Settings;
-use crate::domain::contact::ContactMask;
-use crate::domain::dataset::{Index, PairId, Problem};
-use crate::domain::diffusion::GenerateConfig;
-use crate::domain::evaluation::Scores;
-use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::mesh::TriMesh;
-use crate::domain::rig::Rig;
-use crate::domain::sample::Sample;
-use crate::infer::engine::EngineChoice;
-use crate::io::dataset::{Dataset, ToolUnit};
-use crate::io::statistics::ShiftStatistics;
-use crate::work::adapt::{self, AdaptSetup, Adapted};
-use crate::work::bundles::{self, BundleInfo};
-use crate::work::case::{self, Case, CaseSetup, Held};
-use crate::work::error::TaskError;
-use crate::work::evaluate::{self, Evaluation, Setup};
-use crate::work::export::{ExportChoice, HandMasks, Plan};
-use crate::work::job::JobCx;
-use crate::work::label_stats::LabelStats;
-use crate::work::labels::{Deed, Labels, Recovered, Told, Unsaved};
-use crate::work::models::{Models, Wanted};
-use crate::work::prediction::Prediction;
-use crate::work::propose::{self, Batch, BatchSetup};
-use crate::work::sweep::{self, Sweep, SweepSetup};
-use crate::work::tool::{UnitSet, set_unit};
-use crate::work::train::{self, TrainSetup, Trained};
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::dataset::{Index, PairId, Problem};
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::evaluation::Scores;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::Rig;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::adapt::{self, AdaptSetup, Adapted};
+use touch2touch_work::bundles::{self, BundleInfo};
+use touch2touch_work::case::{self, Case, CaseSetup, Held};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::evaluate::{self, Evaluation, Setup};
+use touch2touch_work::export::{ExportChoice, HandMasks, Plan};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::dataset::{Dataset, ToolUnit};
+use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::label_stats::LabelStats;
+use touch2touch_work::labels::{Deed, Labels, Recovered, Told, Unsaved};
+use touch2touch_work::models::{Models, Wanted};
+use touch2touch_work::prediction::Prediction;
+use touch2touch_work::propose::{self, Batch, BatchSetup};
+use touch2touch_work::sweep::{self, Sweep, SweepSetup};
+use touch2touch_work::tool::{UnitSet, set_unit};
+use touch2touch_work::train::{self, TrainSetup, Trained};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -143,7 +143,7 @@ pub trait DataSource: Send + Sync {
     }
 
     /// How far the labeling is, what it took, and what comes back to a person; see
-    /// [`crate::work::label_stats::label_stats`].
+    /// [`touch2touch_work::label_stats::label_stats`].
     ///
     /// # Errors
     /// None of the journals: what cannot be read of them is in the result.

@@ -13,8 +13,8 @@ use super::action::{Action, Shortcut};
 use super::effect::Effect;
 use super::keys::{ImprintSource, RegistrationChoice, ShiftMode};
 use super::state::State;
-use crate::domain::label::Paint;
-use crate::infer::engine::EngineChoice;
+use touch2touch_core::label::Paint;
+use touch2touch_work::infer::engine::EngineChoice;
 
 /// What can happen to the preferences.
 #[derive(Clone, Debug)]

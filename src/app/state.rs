@@ -19,9 +19,9 @@ use super::tasks::state::{Log, Tasks};
 use super::train::state::TrainState;
 use super::view::state::Selection;
 use super::workbench::state::Workbench;
-use crate::domain::dataset::PairEntry;
-use crate::domain::rig::{PadId, Rig, Text};
-use crate::work::error::TaskError;
+use touch2touch_core::dataset::PairEntry;
+use touch2touch_core::rig::{PadId, Rig, Text};
+use touch2touch_work::error::TaskError;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]

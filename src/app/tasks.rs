@@ -8,7 +8,7 @@ pub use state::{Entry, Level, Log, Task, Tasks, Ticket};
 
 use super::effect::Effect;
 use super::state::State;
-use crate::work::error::TaskError;
+use touch2touch_work::error::TaskError;
 
 /// What can happen to jobs and log.
 #[derive(Clone, Debug)]

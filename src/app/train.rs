@@ -10,8 +10,8 @@ use super::effect::Effect;
 use super::settings::{self, SettingsCommand, state::MaskSettings};
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use crate::work::bundles::BundleInfo;
-use crate::work::train::Trained;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::train::Trained;
 
 /// What can happen to the training.
 #[derive(Clone, Copy, Debug)]

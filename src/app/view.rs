@@ -13,7 +13,7 @@ use super::keys::ImprintSource;
 use super::labels;
 use super::pane::Pane;
 use super::state::State;
-use crate::domain::rig::PadId;
+use touch2touch_core::rig::PadId;
 
 /// What can happen to what is on screen.
 #[derive(Clone, Debug)]

@@ -11,8 +11,8 @@ use super::inspect::InspectCommand;
 use super::keys::{ImprintSource, Request, RunKey};
 use super::state::State;
 use super::{inspect, labels};
-use crate::domain::hand::{self, AcceptedPose, HandAxis, HandCost, HandPose};
-use crate::work::error::TaskError;
+use touch2touch_core::hand::{self, AcceptedPose, HandAxis, HandCost, HandPose};
+use touch2touch_work::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;

@@ -9,7 +9,7 @@ use super::buffer::{Elements, Uniform};
 use super::pipelines::Pipelines;
 use super::vertex::{CREASE_RAD, place};
 use super::{Gpu, GpuError, view, wgpu};
-use crate::domain::mesh::TriMesh;
+use touch2touch_core::mesh::TriMesh;
 
 /// How the edges of a mesh are drawn.
 #[derive(Clone, Copy, Debug, PartialEq)]

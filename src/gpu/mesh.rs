@@ -12,8 +12,8 @@ use super::pipelines::Pipelines;
 use super::vertex::{CREASE_RAD, MeshVertex, drawable, place};
 use super::view::Camera;
 use super::{Gpu, GpuError, view, wgpu};
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::mesh::TriMesh;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::mesh::TriMesh;
 
 /// A mesh to be shown.
 #[derive(Clone, Debug)]

@@ -9,7 +9,7 @@ use super::buffer::{Elements, Uniform};
 use super::pipelines::Pipelines;
 use super::vertex::drawable;
 use super::{Gpu, GpuError, view, wgpu};
-use crate::domain::colormap::{ColorMap, NAN_COLOR, Range};
+use touch2touch_core::colormap::{ColorMap, NAN_COLOR, Range};
 
 /// A cloud to be shown.
 #[derive(Clone, Debug)]

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::wgpu;
-use crate::domain::colormap::Range;
+use touch2touch_core::colormap::Range;
 
 /// Faces that meet at less than this are one rounded surface.
 pub(super) const CREASE_RAD: f64 = 40.0 / 180.0 * std::f64::consts::PI;

@@ -1,6 +1,6 @@
 //! The camera, and the only place where f64 meters become the f32 of the device.
 //!
-//! World = the grasp frame (see [`crate::domain::frames`]): x = closing axis with the left finger at negative x,
+//! World = the grasp frame (see [`touch2touch_core::frames`]): x = closing axis with the left finger at negative x,
 //! +z = the direction the tool points, y = lateral. On screen the wrist is up (-z), so the tool hangs down.
 
 use bytemuck::{Pod, Zeroable};
@@ -8,7 +8,7 @@ use glam::{DAffine3, DMat4, DVec2, DVec3, DVec4, Vec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI};
 
-use crate::domain::label::{Layers, Sight};
+use touch2touch_core::label::{Layers, Sight};
 
 /// Up on the screen, in world coordinates.
 const UP: DVec3 = DVec3::NEG_Z;

@@ -10,8 +10,8 @@ use super::args::{DatasetArgs, LimitArgs, parse_minutes};
 use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::dataset::PairId;
-use crate::work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 
 /// Arguments of `adapt`.
 #[derive(Debug, Args)]

@@ -12,11 +12,11 @@ use serde::Serialize;
 use strum::IntoEnumIterator;
 
 use super::Common;
-use crate::domain::pose::{Registration, RegistrationChoice};
-use crate::domain::read_as::{ReadAs, parse_list};
-use crate::domain::rig::{PadId, Rig};
-use crate::io::atomic;
-use crate::io::dataset::{Dataset, OpenError, ToolScale};
+use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::read_as::{ReadAs, parse_list};
+use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_work::io::atomic;
+use touch2touch_work::io::dataset::{Dataset, OpenError, ToolScale};
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]

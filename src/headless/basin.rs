@@ -10,17 +10,16 @@ use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Output, VerbResult};
-use crate::domain::align::basin::{Basin, Plane};
-use crate::domain::align::{Ask, Run};
-use crate::domain::findings::Finding;
-use crate::domain::frames::PlanarPose;
-use crate::domain::pose::RegistrationChoice;
-use crate::domain::units::{angle_error, fixed, mm, wrap_angle};
-use crate::work;
-use crate::work::job::JobCx;
-use crate::work::labels::{ImprintSource, Labels};
-use crate::work::mask::MaskInputs;
-use crate::work::tool::load_tool;
+use touch2touch_core::align::basin::{Basin, Plane};
+use touch2touch_core::align::{Ask, Run};
+use touch2touch_core::findings::Finding;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::units::{angle_error, fixed, mm, wrap_angle};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::tool::load_tool;
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -108,9 +107,9 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let points = contact.points(&sample)?;
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
     let registration = args.engine.method();
-    let own = work::pose::pose(&points, &tool, &*registration, Ask::default(), sample.grasp_from_object)?;
+    let own = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), sample.grasp_from_object)?;
     let started = Instant::now();
-    let basin = work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;
+    let basin = touch2touch_work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
         engine: args.engine.to_string(),

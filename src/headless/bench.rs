@@ -17,9 +17,9 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::VerbResult;
-use crate::domain::cloud::{CloudError, lift};
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::sample::DepthCamera;
+use touch2touch_core::cloud::{CloudError, lift};
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::sample::DepthCamera;
 
 /// What is measured.
 #[derive(Debug, Subcommand)]

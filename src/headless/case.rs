@@ -9,10 +9,10 @@ use super::args::{DatasetArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::pose::RegistrationChoice;
-use crate::work::case::{CaseSetup, check, make, open};
-use crate::work::labels::Labels;
-use crate::work::models::Models;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::case::{CaseSetup, check, make, open};
+use touch2touch_work::labels::Labels;
+use touch2touch_work::models::Models;
 
 /// What is done with a case.
 #[derive(Debug, Subcommand)]
@@ -98,7 +98,7 @@ fn run_make(args: &MakeArgs) -> VerbResult {
         view: None,
     };
     let case = make(&dataset, &setup, predictor.models(), &args.out, &output.job())?;
-    let angle = |pose: crate::domain::frames::PlanarPose| pose.inverse().theta_rad.to_degrees();
+    let angle = |pose: touch2touch_core::frames::PlanarPose| pose.inverse().theta_rad.to_degrees();
     let angles_deg = case.results.iter().map(|r| (r.imprint.key(), r.pose.map(angle))).collect();
     let made = Made { file: &args.out, pair: &case.pair, angles_deg };
     output.finish(&made, || format!("wrote {} ({})", args.out.display(), case.pair))?;

@@ -12,27 +12,27 @@ use super::ledger::write_colored;
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Output, ToolArgs, VerbResult, seeds};
-use crate::domain::align::Ask;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::findings::Finding;
-use crate::domain::grid::DepthMap;
-use crate::domain::hand::PoseDifference;
-use crate::domain::pose::{RegistrationChoice, ToolModel};
-use crate::domain::postprocess::ShiftMode;
-use crate::domain::rig::{PadId, PerPad, Text};
-use crate::domain::sample::Sample;
-use crate::domain::units::{fixed, mm};
-use crate::io::dataset::Dataset;
-use crate::io::npz;
-use crate::work::compare::{Comparison, Depicted, beside, between, tile_of};
-use crate::work::imprint;
-use crate::work::job::JobCx;
-use crate::work::labels::{ImprintOf, ImprintSource, Labels};
-use crate::work::mask::MaskInputs;
-use crate::work::pose::{PoseResult, pose};
-use crate::work::prediction::Prediction;
-use crate::work::subject::{Subject, Wish};
-use crate::work::tool::load_tool;
+use touch2touch_core::align::Ask;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::findings::Finding;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::{PadId, PerPad, Text};
+use touch2touch_core::sample::Sample;
+use touch2touch_core::units::{fixed, mm};
+use touch2touch_work::compare::{Comparison, Depicted, beside, between, tile_of};
+use touch2touch_work::imprint;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::npz;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{ImprintOf, ImprintSource, Labels};
+use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::prediction::Prediction;
+use touch2touch_work::subject::{Subject, Wish};
+use touch2touch_work::tool::load_tool;
 
 /// Half the range of the difference's colors in a written picture, meters.
 const DIFFERENCE_M: f32 = 0.004;
@@ -161,7 +161,7 @@ fn find(
     args: &CompareArgs,
     subject: &Subject,
     dataset: &Dataset,
-    pair: crate::domain::dataset::PairId,
+    pair: touch2touch_core::dataset::PairId,
     sample: &Sample,
 ) -> anyhow::Result<Found> {
     let predictor = |wish: &Wish| Predictor::new(&args.model.with(wish), &dataset.rig);

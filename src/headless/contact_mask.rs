@@ -5,8 +5,8 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator as _;
 
 use super::Output;
-use crate::work::labels::{Labels, PairLabels};
-use crate::work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::labels::{Labels, PairLabels};
+use touch2touch_work::mask::{MaskChoice, MaskSource};
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]

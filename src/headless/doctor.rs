@@ -9,17 +9,17 @@ use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
-use crate::domain::doubt::Doubt;
-use crate::domain::findings::{Finding, Findings};
-use crate::domain::units::counted;
-use crate::infer::engine::EngineChoice;
-use crate::io::dataset::{Dataset, OpenError};
-use crate::io::doctor::{self, DoctorReport};
-use crate::work::bundles::{self, BundleKind};
-use crate::work::doubts::{self, examine_reading};
-use crate::work::job::JobCx;
-use crate::work::models::Models;
-use crate::work::predict::Generating;
+use touch2touch_core::doubt::Doubt;
+use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_core::units::counted;
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::doubts::{self, examine_reading};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::dataset::{Dataset, OpenError};
+use touch2touch_work::io::doctor::{self, DoctorReport};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::Models;
+use touch2touch_work::predict::Generating;
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).

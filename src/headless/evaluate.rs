@@ -1,7 +1,7 @@
 //! `touch2touch evaluate`: the paper's results table of a data set.
 
-use crate::io::dataset::Dataset;
 use std::path::{Path, PathBuf};
+use touch2touch_work::io::dataset::Dataset;
 
 use clap::{Args, ValueEnum};
 
@@ -9,13 +9,13 @@ use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::predict::{RuntimeArg, ShiftArg};
 use super::{Common, Output, ToolArgs, VerbResult};
-use crate::domain::diffusion::Sampler;
-use crate::domain::evaluation::{self, Row, paper_rows};
-use crate::domain::pose::RegistrationChoice;
-use crate::infer::bundle::{Bundle, Found, Origin, find_all};
-use crate::io::atomic;
-use crate::work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
-use crate::work::models::Models;
+use touch2touch_core::diffusion::Sampler;
+use touch2touch_core::evaluation::{self, Row, paper_rows};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
+use touch2touch_work::infer::bundle::{Bundle, Found, Origin, find_all};
+use touch2touch_work::io::atomic;
+use touch2touch_work::models::Models;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]

@@ -12,17 +12,17 @@ use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
-use crate::domain::align::Ask;
-use crate::domain::findings::Finding;
-use crate::domain::pose::RegistrationChoice;
-use crate::work::cloud::clouds;
-use crate::work::figure::note;
-use crate::work::job::JobCx;
-use crate::work::labels::{ImprintSource, Labels};
-use crate::work::mask::MaskInputs;
-use crate::work::pair_files::{PairFile, PairParts, write};
-use crate::work::pose::pose;
-use crate::work::tool::load_tool;
+use touch2touch_core::align::Ask;
+use touch2touch_core::findings::Finding;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::cloud::clouds;
+use touch2touch_work::figure::note;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::pair_files::{PairFile, PairParts, write};
+use touch2touch_work::pose::pose;
+use touch2touch_work::tool::load_tool;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]

@@ -10,10 +10,10 @@ use strum::IntoEnumIterator as _;
 use super::args::{DatasetArgs, FingerArg, keyed};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::dataset::PairId;
-use crate::work::error::TaskError;
-use crate::work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
 
 /// Arguments of `figure`.
 #[derive(Debug, Args)]
@@ -101,7 +101,7 @@ pub(super) fn run(args: &FigureArgs) -> VerbResult {
     let mut setup = FigureSetup {
         pairs,
         fingers,
-        shift: crate::domain::postprocess::ShiftMode::default(),
+        shift: touch2touch_core::postprocess::ShiftMode::default(),
         look,
         note: String::new(),
     };

@@ -7,28 +7,28 @@ use strum::IntoEnumIterator as _;
 
 use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
-use crate::domain::align::Ask;
-use crate::domain::contact::MaskBasis;
-use crate::domain::dataset::PairId;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::DepthMap;
-use crate::domain::hand::AcceptedPose;
-use crate::domain::label::{Ground, Provenance};
-use crate::domain::pose::ToolModel;
-use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::Sample;
-use crate::io::dataset::Dataset;
-use crate::work::cloud::seen;
-use crate::work::error::TaskError;
-use crate::work::job::JobCx;
-use crate::work::label_stats::LabelStats;
-use crate::work::labels::{
+use touch2touch_core::align::Ask;
+use touch2touch_core::contact::MaskBasis;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::label::{Ground, Provenance};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::cloud::seen;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::label_stats::LabelStats;
+use touch2touch_work::labels::{
     Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person, take_in,
 };
-use crate::work::mask::{Contact, MaskInputs};
-use crate::work::pose::pose;
-use crate::work::propose::{self, Proposal, ProposeSetup, accepted};
-use crate::work::tool::load_tool;
+use touch2touch_work::mask::{Contact, MaskInputs};
+use touch2touch_work::pose::pose;
+use touch2touch_work::propose::{self, Proposal, ProposeSetup, accepted};
+use touch2touch_work::tool::load_tool;
 
 pub(super) use args::LabelArgs;
 use report::{Report, Stored};

@@ -9,17 +9,17 @@ use super::args::{DatasetArgs, FingerArg};
 use super::notes::Notes;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::ambiguity::{Ambiguity, ambiguity};
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::findings::Finding;
-use crate::domain::grid::DepthMap;
-use crate::domain::metrics::Line;
-use crate::domain::picture::colored;
-use crate::domain::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
-use crate::domain::rig::{PadId, Text};
-use crate::domain::units::{fixed, mm};
-use crate::io::images;
-use crate::work::ledger::{LedgerResult, of_prediction};
+use touch2touch_core::ambiguity::{Ambiguity, ambiguity};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::findings::Finding;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::metrics::Line;
+use touch2touch_core::picture::colored;
+use touch2touch_core::postprocess::{ChainReading, Flag, Histogram, Ledger, Orientation, Stats};
+use touch2touch_core::rig::{PadId, Text};
+use touch2touch_core::units::{fixed, mm};
+use touch2touch_work::io::images;
+use touch2touch_work::ledger::{LedgerResult, of_prediction};
 
 /// Arguments of `ledger`.
 #[derive(Debug, Args)]
@@ -168,7 +168,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     Ok(true)
 }
 
-fn stage(record: &crate::domain::postprocess::StageRecord) -> StageReport {
+fn stage(record: &touch2touch_core::postprocess::StageRecord) -> StageReport {
     StageReport {
         name: record.stage.name(),
         how: record.how.clone(),

@@ -18,16 +18,16 @@ use super::contact_mask::MaskArgs;
 use super::output::says;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
-use crate::domain::dataset::PairId;
-use crate::domain::rig::PadId;
-use crate::domain::sample::Sample;
-use crate::io::exchange::{ExportReport, Format};
-use crate::work::agreement::{Agreements, compare_labels};
-use crate::work::error::TaskError;
-use crate::work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
-use crate::work::labels::Labels;
-use crate::work::mask::MaskInputs;
-use crate::work::tool::Tools;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::agreement::{Agreements, compare_labels};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
+use touch2touch_work::io::exchange::{ExportReport, Format};
+use touch2touch_work::labels::Labels;
+use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::tool::Tools;
 
 /// What can be done with masks.
 #[derive(Debug, Subcommand)]

@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::predict::RuntimeArg;
 use super::{Common, Output, VerbResult};
-use crate::infer::bundle::Bundle;
-use crate::infer::engine::{EngineChoice, EngineKind, resolve};
-use crate::infer::{runtime, trial};
+use touch2touch_work::infer::bundle::Bundle;
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_work::infer::{runtime, trial};
 
 /// What can be done with a bundle.
 #[derive(Debug, Subcommand)]

@@ -2,9 +2,9 @@
 //! as a whole comes first.
 
 use super::{Output, output};
-use crate::domain::dataset::Problem;
-use crate::domain::findings::{Finding, Findings};
-use crate::io::dataset::Dataset;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_work::io::dataset::Dataset;
 
 /// The notes of the data set, its pairs and CAD models that a verb answers from.
 #[derive(Debug)]

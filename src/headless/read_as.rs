@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, Readings, parse_readings};
 use super::{Common, Output, VerbResult};
-use crate::io::dataset::{READ_AS_FILE, write_read_as};
+use touch2touch_work::io::dataset::{READ_AS_FILE, write_read_as};
 
 /// Arguments of `read-as`.
 #[derive(Debug, Args)]

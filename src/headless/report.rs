@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::json;
 
-use crate::io::atomic;
-use crate::io::dataset::Dataset;
-use crate::io::names::Outputs;
+use touch2touch_work::io::atomic;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::names::Outputs;
 
 /// Where the files of the pairs go, without an ending, each pair's its own; the folder is made if it is not there. A run
 /// that would write two pairs to one file ends here, before it wrote anything.

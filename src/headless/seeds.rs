@@ -9,22 +9,22 @@ use serde::Serialize;
 
 use super::contact_mask::MaskArgs;
 use super::predict::Predictor;
-use crate::domain::align::Ask;
-use crate::domain::contact::MaskBasis;
-use crate::domain::diffusion::GenerateConfig;
-use crate::domain::ensemble::{AngleFan, Spread, seeds};
-use crate::domain::grid::DepthMap;
-use crate::domain::pose::{RegistrationChoice, ToolModel};
-use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::Sample;
-use crate::domain::units::angle_error;
-use crate::io::{images, names, npz};
-use crate::work::ensemble::{Ensemble, ensemble};
-use crate::work::imprint::imprint_of;
-use crate::work::labels::ImprintOf;
-use crate::work::mask::MaskInputs;
-use crate::work::pose;
-use crate::work::prediction::Prediction;
+use touch2touch_core::align::Ask;
+use touch2touch_core::contact::MaskBasis;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::ensemble::{AngleFan, Spread, seeds};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::Sample;
+use touch2touch_core::units::angle_error;
+use touch2touch_work::ensemble::{Ensemble, ensemble};
+use touch2touch_work::imprint::imprint_of;
+use touch2touch_work::io::{images, names, npz};
+use touch2touch_work::labels::ImprintOf;
+use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::pose;
+use touch2touch_work::prediction::Prediction;
 
 /// How many seeds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -106,7 +106,7 @@ pub(super) fn write(
         images::write_gray16(&file(what, "png"), &map.map(|&d| ((d + from) * step).clamp(0.0, 65535.0) as u16))?;
     }
     let finite = |v: f64| v.is_finite().then_some(v);
-    let mean_of = |map: &DepthMap| finite(crate::domain::postprocess::Stats::of(map).mean);
+    let mean_of = |map: &DepthMap| finite(touch2touch_core::postprocess::Stats::of(map).mean);
     Ok(SeedFigures {
         seeds: seeds(first, found.imprints.len()),
         spread_mean_m: finite(found.spread.mean_std()),

@@ -11,9 +11,9 @@ use strum::IntoEnumIterator;
 
 use super::args::at_least_one;
 use super::{Common, Output, VerbResult};
-use crate::domain::catalog::{self, ToolSpec};
-use crate::domain::sim::{self, Condition, Fault, SimConfig};
-use crate::io::simulated::{Layout, Writing};
+use touch2touch_core::catalog::{self, ToolSpec};
+use touch2touch_core::sim::{self, Condition, Fault, SimConfig};
+use touch2touch_work::io::simulated::{Layout, Writing};
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]

@@ -9,14 +9,14 @@ use serde::Serialize;
 use super::args::{DatasetArgs, FingerArg, LimitArgs};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
-use crate::domain::dataset::PairId;
-use crate::domain::postprocess::ShiftMode;
-use crate::domain::units::{fixed, mm};
-use crate::io::statistics::ShiftStatistics;
-use crate::work::error::TaskError;
-use crate::work::job::JobCx;
-use crate::work::models::Wanted;
-use crate::work::statistics::{StatisticsSetup, statistics};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::units::{fixed, mm};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::Wanted;
+use touch2touch_work::statistics::{StatisticsSetup, statistics};
 
 /// Arguments of `stats`.
 #[derive(Debug, Args)]

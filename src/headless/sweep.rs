@@ -6,10 +6,10 @@ use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult};
-use crate::domain::dataset::PairId;
-use crate::domain::pose::RegistrationChoice;
-use crate::work::mask::{MaskChoice, MaskSource};
-use crate::work::sweep::{Dial, InForce, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::sweep::{Dial, InForce, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -125,7 +125,7 @@ fn table(dial: Dial, series: &Series) -> String {
 fn line(point: &Point, best: bool) -> String {
     let s = &point.summary;
     let number = |value: Option<f64>, digits: usize| value.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
-    let angle = |get: fn(&crate::domain::metrics::AngleSummary) -> Option<f64>| s.angle.as_ref().and_then(get);
+    let angle = |get: fn(&touch2touch_core::metrics::AngleSummary) -> Option<f64>| s.angle.as_ref().and_then(get);
     let name = point.value.map_or("as set".to_owned(), Setting::key);
     let mark = if point.value.is_some() && point.in_force { " *" } else { "" };
     let name = format!("{name}{mark}{}", if best { " best" } else { "" });

@@ -8,8 +8,8 @@ use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
-use crate::io::dataset::{Dataset, ToolUnit};
-use crate::work::tool::{load_tool, set_unit, units_of};
+use touch2touch_work::io::dataset::{Dataset, ToolUnit};
+use touch2touch_work::tool::{load_tool, set_unit, units_of};
 
 /// Arguments of `unit`.
 #[derive(Debug, Args)]

@@ -22,18 +22,18 @@ use super::output::says;
 use super::pose::{Engines, EnginesParser};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, ToolArgs, VerbResult, report};
-use crate::domain::dataset::{PairId, Problem};
-use crate::domain::rig::PerPad;
-use crate::domain::sample::DepthCamera;
-use crate::io::dataset::{Dataset, cameras_of, rig_of};
-use crate::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
-use crate::io::names::Outputs;
-use crate::work::job::Cancel;
-use crate::work::labels::{Labels, PairLabels};
-use crate::work::mask::MaskSource;
 use done::Done;
 use one::Worker;
 use summary::Summary;
+use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::sample::DepthCamera;
+use touch2touch_work::io::dataset::{Dataset, cameras_of, rig_of};
+use touch2touch_work::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
+use touch2touch_work::io::names::Outputs;
+use touch2touch_work::job::Cancel;
+use touch2touch_work::labels::{Labels, PairLabels};
+use touch2touch_work::mask::MaskSource;
 use write::Save;
 
 /// Arguments of `watch`.

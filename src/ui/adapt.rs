@@ -11,8 +11,8 @@ use super::widget::{curves, empty};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane};
-use crate::domain::units::{fixed, mm};
-use crate::work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
+use touch2touch_core::units::{fixed, mm};
+use touch2touch_work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
 /// Between pictures, points.
 const GAP: f32 = 6.0;

@@ -33,8 +33,8 @@ use crate::app::services::SharedServices;
 use crate::app::settings::{Last, MaskTool, Theme, Workspace};
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
-use crate::domain::rig::SensorKind;
-use crate::io::caught::caught;
+use touch2touch_core::rig::SensorKind;
+use touch2touch_work::io::caught::caught;
 
 /// How the studio is started.
 pub struct Options {

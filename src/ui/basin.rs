@@ -17,10 +17,10 @@ use crate::app::command::{Command, Pane};
 use crate::app::inspect::{BasinColor, InspectCommand};
 use crate::app::keys::PoseBits;
 use crate::app::state::Lookup;
-use crate::domain::align::basin::{Arrival, Axis, Basin, Cell, Plane};
-use crate::domain::colormap::ColorMap;
-use crate::domain::frames::PlanarPose;
-use crate::domain::units;
+use touch2touch_core::align::basin::{Arrival, Axis, Basin, Cell, Plane};
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::units;
 
 /// Room for the numbers at the left and below, points.
 const MARGIN: egui::Vec2 = vec2(30.0, 28.0);

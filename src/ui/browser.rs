@@ -18,10 +18,10 @@ use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
-use crate::domain::dataset::PairId;
-use crate::domain::evaluation::Figure;
-use crate::domain::units::counted;
-use crate::work::queue::QueueBy;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::Figure;
+use touch2touch_core::units::counted;
+use touch2touch_work::queue::QueueBy;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;

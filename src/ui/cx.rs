@@ -16,8 +16,8 @@ use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
 use crate::app::tasks::state::{Task, Ticket};
-use crate::domain::dataset::PairId;
-use crate::domain::rig::SensorKind;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::SensorKind;
 
 /// What a pane may use while it is drawn.
 pub(super) struct Cx<'a> {

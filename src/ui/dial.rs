@@ -12,7 +12,7 @@ use crate::app::action::Action;
 use crate::app::command::{DialCommand, Pane};
 use crate::app::dial::DialPairs;
 use crate::app::keys::ImprintSource;
-use crate::work::sweep::{Dial, MOST_VALUES, Series, Sweep};
+use touch2touch_work::sweep::{Dial, MOST_VALUES, Series, Sweep};
 
 /// Which imprints are shown.
 #[derive(Default)]

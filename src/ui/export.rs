@@ -12,7 +12,7 @@ use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
 use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
 use crate::app::keys::ImprintSource;
-use crate::work::figure::{FigurePane, FigureTheme};
+use touch2touch_work::figure::{FigurePane, FigureTheme};
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
 pub(super) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {

@@ -9,8 +9,8 @@ use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand, SettingsCommand};
 use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
-use crate::domain::diffusion::GUIDANCE;
-use crate::work::bundles::{BundleInfo, BundleKind};
+use touch2touch_core::diffusion::GUIDANCE;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
 const LABEL: f32 = 60.0;

@@ -23,16 +23,16 @@ use crate::app::keys::ImprintSource;
 use crate::app::results::Preview;
 use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::picture;
-use crate::domain::rig::{PadId, Sensor, SensorKind};
-use crate::domain::sample::Scale;
-use crate::domain::turn::Turn;
-use crate::domain::units;
-use crate::work::bundles::BundleKind;
-use crate::work::error::{TaskError, UnitOffer};
 use link::Link;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::picture;
+use touch2touch_core::rig::{PadId, Sensor, SensorKind};
+use touch2touch_core::sample::Scale;
+use touch2touch_core::turn::Turn;
+use touch2touch_core::units;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::error::{TaskError, UnitOffer};
 
 /// What is being painted on the images.
 #[derive(Default)]

@@ -15,11 +15,11 @@ use crate::app::command::{Command, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
-use crate::domain::align::Observability;
-use crate::domain::align::reason::Reason;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::units;
-use crate::work::layers::LayerResult;
+use touch2touch_core::align::Observability;
+use touch2touch_core::align::reason::Reason;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::units;
+use touch2touch_work::layers::LayerResult;
 
 /// The colors of residuals: perceptually uniform, and told apart by color-blind eyes.
 pub(super) const RESIDUAL_MAP: ColorMap = ColorMap::Viridis;

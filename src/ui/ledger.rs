@@ -17,11 +17,13 @@ use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::postprocess::{ChainReading, CorrectionPart, CorrectionParts, Flag, Severity, Stage, StageRecord};
-use crate::domain::rig::PadId;
-use crate::domain::units::{fixed, mm};
-use crate::work::ledger::LedgerResult;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::postprocess::{
+    ChainReading, CorrectionPart, CorrectionParts, Flag, Severity, Stage, StageRecord,
+};
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units::{fixed, mm};
+use touch2touch_work::ledger::LedgerResult;
 
 /// From this width on the stages stand beside the plots.
 const WIDE: f32 = 620.0;
@@ -348,8 +350,8 @@ fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
             if offset < 0.0 { "-" } else { "+" },
             fixed(mm(offset.abs()), 2),
             match reading.mapping {
-                crate::domain::postprocess::Mapping::Correct => "correct",
-                crate::domain::postprocess::Mapping::Doubled => "doubled",
+                touch2touch_core::postprocess::Mapping::Correct => "correct",
+                touch2touch_core::postprocess::Mapping::Doubled => "doubled",
             }
         ));
     }

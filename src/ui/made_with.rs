@@ -10,8 +10,8 @@ use crate::app::action::Action;
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::pane::{Kind, Pane};
 use crate::app::results::shown::Why;
-use crate::domain::rig::PadId;
-use crate::work::prediction::settings_text;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::prediction::settings_text;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 18.0;

@@ -16,10 +16,10 @@ use crate::app::labels::Review;
 use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
 use crate::app::state::Lookup;
 use crate::app::workbench::SceneTool;
-use crate::domain::label::{Layers, Paint};
-use crate::domain::rig::PadId;
-use crate::domain::units;
-use crate::work::labels::{MAX_NOTE, system_person};
+use touch2touch_core::label::{Layers, Paint};
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::labels::{MAX_NOTE, system_person};
 
 /// The note being typed.
 #[derive(Default)]

@@ -12,13 +12,13 @@ use crate::app::action::Action;
 use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
 use crate::app::keys::{ImprintSource, Registration};
 use crate::app::state::{Absent, Lookup};
-use crate::domain::hand::{HandPose, PoseDifference};
-use crate::domain::postprocess::{Severity, Stage, Stats};
-use crate::domain::sample::Scale;
-use crate::domain::units;
-use crate::work::compare::Comparison;
-use crate::work::verdict::Verdict;
 use strum::IntoEnumIterator as _;
+use touch2touch_core::hand::{HandPose, PoseDifference};
+use touch2touch_core::postprocess::{Severity, Stage, Stats};
+use touch2touch_core::sample::Scale;
+use touch2touch_core::units;
+use touch2touch_work::compare::Comparison;
+use touch2touch_work::verdict::Verdict;
 
 /// Figures that only this pane shows.
 #[derive(Default)]

@@ -8,7 +8,7 @@ use super::fuzzy::score;
 use super::theme::SMALL;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, ViewCommand};
-use crate::domain::dataset::PairId;
+use touch2touch_core::dataset::PairId;
 
 /// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
 const MOST: usize = 60;

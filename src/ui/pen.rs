@@ -13,8 +13,8 @@ use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Stroke as Drawn;
 use crate::app::settings::MaskTool;
-use crate::domain::label::{DrawTool, Paint};
-use crate::domain::rig::PadId;
+use touch2touch_core::label::{DrawTool, Paint};
+use touch2touch_core::rig::PadId;
 
 /// What is drawn on: a picture on the screen.
 pub(super) struct Easel<'a> {

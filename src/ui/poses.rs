@@ -9,10 +9,10 @@ use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::PoseOf;
-use crate::domain::frames::PlanarPose;
-use crate::domain::hand::PoseDifference;
-use crate::domain::units;
-use crate::work::verdict::Verdict;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::units;
+use touch2touch_work::verdict::Verdict;
 
 /// Height of a row: two lines of small type.
 const ROW: f32 = 32.0;

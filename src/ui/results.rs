@@ -10,7 +10,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
-use crate::domain::evaluation::{Column, Group, Row, TableMetrics, columns};
+use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
 
 /// Height of a row, points.
 const ROW: f32 = 20.0;

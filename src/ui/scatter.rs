@@ -16,8 +16,8 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreTable, SourceScores};
-use crate::domain::dataset::PairId;
-use crate::domain::evaluation::{Figure, mean};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::{Figure, mean};
 
 /// Room for the numbers of the axes, points.
 const MARGIN: [f32; 2] = [44.0, 30.0];

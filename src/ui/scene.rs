@@ -32,11 +32,11 @@ use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
-use crate::domain::rig::PadId;
-use crate::domain::units;
 use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
-use crate::work::cloud::Clouds;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::cloud::Clouds;
 
 pub(super) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(super) use layers::{DISTANCE_MAP, outline};

@@ -6,8 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use eframe::egui::{self, ColorImage, Rect};
 
 use crate::app::command::{Command, TasksCommand};
-use crate::io::folders;
-use crate::work::error::TaskError;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::folders;
 
 /// What becomes of a picture of the window.
 #[derive(Clone, Copy, Debug)]

@@ -14,12 +14,12 @@ use crate::app::command::{Command, Pane, PredictCommand};
 use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
 use crate::app::seeds::{COUNT, SeedsCommand};
 use crate::app::state::Lookup;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::ensemble::{AngleFan, Dial};
-use crate::domain::grid::DepthMap;
-use crate::domain::units;
-use crate::work::ensemble::Ensemble;
-use crate::work::pose::PoseResult;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::ensemble::{AngleFan, Dial};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::units;
+use touch2touch_work::ensemble::Ensemble;
+use touch2touch_work::pose::PoseResult;
 
 /// Between pictures, points.
 const GAP: f32 = 4.0;

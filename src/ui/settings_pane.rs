@@ -8,8 +8,8 @@ use super::theme::{caption, section};
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
-use crate::infer::engine::EngineChoice;
-use crate::work::labels::system_person;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::labels::system_person;
 
 const REPEATS: &str = "Share of the pairs that you marked done that come back as todo, without their mask and unannounced. \
                        The first mask stays; both are compared under Progress of the Mask pane. 0 switches it off. Default 5 %";

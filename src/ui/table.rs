@@ -13,8 +13,8 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores};
 use crate::app::library::{Sort, short_name};
-use crate::domain::dataset::PairId;
-use crate::domain::evaluation::{Figure, mean};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::{Figure, mean};
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;

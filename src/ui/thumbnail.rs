@@ -6,9 +6,9 @@ use eframe::egui::{Color32, Painter, Pos2, Rect, Response, pos2};
 
 use super::cx::Cx;
 use super::widget::texture::depth_image;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::DepthMap;
-use crate::domain::units;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::units;
 
 /// Draws one into `rect`; made again only where `recipe` (what it shows) or its colors changed.
 pub(super) fn depth(

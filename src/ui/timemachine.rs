@@ -17,8 +17,8 @@ use crate::app::command::{Command, Pane, SettingsCommand};
 use crate::app::inspect::{InspectCommand, Inspected};
 use crate::app::keys::{ImprintSource, PoseBits, Registration};
 use crate::app::state::Lookup;
-use crate::domain::frames::PlanarPose;
-use crate::domain::units;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::units;
 
 /// Steps per second while playing.
 const PACE: f64 = 8.0;

@@ -10,9 +10,9 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
 use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
-use crate::work::bundles::BundleKind;
-use crate::work::labels::ImprintSource;
-use crate::work::train::{Told, Trained};
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::train::{Told, Trained};
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();

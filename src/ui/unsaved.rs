@@ -6,7 +6,7 @@ use super::cx::Cx;
 use super::theme::caption;
 use crate::app::command::{LabelsCommand, UnsavedCommand};
 use crate::app::labels::Question;
-use crate::domain::units::counted;
+use touch2touch_core::units::counted;
 
 /// The question, where there is one; it blocks everything else.
 pub(super) fn question(cx: &mut Cx<'_>, ctx: &egui::Context) {

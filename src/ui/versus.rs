@@ -15,16 +15,16 @@ use crate::app::keys::VersusKey;
 use crate::app::pane::Pane;
 use crate::app::settings::{Versus, VersusMode};
 use crate::app::state::Lookup;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::DepthMap;
-use crate::domain::rig::PadId;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{Palette, SMALL};
 use crate::ui::widget::colorbar;
 use crate::ui::widget::image_canvas::{CanvasOutput, ImageCanvas, Primary, shows_squares};
 use crate::ui::widget::texture::{Histogram, depth_image};
-use crate::work::subject::Subject;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::subject::Subject;
 
 /// What the comparison remembers.
 pub(super) struct Memory {

@@ -2,8 +2,8 @@
 
 use glam::{DVec3, Mat4, Vec4};
 use touch2touch::app::labels::StrokeIn3d;
-use touch2touch::domain::label::{Layers, Sight};
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::label::{Layers, Sight};
+use touch2touch_work::io::masks::MaskStore;
 
 use super::*;
 

@@ -1,8 +1,8 @@
 //! What an angle hangs on is the same on the screen and by verb.
 
 use touch2touch::app::command::ViewCommand;
-use touch2touch::io::npz;
-use touch2touch::io::pt::Values;
+use touch2touch_work::io::npz;
+use touch2touch_work::io::pt::Values;
 
 use super::*;
 
@@ -48,7 +48,7 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     // A registration that has none says so, in both.
     let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold", "--engine", "gicp"];
     let why = json(&verb, home.path())["cases"][0]["no_influence"].as_str().unwrap().to_owned();
-    let engine = touch2touch::domain::pose::Registration::Gicp.into();
+    let engine = touch2touch_core::pose::Registration::Gicp.into();
     studio.send(SettingsCommand::SetPoseEngine(engine).into());
     let Lookup::Failed(said) = studio.state.influence(MEASURED) else { panic!("{:?}", studio.state.tasks.failed) };
     assert!(why.contains(&said.why), "{why}: {}", said.why);

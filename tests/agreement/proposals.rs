@@ -2,12 +2,12 @@
 
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{HandMask, Review};
-use touch2touch::domain::label::{Paint, Provenance};
-use touch2touch::domain::pose::RegistrationChoice;
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::work::job::{Cancel, JobCx};
-use touch2touch::work::models::Models;
-use touch2touch::work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_core::label::{Paint, Provenance};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_work::models::Models;
+use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 use super::*;
 

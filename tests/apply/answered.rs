@@ -2,9 +2,9 @@
 
 use std::path::PathBuf;
 
-use touch2touch::work::adapt::{Adapted, Scored};
-use touch2touch::work::sweep::{Dial, InForce, Sweep};
-use touch2touch::work::train::Trained;
+use touch2touch_work::adapt::{Adapted, Scored};
+use touch2touch_work::sweep::{Dial, InForce, Sweep};
+use touch2touch_work::train::Trained;
 
 pub(super) fn swept() -> Sweep {
     Sweep {

@@ -10,18 +10,18 @@ use touch2touch::app::results::Preview;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Ticket;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::DepthMap;
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::infer::bundle::{Origin, SensorPair};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
 use touch2touch::app::results::preview::Onlooker;
-use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch::work::job::{JobCx, PreviewPicture};
-use touch2touch::work::prediction::Prediction;
+use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch_work::job::{JobCx, PreviewPicture};
+use touch2touch_work::prediction::Prediction;
 
 const RIGHT: PadId = lab::RIGHT;
 const LEFT: PadId = lab::LEFT;

@@ -7,9 +7,9 @@ use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, Registration, Request};
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::state::Lookup;
-use touch2touch::domain::align::basin::Plane;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::frames::PlanarPose;
+use touch2touch_core::align::basin::Plane;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
 
 use super::double::{Bench, SIMULATED};
 use super::panes;

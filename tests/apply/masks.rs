@@ -9,10 +9,10 @@ use touch2touch::app::command::{
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
 use touch2touch::app::settings::{MaskSource, MaskTool};
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::CleanKind;
-use touch2touch::domain::rig::{PadId, lab};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::CleanKind;
+use touch2touch_core::rig::{PadId, lab};
 
 use super::double::Bench;
 use super::panes;

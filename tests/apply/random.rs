@@ -10,7 +10,7 @@ use strum::IntoEnumIterator;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
-use touch2touch::domain::grid::Mask;
+use touch2touch_core::grid::Mask;
 
 use self::commands::command;
 use super::double::{Bench, SIMULATED};

@@ -8,9 +8,9 @@ use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
 use touch2touch::app::results::shown::Why;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::state::State;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::infer::engine::EngineChoice;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::infer::engine::EngineChoice;
 
 use super::double::Bench;
 use super::panes;

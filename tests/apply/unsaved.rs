@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use touch2touch::app::command::{LabelsCommand, LibraryCommand, UiRequest, UnsavedCommand};
 use touch2touch::app::labels::Question;
 use touch2touch::app::library::Place;
-use touch2touch::domain::rig::lab;
+use touch2touch_core::rig::lab;
 
 use super::double::Bench;
 use super::masks::{bench, stroke};

@@ -12,8 +12,8 @@ use touch2touch::app::runtime::Runtime;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Entry;
-use touch2touch::domain::dataset::{PairId, Problem};
-use touch2touch::domain::rig::lab;
+use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::rig::lab;
 
 use super::double::{Bench, Double, SIMULATED};
 use super::panes;

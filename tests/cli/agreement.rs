@@ -1,8 +1,8 @@
 //! How far the masks of two people agree.
 
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::{error_text, json, run};
 

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use touch2touch::domain::label::{Marks, Provenance};
-use touch2touch::domain::rig::lab;
 use touch2touch::headless::check_command;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::{MaskStore, StoredMask, StoredReview};
+use touch2touch_core::label::{Marks, Provenance};
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
 
 use super::{error_text, run};
 use crate::cli_generate::full_size_bundle;
@@ -131,7 +131,7 @@ impl Stage {
         let dataset = Dataset::open(&set).unwrap();
         let name = dataset.index.pairs[0].name.clone();
         // One mask corrected by hand, for the export.
-        let id = touch2touch::domain::dataset::PairId(0);
+        let id = touch2touch_core::dataset::PairId(0);
         let sample = dataset.load(id).unwrap();
         let imprint = &sample.pad(lab::RIGHT).unwrap().depth().unwrap().imprint;
         let mask = imprint.map(|&depth| depth > 0.005);

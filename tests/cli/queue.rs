@@ -1,7 +1,7 @@
 //! A data set of masks: notes, which to look at first, and what they took.
 
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::{error_text, json, run};
 
@@ -53,9 +53,9 @@ fn what_masks_took_is_counted_from_their_journals() {
     assert!(found["seconds_per_mask"].as_f64().unwrap() <= 60.0);
     // A second mask, as the studio writes it, is listed with how far it is from the first.
     let store = MaskStore::for_dataset(&Dataset::open(&set).unwrap()).unwrap();
-    let (right, again) = (touch2touch::domain::rig::lab::RIGHT, store.repeats_of("Anna"));
+    let (right, again) = (touch2touch_core::rig::lab::RIGHT, store.repeats_of("Anna"));
     let mut mask = store.load(&names[0], right).unwrap().unwrap();
-    mask.mask = touch2touch::domain::label::shrink(&mask.mask, 2.0);
+    mask.mask = touch2touch_core::label::shrink(&mask.mask, 2.0);
     again.save(&names[0], right, Some(&mask)).unwrap();
     again.save_review(&names[0], &store.load_review(&names[0]).unwrap().unwrap()).unwrap();
     let found = json(&run(&["masks", "stats", path, "--person", "Anna", "--json"], dir.path()));

@@ -3,10 +3,10 @@
 
 use std::path::Path;
 
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::read_as::{Depths, ReadAs};
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::simulated::{Layout, write_pair};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::read_as::{Depths, ReadAs};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair};
 
 use super::{error_text, json};
 use crate::support::{run, shared};

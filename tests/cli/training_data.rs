@@ -3,11 +3,11 @@
 use std::path::Path;
 
 use serde_json::Value;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::label::{Marks, Provenance};
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::{MaskStore, StoredMask};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::label::{Marks, Provenance};
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::{MaskStore, StoredMask};
 
 use super::{error_text, json, run};
 

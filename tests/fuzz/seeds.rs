@@ -3,7 +3,7 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use touch2touch::io::pt::{PtItem, Tensor, Values, write_dict};
+use touch2touch_work::io::pt::{PtItem, Tensor, Values, write_dict};
 
 use super::mutate::{png_checksums, zip};
 
@@ -186,7 +186,7 @@ pub(super) fn npz() -> Vec<Seed> {
     let one = |entry: Vec<u8>| Content::Zip(vec![("x.npy".to_owned(), entry)]);
     let bomb = npy("4194305, 4, ", &vec![0; 4 * 4 * 4_194_305]);
     vec![
-        good("arrays", opened(&written(|file| touch2touch::io::npz::write(file, &tensors).unwrap()))),
+        good("arrays", opened(&written(|file| touch2touch_work::io::npz::write(file, &tensors).unwrap()))),
         good("another order", one(npy("2, 2", &[0; 16]))),
         bad("a product that wraps", one(npy("4294967296, 4294967296", &[])), "do not fit"),
         bad("a product that wraps to nothing", one(npy("0, 4294967296, 4294967296", &[])), "do not fit"),
@@ -199,9 +199,9 @@ pub(super) fn npz() -> Vec<Seed> {
 /// Arrays that are masks.
 pub(super) fn npy_masks() -> Vec<Seed> {
     let raw = |shape: &str, data: &[u8]| Content::Raw(npy(shape, data));
-    let mask = touch2touch::domain::grid::Grid::from_fn(5, 4, |x, _| if x > 2 { 255u8 } else { 0 });
+    let mask = touch2touch_core::grid::Grid::from_fn(5, 4, |x, _| if x > 2 { 255u8 } else { 0 });
     vec![
-        good("bytes", Content::Raw(written(|file| touch2touch::io::npz::write_npy_gray(file, &mask).unwrap()))),
+        good("bytes", Content::Raw(written(|file| touch2touch_work::io::npz::write_npy_gray(file, &mask).unwrap()))),
         good("numbers", raw("2, 2", &[0; 16])),
         bad("other numbers", raw("1, 1", &2.5f32.to_le_bytes()), "the value 2.5"),
         bad("a long list", raw("4,", &[0; 16]), "(height, width)"),

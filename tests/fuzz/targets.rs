@@ -5,30 +5,30 @@ use std::path::{Path, PathBuf};
 use sha2::Digest as _;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::grid::{Grid, Mask};
-use touch2touch::domain::label::{self, Marks};
-use touch2touch::domain::moments::Moments;
-use touch2touch::domain::postprocess::{RawPrediction, ShiftFit};
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sample::DepthCamera;
-use touch2touch::domain::sensor::Intrinsics;
-use touch2touch::infer::bundle::{Bundle, MANIFEST};
-use touch2touch::infer::engine::EngineKind;
-use touch2touch::infer::recipe::Recipe;
-use touch2touch::infer::store::Store;
-use touch2touch::io::cases::{Case, Stratum};
-use touch2touch::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
-use touch2touch::io::masks::{MaskStore, StoredMask, StoredReview};
-use touch2touch::io::pt::Tensor;
-use touch2touch::io::statistics::{Provenance, ShiftStatistics};
-use touch2touch::io::{cases, exchange, images, npz, pt, stl};
-use touch2touch::work::case::{self, CaseSetup};
-use touch2touch::work::job::JobCx;
-use touch2touch::work::mask::{MaskChoice, MaskSource};
-use touch2touch::work::models::Models;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{Grid, Mask};
+use touch2touch_core::label::{self, Marks};
+use touch2touch_core::moments::Moments;
+use touch2touch_core::postprocess::{RawPrediction, ShiftFit};
+use touch2touch_core::rig::lab;
+use touch2touch_core::sample::DepthCamera;
+use touch2touch_core::sensor::Intrinsics;
+use touch2touch_work::case::{self, CaseSetup};
+use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_work::infer::engine::EngineKind;
+use touch2touch_work::infer::recipe::Recipe;
+use touch2touch_work::infer::store::Store;
+use touch2touch_work::io::cases::{Case, Stratum};
+use touch2touch_work::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
+use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
+use touch2touch_work::io::pt::Tensor;
+use touch2touch_work::io::statistics::{Provenance, ShiftStatistics};
+use touch2touch_work::io::{cases, exchange, images, npz, pt, stl};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::models::Models;
 
 use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
 
@@ -261,9 +261,9 @@ fn case_seeds() -> Vec<Seed> {
     seeds
 }
 
-fn tetrahedron() -> touch2touch::domain::mesh::TriMesh {
+fn tetrahedron() -> touch2touch_core::mesh::TriMesh {
     let corners = [[0.0, 0.0, 0.0], [0.04, 0.0, 0.0], [0.0, 0.04, 0.0], [0.0, 0.0, 0.04]];
-    touch2touch::domain::mesh::TriMesh {
+    touch2touch_core::mesh::TriMesh {
         vertices: corners.map(glam::DVec3::from_array).to_vec(),
         triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
     }

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use crate::support;
-use touch2touch::domain::dataset::{PairId, Split};
-use touch2touch::domain::grid::Grid;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::turn::Turn;
-use touch2touch::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
-use touch2touch::io::images;
-use touch2touch::io::pt::{PtItem, Tensor, read_dict, write_dict};
-use touch2touch::io::simulated::{Layout, pair_paths, write_pair};
+use touch2touch_core::dataset::{PairId, Split};
+use touch2touch_core::grid::Grid;
+use touch2touch_core::rig::lab;
+use touch2touch_core::turn::Turn;
+use touch2touch_work::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
+use touch2touch_work::io::images;
+use touch2touch_work::io::pt::{PtItem, Tensor, read_dict, write_dict};
+use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair};
 
 use super::{touch, touch_file};
 
@@ -244,7 +244,7 @@ fn the_demo_renders_what_is_asked_for() {
     seen.dedup();
     assert!(seen.len() == pairs && pairs >= 12 * 20);
     let (a, again, b) = (demo.load(PairId(3)).unwrap(), demo.load(PairId(3)).unwrap(), demo.load(PairId(4)).unwrap());
-    let imprint = |s: &touch2touch::domain::sample::Sample| {
+    let imprint = |s: &touch2touch_core::sample::Sample| {
         let map = &s.pad(lab::LEFT).unwrap().depth().unwrap().imprint;
         map.as_slice().iter().map(|v| v.to_bits()).collect::<Vec<u32>>()
     };

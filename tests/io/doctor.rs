@@ -3,16 +3,16 @@
 use std::ops::ControlFlow;
 use std::path::Path;
 
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::grid::Grid;
-use touch2touch::domain::mesh::TriMesh;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sample::Sample;
-use touch2touch::io::dataset::{Dataset, ToolUnit};
-use touch2touch::io::doctor::{DoctorReport, examine};
-use touch2touch::io::pt::read_text_lists;
-use touch2touch::io::simulated::{Layout, WriteError, write_pair, write_tools};
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::io::dataset::{Dataset, ToolUnit};
+use touch2touch_work::io::doctor::{DoctorReport, examine};
+use touch2touch_work::io::pt::read_text_lists;
+use touch2touch_work::io::simulated::{Layout, WriteError, write_pair, write_tools};
 
 use super::touch;
 use crate::support;
@@ -45,7 +45,7 @@ fn spoilt(spoil: impl FnOnce(&mut Sample)) -> Vec<String> {
 }
 
 /// Changes both bubbles.
-fn bubbles(sample: &mut Sample, f: impl Fn(&mut touch2touch::domain::sample::DepthTouch)) {
+fn bubbles(sample: &mut Sample, f: impl Fn(&mut touch2touch_core::sample::DepthTouch)) {
     for finger in lab::PADS {
         f(sample.pads[finger].as_mut().unwrap().depth_mut().unwrap());
     }

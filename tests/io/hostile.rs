@@ -4,12 +4,12 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::Duration;
 
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::lab;
-use touch2touch::infer::bundle::Bundle;
-use touch2touch::io::dataset::{Dataset, read_in_meters};
-use touch2touch::io::masks::MaskStore;
-use touch2touch::io::{cases, images, npz, pt, statistics, stl};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::lab;
+use touch2touch_work::infer::bundle::Bundle;
+use touch2touch_work::io::dataset::{Dataset, read_in_meters};
+use touch2touch_work::io::masks::MaskStore;
+use touch2touch_work::io::{cases, images, npz, pt, statistics, stl};
 
 /// A pipe that nobody writes to, and a link to a device that never ends.
 fn not_files(dir: &Path, name: &str) -> [PathBuf; 2] {

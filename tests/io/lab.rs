@@ -1,10 +1,10 @@
 //! The reference data set that PyTorch wrote, where it is there.
 
 use glam::DVec3;
-use touch2touch::domain::dataset::{PairId, Split};
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::{Dataset, SourceKind};
-use touch2touch::io::{npz, stl};
+use touch2touch_core::dataset::{PairId, Split};
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::{Dataset, SourceKind};
+use touch2touch_work::io::{npz, stl};
 
 use crate::support;
 
@@ -20,7 +20,7 @@ fn every_tensor_of_the_reference_set_is_right() {
     for (name, want) in truth {
         let (tool, number) = name.split_once('/').unwrap();
         let number: u64 = number.parse().unwrap();
-        let is_it = |p: &touch2touch::domain::dataset::PairEntry| p.tool.as_deref() == Some(tool) && p.number == number;
+        let is_it = |p: &touch2touch_core::dataset::PairEntry| p.tool.as_deref() == Some(tool) && p.number == number;
         let id = PairId(dataset.index.pairs.iter().position(is_it).unwrap() as u32);
         let loaded = dataset.load_with_counts(id).unwrap();
         // The set's cameras are mirrored, which no quaternion can say: the loader repairs that and says so.

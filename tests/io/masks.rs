@@ -5,16 +5,16 @@ use std::process::{Command, Stdio};
 
 use glam::DVec2;
 use serde_json::Value;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::hand::{AcceptedPose, HandPose};
-use touch2touch::domain::label::{Marks, Provenance, paint_where};
-use touch2touch::domain::postprocess::ShiftMode;
-use touch2touch::domain::predicted_id::PredictedId;
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::{FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::hand::{AcceptedPose, HandPose};
+use touch2touch_core::label::{Marks, Provenance, paint_where};
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::predicted_id::PredictedId;
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::{FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
 
 use super::touch_file;
 
@@ -356,10 +356,16 @@ fn the_journal_and_the_lock_are_ordinary_files_in_their_own_place() {
 fn nothing_is_written_where_the_data_set_is_not_any_more() {
     let dir = tempfile::tempdir().unwrap();
     let (root, elsewhere) = (dir.path().join("set"), dir.path().join("renamed"));
-    let tool = touch2touch::domain::catalog::tools().first().unwrap();
-    let sample = touch2touch::domain::sim::simulate(tool, Default::default(), 1, &Default::default());
-    touch2touch::io::simulated::write_pair(&root, touch2touch::io::simulated::Layout::Train, &tool.name, 0, &sample)
-        .unwrap();
+    let tool = touch2touch_core::catalog::tools().first().unwrap();
+    let sample = touch2touch_core::sim::simulate(tool, Default::default(), 1, &Default::default());
+    touch2touch_work::io::simulated::write_pair(
+        &root,
+        touch2touch_work::io::simulated::Layout::Train,
+        &tool.name,
+        0,
+        &sample,
+    )
+    .unwrap();
     let dataset = Dataset::open(&root).unwrap();
     let root = dataset.root.clone().unwrap();
     let store = MaskStore::for_dataset(&dataset).unwrap();

@@ -15,8 +15,11 @@ use std::path::Path;
 use super::code;
 use crate::support::rust_files;
 
-/// The layers without a circle. A layer that has become free of them is added here and stays so.
-const LAYERS: &[&str] = &["domain", "io", "infer", "gpu", "work", "headless", "ui"];
+/// The crates below the application; in names, a crate is the root of its modules.
+const CRATES: &[&str] = &["core", "work"];
+
+/// The crates and layers without a circle. A layer that has become free of them is added here and stays so.
+const LAYERS: &[&str] = &["core", "work", "gpu", "headless", "ui"];
 
 /// A path in the crate, such as `["domain", "align", "icp"]`.
 type Name = Vec<String>;
@@ -33,14 +36,27 @@ fn parts(path: &str) -> Name {
 
 /// The files of a layer without those that are only compiled for tests.
 fn sources(layer: &str) -> Sources {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut files = vec![src.join(format!("{layer}.rs"))];
-    rust_files(&src.join(layer), &mut files);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let mut files = Vec::new();
+    let src = if CRATES.contains(&layer) {
+        let src = root.join("crates").join(layer).join("src");
+        rust_files(&src, &mut files);
+        src
+    } else {
+        let src = root.join("src");
+        files.push(src.join(format!("{layer}.rs")));
+        rust_files(&src.join(layer), &mut files);
+        src
+    };
     let mut all = Sources::new();
     let mut for_tests = BTreeSet::new();
     for file in files {
         let module = file.strip_prefix(&src).unwrap().with_extension("");
-        let module: Name = module.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        let mut module: Name = module.iter().map(|part| part.to_string_lossy().into_owned()).collect();
+        if CRATES.contains(&layer) {
+            module.retain(|part| part != "lib");
+            module.insert(0, layer.to_owned());
+        }
         let text = std::fs::read_to_string(&file).unwrap();
         for after in text.split("#[cfg(test)]").skip(1) {
             let line = after.trim_start().lines().next().unwrap_or_default();
@@ -91,7 +107,10 @@ fn leaves(path: &str, tree: &str, out: &mut Vec<(Name, String)>) {
 fn absolute(module: &[String], path: &[String], sources: &Sources) -> Option<Name> {
     let up = path.iter().take_while(|part| *part == "super").count();
     match path.first()?.as_str() {
-        "crate" => Some(path[1..].to_vec()),
+        "crate" => {
+            let root = usize::from(module.first().is_some_and(|first| CRATES.contains(&first.as_str())));
+            Some([&module[..root], &path[1..]].concat())
+        }
         "self" => Some([module, &path[1..]].concat()),
         "super" => Some([&module[..module.len().saturating_sub(up)], &path[up..]].concat()),
         _ => {

@@ -3,14 +3,14 @@
 use rand::seq::SliceRandom;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use touch2touch::domain::contact::{ByteCast, LAB_IMPRINT_MAX_M, LAB_IMPRINT_MIN_M, lab_unet_input};
-use touch2touch::domain::grid::{DepthMap, Grid};
-use touch2touch::domain::moments::Moments;
-use touch2touch::domain::postprocess::{
+use touch2touch_core::contact::{ByteCast, LAB_IMPRINT_MAX_M, LAB_IMPRINT_MIN_M, lab_unet_input};
+use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::moments::Moments;
+use touch2touch_core::postprocess::{
     DepthChain, DepthRange, FlagKind, Mapping, RawPrediction, Reduction, RefitShift, Shift, ShiftFit, ShiftMode,
     ShiftStats, Stats, ledger,
 };
-use touch2touch::domain::resample::Resampling;
+use touch2touch_core::resample::Resampling;
 
 fn chain() -> DepthChain {
     DepthChain {

@@ -4,7 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{AdaptCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
-use touch2touch::work::bundles::BundleKind;
+use touch2touch_work::bundles::BundleKind;
 
 use super::rig::{Rig, write_dataset};
 

@@ -5,13 +5,13 @@ use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, SettingsCo
 use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{Theme, Workspace};
-use touch2touch::domain::ambiguity::Touch;
-use touch2touch::domain::catalog;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::postprocess::FlagKind;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_core::ambiguity::Touch;
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::postprocess::FlagKind;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
 

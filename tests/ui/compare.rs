@@ -7,8 +7,8 @@ use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand};
 use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
 use touch2touch::app::settings::{Versus, VersusMode, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::domain::rig::lab;
-use touch2touch::work::subject::Subject;
+use touch2touch_core::rig::lab;
+use touch2touch_work::subject::Subject;
 
 use super::rig::Rig;
 

@@ -7,8 +7,8 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::tasks::Level;
-use touch2touch::domain::rig::lab;
-use touch2touch::work::error::TaskError;
+use touch2touch_core::rig::lab;
+use touch2touch_work::error::TaskError;
 
 use super::rig::Rig;
 

@@ -6,8 +6,8 @@ use touch2touch::app::command::{DialCommand, LibraryCommand, Pane, SettingsComma
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
-use touch2touch::domain::pose::Registration;
-use touch2touch::work::sweep::Dial;
+use touch2touch_core::pose::Registration;
+use touch2touch_work::sweep::Dial;
 
 use super::rig::{Rig, write_dataset};
 

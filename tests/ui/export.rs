@@ -12,9 +12,9 @@ use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::{ColorRange, Theme, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::lab;
-use touch2touch::io::images;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::images;
 
 use super::rig::{Rig, write_dataset};
 

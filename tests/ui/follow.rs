@@ -6,10 +6,10 @@ use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::state::{Absent, Lookup};
-use touch2touch::domain::catalog;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
-use touch2touch::io::simulated::{Layout, pair_paths, write_pair};
+use touch2touch_core::catalog;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
+use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair};
 
 use super::rig::Rig;
 

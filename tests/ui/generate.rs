@@ -3,7 +3,7 @@
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{PredictCommand, SettingsCommand};
 use touch2touch::app::keys::{ImprintSource, Preset};
-use touch2touch::domain::rig::lab;
+use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
 

@@ -6,7 +6,7 @@ use touch2touch::app::command::{Command, Pane, SettingsCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{MaskSource, Workspace};
-use touch2touch::domain::align::basin::is_same_place;
+use touch2touch_core::align::basin::is_same_place;
 
 use super::rig::Rig;
 

@@ -11,10 +11,10 @@ use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand, TasksComm
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
 use touch2touch::app::settings::{Theme, Workspace};
-use touch2touch::domain::postprocess::ShiftMode;
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::rig::Rig;
 

@@ -5,8 +5,8 @@ use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use touch2touch::app::command::{PredictCommand, SettingsCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::state::State;
-use touch2touch::domain::rig::lab;
-use touch2touch::work::subject::Subject;
+use touch2touch_core::rig::lab;
+use touch2touch_work::subject::Subject;
 
 use super::rig::Rig;
 

@@ -7,12 +7,12 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::settings::{MaskChoice, MaskSource, MaskTool, Workspace};
 use touch2touch::app::workbench::SceneTool;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::{CleanKind, Layers};
-use touch2touch::domain::rig::{PadId, lab};
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::exchange::check_folder;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::{CleanKind, Layers};
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::exchange::check_folder;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::rig::Rig;
 

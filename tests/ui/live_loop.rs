@@ -7,8 +7,8 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{SceneLayer, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::rig::lab;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
 

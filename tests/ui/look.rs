@@ -13,14 +13,14 @@ use touch2touch::app::settings::{
     LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::frames::PlanarPose;
-use touch2touch::domain::hand::HandAxis;
-use touch2touch::domain::label::Paint;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim::Fault;
-use touch2touch::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch::work::subject::Subject;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::hand::HandAxis;
+use touch2touch_core::label::Paint;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim::Fault;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::subject::Subject;
 
 use super::rig::Rig;
 

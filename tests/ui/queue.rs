@@ -8,11 +8,11 @@ use touch2touch::app::labels::Review;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::domain::grid::Mask;
-use touch2touch::domain::label::{CleanKind, CleanUp};
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::{CleanKind, CleanUp};
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::rig::{Rig, write_dataset};
 

@@ -6,8 +6,8 @@ use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, 
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::Workspace;
-use touch2touch::domain::dataset::PairId;
-use touch2touch::domain::evaluation::Figure;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::Figure;
 
 use super::rig::{Rig, write_dataset};
 

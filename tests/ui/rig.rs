@@ -11,28 +11,28 @@ use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
-use touch2touch::domain::catalog;
-use touch2touch::domain::contact::ContactMask;
-use touch2touch::domain::diffusion::GenerateConfig;
-use touch2touch::domain::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch::domain::postprocess::{
+use touch2touch::ui::{Options, StudioApp};
+use touch2touch_core::catalog;
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::postprocess::{
     DepthChain, DepthRange, Mapping, RawPrediction, Reduction, Shift, ShiftMode, ShiftStats,
 };
-use touch2touch::domain::resample::Resampling;
-use touch2touch::domain::rig::lab;
-use touch2touch::domain::sim;
-use touch2touch::infer::bundle::Origin;
-use touch2touch::infer::bundle::SensorPair;
-use touch2touch::infer::engine::EngineChoice;
-use touch2touch::io::simulated::{Layout, pair_paths, write_pair, write_tools};
-use touch2touch::io::statistics::ShiftStatistics;
-use touch2touch::ui::{Options, StudioApp};
-use touch2touch::work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch::work::error::TaskError;
-use touch2touch::work::imprint::in_meters;
-use touch2touch::work::job::{JobCx, PreviewPicture};
-use touch2touch::work::models::Wanted;
-use touch2touch::work::prediction::Prediction;
+use touch2touch_core::resample::Resampling;
+use touch2touch_core::rig::lab;
+use touch2touch_core::sim;
+use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::imprint::in_meters;
+use touch2touch_work::infer::bundle::Origin;
+use touch2touch_work::infer::bundle::SensorPair;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair, write_tools};
+use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::job::{JobCx, PreviewPicture};
+use touch2touch_work::models::Wanted;
+use touch2touch_work::prediction::Prediction;
 
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {

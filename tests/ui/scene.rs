@@ -8,7 +8,7 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{LayerLook, SceneLayer};
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::{Layer, SectionAxis};
-use touch2touch::domain::rig::lab;
+use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
 

@@ -3,8 +3,8 @@
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand};
 use touch2touch::app::seeds::SeedsCommand;
-use touch2touch::domain::ensemble::AngleFan;
-use touch2touch::domain::rig::lab;
+use touch2touch_core::ensemble::AngleFan;
+use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
 

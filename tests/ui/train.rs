@@ -5,8 +5,8 @@ use touch2touch::app::command::{Pane, SettingsCommand, TrainCommand, UiRequest, 
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::train::TrainForm;
-use touch2touch::work::bundles::BundleKind;
-use touch2touch::work::train::TrainChoice;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::train::TrainChoice;
 
 use super::rig::Rig;
 use crate::support::run;

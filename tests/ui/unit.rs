@@ -6,8 +6,8 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::state::Lookup;
 use touch2touch::app::tasks::Level;
-use touch2touch::io::dataset::ToolUnit;
-use touch2touch::io::stl;
+use touch2touch_work::io::dataset::ToolUnit;
+use touch2touch_work::io::stl;
 
 use super::rig::Rig;
 

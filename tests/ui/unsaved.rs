@@ -7,9 +7,9 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::labels::{Question, Review};
 use touch2touch::app::settings::Workspace;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::FOLDER;
-use touch2touch::work::labels::{Labels, recover};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::FOLDER;
+use touch2touch_work::labels::{Labels, recover};
 
 use super::rig::Rig;
 

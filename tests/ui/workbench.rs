@@ -10,11 +10,11 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
-use touch2touch::domain::align::reason::Reason;
-use touch2touch::domain::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
-use touch2touch::domain::rig::lab;
-use touch2touch::io::dataset::Dataset;
-use touch2touch::io::masks::MaskStore;
+use touch2touch_core::align::reason::Reason;
+use touch2touch_core::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::masks::MaskStore;
 
 use super::rig::Rig;
 

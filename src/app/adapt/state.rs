@@ -6,10 +6,10 @@ use std::sync::Arc;
 use super::super::labels::state::Review;
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::domain::dataset::PairId;
-use crate::work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::job::Curve;
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::job::Curve;
 
 /// Parts in which pairs are left out in turn.
 const FOLDS: usize = 3;

@@ -4,9 +4,9 @@ use std::sync::Arc;
 
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::domain::dataset::PairId;
-use crate::work::bundles::BundleKind;
-use crate::work::sweep::{Dial, InForce, Setting, Sweep, SweepSetup};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::sweep::{Dial, InForce, Setting, Sweep, SweepSetup};
 
 /// Over which pairs a dial is turned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

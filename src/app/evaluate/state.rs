@@ -7,11 +7,11 @@ use strum::IntoEnumIterator as _;
 
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::domain::dataset::{Index, PairId};
-use crate::domain::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::evaluate::{Evaluation, Setup};
-use crate::work::queue::{Queue, QueueBy};
+use touch2touch_core::dataset::{Index, PairId};
+use touch2touch_core::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::evaluate::{Evaluation, Setup};
+use touch2touch_work::queue::{Queue, QueueBy};
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];

@@ -6,12 +6,12 @@ use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
 use super::super::settings::state::ColorMap;
 use super::super::state::State;
-use crate::domain::postprocess::{CorrectionPart, CorrectionParts};
-use crate::infer::engine::EngineChoice;
-use crate::work::bundles::BundleKind;
-use crate::work::mask::MaskSource;
-use crate::work::subject::{Subject, Wish};
-use crate::work::sweep::Setting;
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::mask::MaskSource;
+use touch2touch_work::subject::{Subject, Wish};
+use touch2touch_work::sweep::Setting;
 
 /// The words of a command line.
 struct Words(Vec<String>);

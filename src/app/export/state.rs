@@ -11,23 +11,23 @@ use super::super::pane::{Kind, Pane};
 use super::super::settings::state::{ColorMap as MapChoice, Settings};
 use super::super::state::State;
 use super::super::tasks::state::Ticket;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::contact::MaskBasis;
-use crate::domain::dataset::PairId;
-use crate::domain::frames::PlanarPose;
-use crate::domain::rig::{PadId, Rig};
-use crate::io::case_file;
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::case::{CaseModel, CaseSetup};
-use crate::work::cloud::Clouds;
-use crate::work::error::TaskError;
-use crate::work::export::ExportChoice;
-use crate::work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
-use crate::work::import::ImportSetup;
-use crate::work::mask::made_of;
-use crate::work::pair_files::{PairFile, PairParts, write};
-use crate::work::pose::PoseResult;
-use crate::work::tool::NamedTool;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::contact::MaskBasis;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::case::{CaseModel, CaseSetup};
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::export::ExportChoice;
+use touch2touch_work::figure::{FigureLook, FigurePane, FigureSetup, FigureTheme, note};
+use touch2touch_work::import::ImportSetup;
+use touch2touch_work::io::case_file;
+use touch2touch_work::mask::made_of;
+use touch2touch_work::pair_files::{PairFile, PairParts, write};
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::tool::NamedTool;
 
 /// Pairs of the list that a figure may take.
 pub const MOST_PAIRS: usize = 50;
@@ -71,7 +71,7 @@ impl FigureForm {
     pub fn validated(mut self) -> Self {
         self.first = self.first.map(|n| n.clamp(1, MOST_PAIRS));
         self.scale = self.scale.clamp(SCALES[0], SCALES[3]);
-        self.error_m = crate::domain::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
+        self.error_m = touch2touch_core::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
         self.panes.sort_unstable();
         self.panes.dedup();
         self

@@ -7,9 +7,9 @@ use super::super::pane::Need;
 pub use super::super::results::inspection::Inspection;
 use super::super::state::State;
 use super::super::workbench::state::Layer;
-use crate::domain::align::TraceStep;
-use crate::domain::align::basin::Plane;
-use crate::domain::frames::PlanarPose;
+use touch2touch_core::align::TraceStep;
+use touch2touch_core::align::basin::Plane;
+use touch2touch_core::frames::PlanarPose;
 
 /// What of a registration is looked at. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,10 +4,10 @@ use super::super::effect::Effect;
 use super::super::state::State;
 use super::super::tasks::state::{Level, Task, Ticket};
 use super::end_stroke;
-use crate::work::bundles::BundleKind;
-use crate::work::import::Import;
-use crate::work::labels::ImprintSource;
-use crate::work::propose::{Batch, BatchSetup, ProposeSetup};
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::import::Import;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::propose::{Batch, BatchSetup, ProposeSetup};
 
 impl State {
     /// Whether masks can be proposed for the listed pairs.

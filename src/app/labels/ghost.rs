@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::super::keys::{CloudKey, ImprintSource, PoseKey, Revision};
 use super::super::state::State;
-use crate::domain::grid::Mask;
-use crate::domain::rig::PadId;
-use crate::work::cloud::Clouds;
-use crate::work::pose::PoseResult;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::pose::PoseResult;
 
 /// Mask, pose and cloud before the last change of a mask. Nothing of it is computed: pose and cloud are those that were
 /// there, and are missing where none was.

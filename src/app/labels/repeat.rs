@@ -6,7 +6,7 @@
 use super::super::state::State;
 use super::Review;
 use super::state::Repeating;
-use crate::domain::dataset::PairId;
+use touch2touch_core::dataset::PairId;
 
 /// So many pairs are done between two that come back.
 const BETWEEN: usize = 4;

@@ -6,13 +6,13 @@ use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PoseKey, Revision};
 use super::super::tasks::state::Ticket;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{DrawTool, Drawing, Ground, Provenance, Seen};
-use crate::domain::rig::PadId;
-use crate::work::error::TaskError;
-use crate::work::label_stats::LabelStats;
-pub use crate::work::labels::{HandMask, MaskPlace, PairLabels, Review};
-use crate::work::propose::Proposal;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, Seen};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::label_stats::LabelStats;
+pub use touch2touch_work::labels::{HandMask, MaskPlace, PairLabels, Review};
+use touch2touch_work::propose::Proposal;
 
 /// What happened when the stored labels of a pair were read.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -9,8 +9,8 @@ use crate::app::keys::Revision;
 use crate::app::state::State;
 use crate::app::tasks::state::Level;
 use crate::app::view::state::UiRequest;
-use crate::work::error::TaskErrorKind;
-use crate::work::labels::{Deed, Unsaved};
+use touch2touch_work::error::TaskErrorKind;
+use touch2touch_work::labels::{Deed, Unsaved};
 
 /// What can happen to labels that are not on the disk.
 #[derive(Clone, Debug)]

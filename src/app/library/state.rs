@@ -13,11 +13,11 @@ use super::super::keys::{DatasetSeq, PairKey};
 use super::super::labels::state::Document;
 use super::super::services::DataSource;
 use super::super::state::State;
-use crate::domain::dataset::{Index, PairEntry, PairId};
-use crate::domain::rig::Rig;
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::error::TaskError;
-use crate::work::filter::Filter;
+use touch2touch_core::dataset::{Index, PairEntry, PairId};
+use touch2touch_core::rig::Rig;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::filter::Filter;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

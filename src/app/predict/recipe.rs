@@ -2,9 +2,9 @@
 
 use super::super::keys::{ImprintSource, PredictionKey, TouchKey};
 use super::super::state::{Absent, State};
-use crate::domain::rig::PadId;
-use crate::domain::sample::Sample;
-use crate::work::bundles::{BundleInfo, BundleKind};
+use touch2touch_core::rig::PadId;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.

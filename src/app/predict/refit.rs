@@ -4,10 +4,10 @@ use super::super::effect::Effect;
 use super::super::keys::ShiftMode;
 use super::super::settings;
 use super::super::state::State;
-use crate::domain::rig::PadId;
-use crate::io::statistics::ShiftStatistics;
-use crate::work::bundles::BundleKind;
-use crate::work::error::TaskError;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::statistics::ShiftStatistics;
 
 /// Name of the job on screen.
 const TITLE: &str = "Shift statistics";

@@ -6,8 +6,8 @@ use std::time::Duration;
 use super::super::pane::Need;
 use super::prediction::PredictionKey;
 use super::{Computes, Job, SharedServices, State, Wanted};
-use crate::domain::rig::PadId;
-use crate::work::prediction::Prediction;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::prediction::Prediction;
 
 /// What a prediction may cost to be made without being asked for, seconds.
 pub const CHEAP_S: f64 = 1.0;

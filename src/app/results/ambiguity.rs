@@ -2,8 +2,8 @@
 
 use super::imprint::gone;
 use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
-use crate::domain::ambiguity::{Ambiguity, ambiguity};
-use crate::domain::rig::PadId;
+use touch2touch_core::ambiguity::{Ambiguity, ambiguity};
+use touch2touch_core::rig::PadId;
 
 /// What the GelSlim image of a touch leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

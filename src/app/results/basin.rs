@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::super::pane::Need;
 use super::pose::{PoseKey, Registered};
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::domain::align::basin::{Basin, Plane};
-use crate::work::pose::basin;
+use touch2touch_core::align::basin::{Basin, Plane};
+use touch2touch_work::pose::basin;
 
 /// A basin map.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

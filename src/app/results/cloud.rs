@@ -6,9 +6,9 @@ use super::Latest;
 use super::imprint::{Imprint, ImprintKey};
 use super::mask::{MaskKey, MaskVersion};
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
-use crate::domain::grid::Mask;
-use crate::domain::rig::{PadId, PerPad};
-use crate::work::cloud::{Clouds, clouds};
+use touch2touch_core::grid::Mask;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_work::cloud::{Clouds, clouds};
 
 /// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -2,8 +2,8 @@
 
 use super::versus::VersusKey;
 use super::{Absent, ImprintSource, Lookup, State, TouchKey, Wanted};
-use crate::domain::rig::PadId;
-use crate::work::compare::Comparison;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::compare::Comparison;
 
 impl State {
     /// Prediction against measurement of one finger.

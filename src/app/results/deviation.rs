@@ -2,7 +2,7 @@
 
 use super::pose::{PoseKey, Registered};
 use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::work::deviation::{Deviation, deviation};
+use touch2touch_work::deviation::{Deviation, deviation};
 
 /// The distances at a registered pose.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,8 +4,8 @@ pub use super::imprint::EnsembleKey;
 use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State};
-use crate::domain::rig::PadId;
-use crate::work::ensemble::{Ensemble, ensemble};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::ensemble::{Ensemble, ensemble};
 
 impl Computes for EnsembleKey {
     type Value = Ensemble;

@@ -3,8 +3,8 @@
 use super::super::export::state::ImportForm;
 use super::super::keys::{DatasetSeq, Revision};
 use super::{Computes, Job, Lane, SharedServices, State, Wanted};
-use crate::work::error::TaskError;
-use crate::work::import::{Import, plan_import};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::import::{Import, plan_import};
 
 /// The plan of an import, over what is drawn and marked now.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -6,14 +6,14 @@ use super::super::keys::ShiftMode;
 use super::picture::PictureKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
-use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::rig::{PadId, SensorKind};
-use crate::domain::sample::Sample;
-use crate::work::compare::Beside;
-use crate::work::ensemble::Ensemble;
-use crate::work::error::TaskError;
-use crate::work::imprint;
-use crate::work::labels::ImprintOf;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::rig::{PadId, SensorKind};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::compare::Beside;
+use touch2touch_work::ensemble::Ensemble;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::imprint;
+use touch2touch_work::labels::ImprintOf;
 
 /// A prediction in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::pane::Need;
 use super::pose::{PoseKey, Registered};
 use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::work::influence::{Influence, influence};
+use touch2touch_work::influence::{Influence, influence};
 
 /// The influence of the pixels on a registered angle.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

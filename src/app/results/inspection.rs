@@ -8,11 +8,11 @@ use super::super::keys::RegistrationChoice;
 use super::pose::Registered;
 use super::run::RunKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::domain::align::{AlignReport, TraceStep};
-use crate::domain::frames::PlanarPose;
-use crate::domain::inspect::Counterparts;
-use crate::domain::pose::ToolModel;
-use crate::work::pose::PoseResult;
+use touch2touch_core::align::{AlignReport, TraceStep};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::inspect::Counterparts;
+use touch2touch_core::pose::ToolModel;
+use touch2touch_work::pose::PoseResult;
 
 /// The steps of a recorded registration.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use super::super::pane::Need;
 use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
-use crate::domain::bits::Bits;
-use crate::work::label_stats::LabelStats;
+use touch2touch_core::bits::Bits;
+use touch2touch_work::label_stats::LabelStats;
 
 /// Everything that decides what is counted.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

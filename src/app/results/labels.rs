@@ -5,8 +5,8 @@ use std::sync::Arc;
 use super::super::labels::state::{PairLabels, Stored};
 use super::super::tasks::state::Level;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State};
-use crate::work::error::TaskError;
-use crate::work::labels::Told;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::labels::Told;
 
 /// The labels stored for a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

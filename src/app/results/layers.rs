@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::pose::PoseKey;
 use super::run::RunKey;
 use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::domain::grid::Mask;
-use crate::domain::rig::PerPad;
-use crate::work::layers::{LayerResult, layers};
+use touch2touch_core::grid::Mask;
+use touch2touch_core::rig::PerPad;
+use touch2touch_work::layers::{LayerResult, layers};
 
 /// The layers of a recorded registration from the engine's own starts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

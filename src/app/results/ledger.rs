@@ -3,8 +3,8 @@
 use super::super::keys::ShiftMode;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
-use crate::domain::rig::PadId;
-use crate::work::ledger::{LedgerResult, of_prediction};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::ledger::{LedgerResult, of_prediction};
 
 /// The depth chain of a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

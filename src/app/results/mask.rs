@@ -12,13 +12,13 @@ use super::Request;
 use super::imprint::ImprintKey;
 use super::tool::ToolKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::domain::bits::Bits;
-use crate::domain::contact::{ContactMask, MaskBasis};
-use crate::domain::grid::Mask;
-use crate::domain::label::Provenance;
-use crate::domain::rig::PadId;
-use crate::work::bundles::BundleKind;
-use crate::work::mask::{self, MaskInputs};
+use touch2touch_core::bits::Bits;
+use touch2touch_core::contact::{ContactMask, MaskBasis};
+use touch2touch_core::grid::Mask;
+use touch2touch_core::label::Provenance;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::mask::{self, MaskInputs};
 
 /// An automatic mask of one imprint.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -2,7 +2,7 @@
 
 use super::super::keys::{DatasetSeq, Revision};
 use super::{Computes, Job, Lane, SharedServices, State, Wanted};
-use crate::work::export::{ExportChoice, Plan};
+use touch2touch_work::export::{ExportChoice, Plan};
 
 /// The plan of an export, of what is drawn and marked now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -29,7 +29,7 @@ impl Computes for MaskPlanKey {
     }
 
     /// The form says it.
-    fn failed(&self, _: &mut State, _: &crate::work::error::TaskError) -> bool {
+    fn failed(&self, _: &mut State, _: &touch2touch_work::error::TaskError) -> bool {
         false
     }
 }

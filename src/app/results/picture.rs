@@ -2,8 +2,8 @@
 
 use super::imprint::gone;
 use super::{Computes, Job, Lane, SharedServices, State, TouchKey};
-use crate::work::compare::{Beside, beside};
-use crate::work::error::TaskError;
+use touch2touch_work::compare::{Beside, beside};
+use touch2touch_work::error::TaskError;
 
 /// The picture beside one touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

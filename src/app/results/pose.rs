@@ -7,12 +7,12 @@ use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
 use super::{Absent, Computed, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::domain::align::Ask;
-use crate::domain::frames::PlanarPose;
-use crate::domain::rig::PerPad;
-use crate::work::cloud::Clouds;
-use crate::work::pose::{PoseResult, pose};
-use crate::work::tool::NamedTool;
+use touch2touch_core::align::Ask;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::rig::PerPad;
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::tool::NamedTool;
 
 /// A pose of a cloud.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -8,17 +8,17 @@ use super::super::keys::{Bits64, Sampler, Spacing};
 use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
 use super::{Computes, Job, Lane, Results, SharedServices, State, TouchKey, Wanted};
-use crate::domain::diffusion::GenerateConfig;
-use crate::domain::ensemble::seeds;
-use crate::domain::grid::RgbGrid;
-use crate::domain::rig::{PadId, SensorId};
-use crate::domain::sample::Sample;
-use crate::infer::engine::EngineChoice;
-use crate::work::bundles::BundleInfo;
-use crate::work::error::TaskError;
-use crate::work::job::JobCx;
-use crate::work::models;
-use crate::work::prediction::Prediction;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::ensemble::seeds;
+use touch2touch_core::grid::RgbGrid;
+use touch2touch_core::rig::{PadId, SensorId};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models;
+use touch2touch_work::prediction::Prediction;
 
 /// Everything that decides a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

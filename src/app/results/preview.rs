@@ -7,8 +7,8 @@ use super::super::keys::ShiftMode;
 use super::super::pane::Need;
 use super::prediction::PredictionKey;
 use super::{ImprintSource, State, TouchKey};
-use crate::domain::rig::PadId;
-use crate::work::job::{PreviewPicture, Previews};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::job::{PreviewPicture, Previews};
 
 /// A prediction as it looks on the way.
 #[derive(Clone, Debug)]

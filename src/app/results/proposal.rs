@@ -10,14 +10,14 @@ use super::mask::{MaskKey, MaskVersion};
 use super::pose::PoseKey;
 use super::tool::ToolKey;
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
-use crate::domain::bits::Bits;
-use crate::domain::contact::ContactMask;
-use crate::domain::grid::Grid;
-use crate::domain::hand::HandPose;
-use crate::domain::label::CadPose;
-use crate::domain::rig::PadId;
-use crate::work::error::TaskError;
-use crate::work::propose::{self, Proposal, ProposalSource, Side};
+use touch2touch_core::bits::Bits;
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::hand::HandPose;
+use touch2touch_core::label::CadPose;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::propose::{self, Proposal, ProposalSource, Side};
 
 const WHAT: &str = "Propose a mask";
 
@@ -48,7 +48,7 @@ impl At {
             }
             Self::Hand(bits) => {
                 let [theta_rad, y_m, z_m, x_m, pitch_rad, yaw_rad] = bits.map(f64::from_bits);
-                let planar = crate::domain::frames::PlanarPose { theta_rad, y_m, z_m };
+                let planar = touch2touch_core::frames::PlanarPose { theta_rad, y_m, z_m };
                 let pose = HandPose { planar, x_m, pitch_rad, yaw_rad };
                 (CadPose::Nudged(pose), pose)
             }

@@ -3,8 +3,8 @@
 use super::super::keys::PoseBits;
 use super::pose::{PoseKey, Registered};
 use super::{Computes, ImprintSource, Job, Lane, SharedServices, State};
-use crate::domain::align::Ask;
-use crate::work::pose::{PoseResult, pose};
+use touch2touch_core::align::Ask;
+use touch2touch_work::pose::{PoseResult, pose};
 
 /// A registration with everything recorded: every step, and what became of every point.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

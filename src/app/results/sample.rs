@@ -1,9 +1,9 @@
 //! The tensors of a pair.
 
 use super::{Absent, Computes, Job, Lane, Lookup, PairKey, SharedServices, State};
-use crate::domain::rig::PadId;
-use crate::domain::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
-use crate::work::error::TaskError;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
+use touch2touch_work::error::TaskError;
 
 impl Computes for PairKey {
     type Value = Sample;

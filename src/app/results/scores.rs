@@ -3,9 +3,9 @@
 use super::super::evaluate::state::ScoreTable;
 use super::super::pane::Need;
 use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
-use crate::infer::engine::EngineChoice;
-use crate::work::evaluate::Setup;
 use std::sync::Arc;
+use touch2touch_work::evaluate::Setup;
+use touch2touch_work::infer::engine::EngineChoice;
 
 /// Everything that decides which scores are there.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -10,10 +10,10 @@ use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Cache, Computes as _};
 use crate::app::keys::{ShiftMode, TouchKey};
-use crate::domain::grid::DepthMap;
-use crate::domain::postprocess::RawPrediction;
-use crate::domain::rig::PadId;
-use crate::work::prediction::{Prediction, made_with};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::postprocess::RawPrediction;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::prediction::{Prediction, made_with};
 
 /// The predictions that are shown where the settings do not name one that is there.
 #[derive(Clone, Debug, Default)]

@@ -2,9 +2,9 @@
 
 use super::super::pane::Need;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State, Wanted};
-use crate::domain::dataset::PairId;
-use crate::domain::grid::DepthMap;
-use crate::work::imprint;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_work::imprint;
 
 /// The small picture of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::{Absent, Computes, DatasetSeq, Job, Lane, Lookup, SharedServices, State, Wanted};
-use crate::work::error::TaskError;
-use crate::work::tool::{NamedTool, named_tool};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::tool::{NamedTool, named_tool};
 
 /// A tool of a data set.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -3,10 +3,10 @@
 use super::super::keys::{DatasetSeq, Revision};
 use super::super::pane::Need;
 use super::{Computes, Job, Lane, SharedServices, State, Wanted};
-use crate::work::error::TaskError;
-use crate::work::export::HandMasks;
-use crate::work::labels::Labels;
-use crate::work::train::{TrainChoice, TrainPlan, plan};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::export::HandMasks;
+use touch2touch_work::labels::Labels;
+use touch2touch_work::train::{TrainChoice, TrainPlan, plan};
 
 /// The plan of a training, on what is drawn and marked now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

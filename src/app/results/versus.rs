@@ -13,17 +13,17 @@ use super::picture::PictureKey;
 use super::pose::PoseKey;
 use super::prediction::{PredictionKey, SeedKey};
 use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
-use crate::domain::grid::DepthMap;
-use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::Sample;
-use crate::work::bundles::BundleKind;
-use crate::work::cloud::Clouds;
-use crate::work::compare::{Comparison, Depicted, between, tile_of};
-use crate::work::deviation::{Apart, apart};
-use crate::work::error::TaskError;
-use crate::work::pose::PoseResult;
-use crate::work::prediction::Prediction;
-use crate::work::subject::{Subject, Wish};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::compare::{Comparison, Depicted, between, tile_of};
+use touch2touch_work::deviation::{Apart, apart};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::prediction::Prediction;
+use touch2touch_work::subject::{Subject, Wish};
 
 /// A prediction that is compared with something.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -8,10 +8,10 @@ use super::super::keys::DatasetSeq;
 use super::super::services::{DataSource, Following};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
-use crate::io::caught::caught;
-use crate::io::follow::PERIOD;
-use crate::work::error::TaskError;
-use crate::work::job::Cancel;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::caught::caught;
+use touch2touch_work::io::follow::PERIOD;
+use touch2touch_work::job::Cancel;
 
 /// A followed folder.
 pub(super) enum Job {

@@ -12,9 +12,9 @@ use super::super::jobs::{self, Body, Lane};
 use super::super::keys::DatasetSeq;
 use super::super::results::{Computed, Request};
 use super::{JobId, Wake, lock};
-use crate::io::caught::caught;
-use crate::work::error::TaskError;
-use crate::work::job::{Cancel, JobCx};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::caught::caught;
+use touch2touch_work::job::{Cancel, JobCx};
 
 /// The end of a job.
 pub(super) struct Event {

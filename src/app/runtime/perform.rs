@@ -15,21 +15,21 @@ use super::super::tasks::state::Ticket;
 use super::super::view::state::UiRequest;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
-use crate::domain::dataset::PairId;
-use crate::domain::mesh::sampling::spread;
-use crate::domain::rig::PerPad;
-use crate::domain::sample::Sample;
-use crate::infer::bundle::Ends;
-use crate::io::folders;
-use crate::work::adapt;
-use crate::work::bundles;
-use crate::work::error::TaskError;
-use crate::work::evaluate;
-use crate::work::figure::figure;
-use crate::work::import::import_masks;
-use crate::work::job::{Cancel, JobCx};
-use crate::work::models::Wanted;
-use crate::work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::mesh::sampling::spread;
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::adapt;
+use touch2touch_work::bundles;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::evaluate;
+use touch2touch_work::figure::figure;
+use touch2touch_work::import::import_masks;
+use touch2touch_work::infer::bundle::Ends;
+use touch2touch_work::io::folders;
+use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_work::models::Wanted;
+use touch2touch_work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
 
 /// A place as the system knows it, whatever folder the program was started in: what a note says must be found again.
 fn absolute(place: PathBuf) -> PathBuf {

@@ -5,11 +5,11 @@ use super::super::pane::Need;
 use super::super::results::prediction::SeedKey;
 use super::super::state::{Absent, State};
 use super::super::wanted::Wanted;
-use crate::domain::grid::DepthMap;
-use crate::domain::rig::PadId;
-use crate::work::pose::PoseResult;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::PadId;
+use touch2touch_work::pose::PoseResult;
 
-pub use crate::work::subject::SEEDS as COUNT;
+pub use touch2touch_work::subject::SEEDS as COUNT;
 
 /// What a person chose about seeds.
 #[derive(Clone, Debug, PartialEq, Eq)]

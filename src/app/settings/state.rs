@@ -11,16 +11,16 @@ use strum::EnumIter;
 use super::super::action::Bindings;
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
-use crate::domain::diffusion::{GUIDANCE, GenerateConfig};
-use crate::domain::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
-use crate::domain::postprocess::RefitShift;
-use crate::domain::units::clamp_or;
-use crate::infer::engine::EngineChoice;
-use crate::work::bundles::BundleInfo;
-pub use crate::work::mask::{MaskChoice, MaskSource};
-pub use crate::work::propose::ProposalSource;
-use crate::work::repeats;
 use scene::SceneLook;
+use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
+use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
+use touch2touch_core::postprocess::RefitShift;
+use touch2touch_core::units::clamp_or;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::infer::engine::EngineChoice;
+pub use touch2touch_work::mask::{MaskChoice, MaskSource};
+pub use touch2touch_work::propose::ProposalSource;
+use touch2touch_work::repeats;
 use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.

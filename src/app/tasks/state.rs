@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
 use super::super::keys::{DatasetSeq, PredictionKey, Request};
-use crate::work::error::{TaskError, TaskErrorKind};
-use crate::work::job::Progress;
+use touch2touch_work::error::{TaskError, TaskErrorKind};
+use touch2touch_work::job::Progress;
 
 /// The name of a running job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
-use crate::work::bundles::{BundleInfo, BundleKind};
-use crate::work::job::Curve;
-use crate::work::train::{TrainChoice, TrainSetup, Trained};
-use crate::work::tuning::Tuning;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::job::Curve;
+use touch2touch_work::train::{TrainChoice, TrainSetup, Trained};
+use touch2touch_work::tuning::Tuning;
 
 /// Minutes that can be asked for.
 pub const MINUTES: RangeInclusive<u32> = 1..=600;

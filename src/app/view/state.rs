@@ -7,8 +7,8 @@ use glam::DVec3;
 use super::super::export::state::Output;
 use super::super::keys::ImprintSource;
 use super::super::pane::Pane;
-use crate::domain::dataset::PairId;
-use crate::domain::rig::PadId;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::PadId;
 
 /// What is looked at.
 #[derive(Clone, Debug, Default)]

@@ -8,9 +8,9 @@ use strum::EnumIter;
 use super::super::keys::{ImprintSource, PairKey, RunKey};
 use super::super::pane::Need;
 use super::super::state::State;
-use crate::domain::frames::PlanarPose;
-use crate::domain::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
-use crate::domain::rig::{PadId, Rig};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
+use touch2touch_core::rig::{PadId, Rig};
 
 /// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]

@@ -7,8 +7,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::headless::{Common, Output, VerbResult};
-use crate::io::cases;
-use crate::io::stl;
+use touch2touch_work::io::cases;
+use touch2touch_work::io::stl;
 
 /// Arguments of `bench cases`.
 #[derive(Debug, Args)]

@@ -10,18 +10,18 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Machine, contact_points};
-use crate::domain::catalog;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::{Registration, register};
-use crate::domain::rig::lab;
-use crate::domain::sample::DepthCamera;
-use crate::domain::sim::{self, SimConfig, Spoil, spoil_mask};
-use crate::domain::tool::ToolModel;
-use crate::domain::units::angle_error;
 use crate::headless::args::JsonArgs;
 use crate::headless::{Output, VerbResult};
+use touch2touch_core::catalog;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::metrics::AngleSummary;
+use touch2touch_core::pose::{Registration, register};
+use touch2touch_core::rig::lab;
+use touch2touch_core::sample::DepthCamera;
+use touch2touch_core::sim::{self, SimConfig, Spoil, spoil_mask};
+use touch2touch_core::tool::ToolModel;
+use touch2touch_core::units::angle_error;
 
 /// Pairs that are prepared, then timed, at a time: their cameras must fit into memory.
 const CHUNK: usize = 504;

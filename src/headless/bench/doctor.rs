@@ -10,18 +10,18 @@ use strum::IntoEnumIterator as _;
 
 use self::kinds::{Kind, Set, kinds};
 use super::Machine;
-use crate::domain::catalog::{ToolSpec, tools};
-use crate::domain::doubt::{Doubt, Felt, judge};
-use crate::domain::rig::Rig;
-use crate::domain::sim::{Condition, SimConfig, random_grasp};
 use crate::headless::args::JsonArgs;
 use crate::headless::predict::RuntimeArg;
 use crate::headless::{Output, VerbResult};
-use crate::work::bundles::{self, BundleKind};
-use crate::work::doubts::{Generator, PAIRS, placed};
-use crate::work::job::JobCx;
-use crate::work::models::Models;
-use crate::work::predict::Generating;
+use touch2touch_core::catalog::{ToolSpec, tools};
+use touch2touch_core::doubt::{Doubt, Felt, judge};
+use touch2touch_core::rig::Rig;
+use touch2touch_core::sim::{Condition, SimConfig, random_grasp};
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::doubts::{Generator, PAIRS, placed};
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::Models;
+use touch2touch_work::predict::Generating;
 
 /// Arguments of `bench doctor`.
 #[derive(Debug, Args)]

@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use crate::domain::ensemble::{AngleFan, Dial};
-use crate::domain::grid::RgbGrid;
-use crate::domain::units;
-use crate::work::canvas::{Drawing, Drawn, Paper, pixels};
+use touch2touch_core::ensemble::{AngleFan, Dial};
+use touch2touch_core::grid::RgbGrid;
+use touch2touch_core::units;
+use touch2touch_work::canvas::{Drawing, Drawn, Paper, pixels};
 
 const SEED: RGBColor = RGBColor(0xc2, 0x54, 0x00);
 const TRUTH: RGBColor = RGBColor(0x1c, 0x84, 0x47);

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use crate::domain::metrics::AngleSummary;
-use crate::io::cases::Stratum;
+use touch2touch_core::metrics::AngleSummary;
+use touch2touch_work::io::cases::Stratum;
 
 /// Beyond this an answer is no answer, degrees.
 pub(super) const GROSS_DEG: f64 = 20.0;

@@ -15,17 +15,17 @@ use self::timing::{First, Overhead, timed_run};
 use super::Machine;
 use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint, Picture};
-use crate::domain::diffusion::{GenerateConfig, Sampler, Spacing};
-use crate::domain::metrics::AngleSummary;
-use crate::domain::rig::Rig;
 use crate::headless::args::JsonArgs;
 use crate::headless::{Output, VerbResult};
-use crate::infer::engine::{EngineChoice, EngineKind, resolve};
-use crate::infer::generator::Generator;
-use crate::infer::mask::MaskModel;
-use crate::io::atomic;
-use crate::work::bundles::{self, BundleKind};
-use crate::work::canvas;
+use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
+use touch2touch_core::metrics::AngleSummary;
+use touch2touch_core::rig::Rig;
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::canvas;
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_work::infer::generator::Generator;
+use touch2touch_work::infer::mask::MaskModel;
+use touch2touch_work::io::atomic;
 
 /// What everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);

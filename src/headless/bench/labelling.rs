@@ -11,23 +11,23 @@ use serde::Serialize;
 use super::Machine;
 use super::figures::quantile;
 use super::generator::cases::{Case, simulate};
-use crate::domain::align::Ask;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{CadPose, DrawTool, Drawing, Ground, Paint, Provenance, agreement, difference};
-use crate::domain::pose::RegistrationChoice;
-use crate::domain::rig::{PadId, PerPad, Rig, lab};
 use crate::headless::args::JsonArgs;
 use crate::headless::predict::{ModelArgs, Predictor};
 use crate::headless::{Output, VerbResult};
-use crate::work::cloud::{clouds, contact_points};
-use crate::work::influence::influence;
-use crate::work::job::JobCx;
-use crate::work::labels::{HandMask, ImprintSource};
-use crate::work::mask::{MaskChoice, MaskInputs, MaskSource};
-use crate::work::models::Masking;
-use crate::work::pose::pose;
-use crate::work::propose::{self, Side};
+use touch2touch_core::align::Ask;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::label::{CadPose, DrawTool, Drawing, Ground, Paint, Provenance, agreement, difference};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::rig::{PadId, PerPad, Rig, lab};
+use touch2touch_work::cloud::{clouds, contact_points};
+use touch2touch_work::influence::influence;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{HandMask, ImprintSource};
+use touch2touch_work::mask::{MaskChoice, MaskInputs, MaskSource};
+use touch2touch_work::models::Masking;
+use touch2touch_work::pose::pose;
+use touch2touch_work::propose::{self, Side};
 
 /// Moves of the pointer in a stroke.
 const MOVES: usize = 60;
@@ -254,7 +254,7 @@ impl Persons {
 }
 
 fn apart_deg(a: PlanarPose, b: PlanarPose) -> f64 {
-    crate::domain::units::angle_error(a.theta_rad, b.theta_rad).to_degrees()
+    touch2touch_core::units::angle_error(a.theta_rad, b.theta_rad).to_degrees()
 }
 
 fn true_masks(case: &Case) -> anyhow::Result<PerPad<Mask>> {
@@ -329,9 +329,9 @@ fn proposals(
     if let Some(from) = from {
         let masks = true_masks(from)?;
         each("carried from another grasp", &mut |pad, imprint| {
-            let mut labels = crate::work::labels::PairLabels::default();
+            let mut labels = touch2touch_work::labels::PairLabels::default();
             let hand = masks[pad].clone().map(|mask| HandMask::new(mask, Provenance::Truth));
-            labels.draw(&crate::work::labels::MaskPlace::measured(pad), hand);
+            labels.draw(&touch2touch_work::labels::MaskPlace::measured(pad), hand);
             let to = Side { sample: &case.sample, pad, imprint };
             Ok(propose::carried_from_pair("another", (&from.sample, &labels), to)?.mask)
         })?;

@@ -10,11 +10,11 @@ use serde::{Deserialize, Serialize};
 
 use super::figures::{Outcome, Summary};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
-use crate::domain::frames::PlanarPose;
-use crate::domain::mesh::TriMesh;
-use crate::domain::units::angle_error;
-use crate::io::pt::Tensor;
-use crate::io::{files, npz};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::units::angle_error;
+use touch2touch_work::io::pt::Tensor;
+use touch2touch_work::io::{files, npz};
 
 const SCRIPT: &str = include_str!("../../../benches/peers.py");
 /// Surface points of a tool: as many as the lab's loop compares with.

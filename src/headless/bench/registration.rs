@@ -14,18 +14,18 @@ use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
-use crate::domain::align::{AlignError, AlignReport, icp};
-use crate::domain::cloud::CloudError;
-use crate::domain::field::DistanceField;
-use crate::domain::mesh::TriMesh;
-use crate::domain::pose::{Registration, ToolModel, register};
-use crate::domain::units::angle_error;
 use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
 use crate::headless::output::says;
 use crate::headless::{Output, VerbResult, spread};
-use crate::io::atomic;
-use crate::io::cases::{Case, CaseSet};
-use crate::work::canvas;
+use touch2touch_core::align::{AlignError, AlignReport, icp};
+use touch2touch_core::cloud::CloudError;
+use touch2touch_core::field::DistanceField;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::pose::{Registration, ToolModel, register};
+use touch2touch_core::units::angle_error;
+use touch2touch_work::canvas;
+use touch2touch_work::io::atomic;
+use touch2touch_work::io::cases::{Case, CaseSet};
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
 const REPEAT_MS: f64 = 8.0;

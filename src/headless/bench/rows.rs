@@ -4,8 +4,8 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::figures::Summary;
-use crate::domain::frames::PlanarPose;
-use crate::io::cases::Stratum;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_work::io::cases::Stratum;
 
 /// A case ready to be registered.
 pub(super) struct Prepared {

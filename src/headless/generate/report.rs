@@ -3,13 +3,13 @@
 use serde::Serialize;
 
 use super::super::seeds::SeedFigures;
-use crate::domain::ambiguity::{Ambiguity, Touch};
-use crate::domain::evaluation;
-use crate::domain::findings::Finding;
-use crate::domain::metrics::{self, Unstretched};
-use crate::domain::rig::Text;
-use crate::domain::sample::Scale;
-use crate::work::compare::Comparison;
+use touch2touch_core::ambiguity::{Ambiguity, Touch};
+use touch2touch_core::evaluation;
+use touch2touch_core::findings::Finding;
+use touch2touch_core::metrics::{self, Unstretched};
+use touch2touch_core::rig::Text;
+use touch2touch_core::sample::Scale;
+use touch2touch_work::compare::Comparison;
 
 /// What a prediction is measured in.
 #[derive(Clone, Copy, PartialEq, Eq)]

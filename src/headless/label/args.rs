@@ -10,11 +10,11 @@ use super::super::contact_mask::MaskArgs;
 use super::super::pose::parse_start;
 use super::super::predict::ModelArgs;
 use super::super::{Common, ToolArgs};
-use crate::domain::frames::PlanarPose;
-use crate::domain::label::{CleanKind, CleanUp, Drawing};
-use crate::domain::pose::RegistrationChoice;
-use crate::work::labels::{ImprintSource, Review};
-use crate::work::propose::ProposalSource;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::label::{CleanKind, CleanUp, Drawing};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::labels::{ImprintSource, Review};
+use touch2touch_work::propose::ProposalSource;
 
 fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
     let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));

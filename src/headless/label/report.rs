@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
-use crate::domain::grid::Mask;
-use crate::domain::hand::AcceptedPose;
-use crate::io::dataset::Dataset;
-use crate::work::label_stats::Counts;
-use crate::work::labels::{ImprintOf, PairLabels};
+use touch2touch_core::grid::Mask;
+use touch2touch_core::hand::AcceptedPose;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::label_stats::Counts;
+use touch2touch_work::labels::{ImprintOf, PairLabels};
 
 /// What is stored of a pair.
 #[derive(Debug, Serialize)]

@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::super::args::{DatasetArgs, keyed};
 use super::super::{Common, Output, VerbResult};
-use crate::io::exchange::Format;
-use crate::work::import::{ImportSetup, import_masks, plan_import};
+use touch2touch_work::import::{ImportSetup, import_masks, plan_import};
+use touch2touch_work::io::exchange::Format;
 
 /// Arguments of `masks import`.
 #[derive(Debug, Args)]

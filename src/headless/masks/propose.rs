@@ -6,11 +6,11 @@ use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::predict::{ModelArgs, Predictor};
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
-use crate::domain::dataset::{PairEntry, PairId};
-use crate::domain::pose::RegistrationChoice;
-use crate::work::filter::Filter;
-use crate::work::labels::{ImprintSource, Labels};
-use crate::work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_core::dataset::{PairEntry, PairId};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::filter::Filter;
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 /// Arguments of `masks propose`.
 #[derive(Debug, Args)]

@@ -9,14 +9,14 @@ use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::predict::{RuntimeArg, ShiftArg};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
-use crate::domain::evaluation::Figure;
-use crate::domain::pose::RegistrationChoice;
-use crate::infer::bundle::{Bundle, Origin, find_all};
-use crate::io::dataset::Dataset;
-use crate::work::evaluate::Setup;
-use crate::work::labels::{Labels, Review};
-use crate::work::models::Models;
-use crate::work::queue::{Line, QueueBy, queue};
+use touch2touch_core::evaluation::Figure;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::evaluate::Setup;
+use touch2touch_work::infer::bundle::{Bundle, Origin, find_all};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::labels::{Labels, Review};
+use touch2touch_work::models::Models;
+use touch2touch_work::queue::{Line, QueueBy, queue};
 
 /// Arguments of `masks queue`.
 #[derive(Debug, Args)]

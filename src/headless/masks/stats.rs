@@ -6,8 +6,8 @@ use strum::IntoEnumIterator as _;
 
 use super::super::args::DatasetArgs;
 use super::super::{Common, Output, VerbResult};
-use crate::work::label_stats::{Counts, Effort, LabelStats, label_stats};
-use crate::work::labels::{Labels, Review, system_person};
+use touch2touch_work::label_stats::{Counts, Effort, LabelStats, label_stats};
+use touch2touch_work::labels::{Labels, Review, system_person};
 
 /// Arguments of `masks stats`.
 #[derive(Debug, Args)]

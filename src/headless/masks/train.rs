@@ -9,13 +9,13 @@ use clap::Args;
 use super::super::args::{DatasetArgs, parse_minutes};
 use super::super::predict::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
-use crate::work::bundles::{self, BundleKind};
-use crate::work::export::HandMasks;
-use crate::work::labels::Labels;
-use crate::work::models::Models;
-use crate::work::new_bundle::models_folder;
-use crate::work::train::{Told, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
-use crate::work::tuning::{Tuning, unfinished_folder};
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::export::HandMasks;
+use touch2touch_work::labels::Labels;
+use touch2touch_work::models::Models;
+use touch2touch_work::new_bundle::models_folder;
+use touch2touch_work::train::{Told, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
+use touch2touch_work::tuning::{Tuning, unfinished_folder};
 
 /// Trained for so long where nothing is said.
 const MINUTES: f64 = 10.0;
@@ -131,8 +131,8 @@ fn text(trained: &Trained) -> String {
     };
     for one in &trained.held_out {
         let imprint = match one.imprint {
-            crate::work::labels::ImprintSource::Measured => "",
-            crate::work::labels::ImprintSource::Predicted => ", predicted",
+            touch2touch_work::labels::ImprintSource::Measured => "",
+            touch2touch_work::labels::ImprintSource::Predicted => ", predicted",
         };
         lines.push(row(one.before, one.after, &format!("{}, {}{imprint}", one.pair, one.finger)));
     }

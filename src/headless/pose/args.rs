@@ -11,9 +11,9 @@ use super::super::contact_mask::MaskArgs;
 use super::super::predict::ModelArgs;
 use super::super::seeds::{FanArgs, SeedArgs};
 use super::super::{Common, ToolArgs};
-use crate::domain::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
-use crate::domain::frames::PlanarPose;
-use crate::domain::pose::{Registration, RegistrationChoice};
+use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::pose::{Registration, RegistrationChoice};
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]

@@ -4,16 +4,16 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
-use crate::domain::pose::{RegistrationChoice, ToolModel};
-use crate::domain::sample::Sample;
-use crate::io::names;
-use crate::io::npz;
-use crate::io::pt::Tensor;
-use crate::work::cloud::Clouds;
-use crate::work::error::TaskError;
-use crate::work::influence::{Place, influence};
-use crate::work::labels::ImprintSource;
-use crate::work::pose::PoseResult;
+use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::influence::{Place, influence};
+use touch2touch_work::io::names;
+use touch2touch_work::io::npz;
+use touch2touch_work::io::pt::Tensor;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::pose::PoseResult;
 
 /// What a case says of the influence of its pixels.
 #[derive(Debug, Clone, Serialize)]

@@ -6,14 +6,14 @@ use serde::Serialize;
 
 use super::super::seeds::PoseFan;
 use super::influence::Influences;
-use crate::domain::align::AlignReport;
-use crate::domain::ambiguity::Ambiguity;
-use crate::domain::findings::Finding;
-use crate::domain::hand::{AcceptedPose, HandPose};
-use crate::domain::metrics::AngleSummary;
-use crate::domain::pose::RegistrationChoice;
-use crate::domain::rig::PerPad;
-use crate::domain::units::angle_error;
+use touch2touch_core::align::AlignReport;
+use touch2touch_core::ambiguity::Ambiguity;
+use touch2touch_core::findings::Finding;
+use touch2touch_core::hand::{AcceptedPose, HandPose};
+use touch2touch_core::metrics::AngleSummary;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::units::angle_error;
 
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Case {

@@ -6,11 +6,11 @@ use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
 use super::super::args::keyed;
-use crate::domain::diffusion::{GUIDANCE, Preset, Sampler};
-use crate::domain::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
-use crate::infer::engine::EngineChoice;
-use crate::work::bundles::{self, BundleKind};
-use crate::work::subject::{Mapping, Wish};
+use touch2touch_core::diffusion::{GUIDANCE, Preset, Sampler};
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::subject::{Mapping, Wish};
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]

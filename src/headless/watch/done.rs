@@ -5,16 +5,16 @@ use serde_json::Value;
 
 use super::Source;
 use super::summary::Latency;
-use crate::domain::contact::ContactMask;
-use crate::domain::dataset::Problem;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::DepthMap;
-use crate::domain::postprocess::ShiftMode;
-use crate::domain::rig::{PadId, Text};
-use crate::domain::sample::Sample;
-use crate::work::compare;
-use crate::work::mask::Contact;
-use crate::work::prediction::Prediction;
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::{PadId, Text};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::compare;
+use touch2touch_work::mask::Contact;
+use touch2touch_work::prediction::Prediction;
 
 /// Metrics of one finger.
 #[derive(Debug, Clone, Serialize)]
@@ -96,7 +96,7 @@ pub(super) fn figures(
     tile: Option<&DepthMap>,
 ) -> Option<FingerFigures> {
     let imprint = contact.imprints[pad].as_ref()?;
-    let stats = crate::domain::postprocess::Stats::of(imprint);
+    let stats = touch2touch_core::postprocess::Stats::of(imprint);
     let compared = compare::of_pad(imprint, drawn, sample, pad, tile).ok().flatten();
     let mask = contact.masks[pad].as_ref();
     let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();

@@ -12,19 +12,19 @@ use super::super::predict::Predictor;
 use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
 use super::{Source, WatchArgs, recipe, write};
-use crate::domain::align::Ask;
-use crate::domain::pose::{RegistrationChoice, ToolModel};
-use crate::domain::rig::{PadId, PerPad};
-use crate::domain::sample::Sample;
-use crate::io::dataset::{Dataset, read_in_meters};
-use crate::io::follow::Ready;
-use crate::work::compare;
-use crate::work::job::{Cancel, JobCx};
-use crate::work::labels::{ImprintSource, PairLabels};
-use crate::work::mask::{Contact, MaskInputs};
-use crate::work::pose;
-use crate::work::prediction::Prediction;
-use crate::work::tool::{load_tool, named_tool};
+use touch2touch_core::align::Ask;
+use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::Sample;
+use touch2touch_work::compare;
+use touch2touch_work::io::dataset::{Dataset, read_in_meters};
+use touch2touch_work::io::follow::Ready;
+use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_work::labels::{ImprintSource, PairLabels};
+use touch2touch_work::mask::{Contact, MaskInputs};
+use touch2touch_work::pose;
+use touch2touch_work::prediction::Prediction;
+use touch2touch_work::tool::{load_tool, named_tool};
 
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {

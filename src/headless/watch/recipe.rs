@@ -6,10 +6,10 @@ use serde_json::{Value, json};
 
 use super::super::predict::Predictor;
 use super::WatchArgs;
-use crate::domain::grid::Mask;
-use crate::domain::pose::RegistrationChoice;
-use crate::infer::engine::resolve;
-use crate::work::labels::PairLabels;
+use touch2touch_core::grid::Mask;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_work::infer::engine::resolve;
+use touch2touch_work::labels::PairLabels;
 
 /// Everything the result depends on besides the touch.
 pub(super) fn recipe(

@@ -7,13 +7,13 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::Source;
-use crate::domain::dataset::Problem;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::rig::{Rig, Text};
-use crate::io::names::OUTPUT_MARK;
-use crate::io::pt::{PtItem, Tensor};
-use crate::io::{atomic, files, images, names, npz, pt};
-use crate::work::mask::Contact;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::rig::{Rig, Text};
+use touch2touch_work::io::names::OUTPUT_MARK;
+use touch2touch_work::io::pt::{PtItem, Tensor};
+use touch2touch_work::io::{atomic, files, images, names, npz, pt};
+use touch2touch_work::mask::Contact;
 
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

@@ -6,10 +6,10 @@ use eframe::egui::{
 };
 
 use crate::app::command::{DialCommand, LibraryCommand};
-use crate::domain::dataset::PairId;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::theme::{SMALL, medium};
-use crate::work::sweep::{Outcome, Point, Series, Setting, Sweep};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::sweep::{Outcome, Point, Series, Setting, Sweep};
 
 /// Columns of a small plot, and the one of the pairs without a pose besides.
 const COLUMNS: usize = 24;

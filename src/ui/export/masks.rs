@@ -8,8 +8,8 @@ use super::super::theme::caption;
 use crate::app::command::ExportCommand;
 use crate::app::export::Output;
 use crate::app::state::Lookup;
-use crate::io::exchange::Format;
-use crate::work::export::{ExportChoice, Which};
+use touch2touch_work::export::{ExportChoice, Which};
+use touch2touch_work::io::exchange::Format;
 
 /// The form, where it is open. It blocks nothing: pairs can be drawn and marked beside it.
 pub(in crate::ui) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {

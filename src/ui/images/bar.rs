@@ -6,11 +6,11 @@ use super::{map_of, scale_note};
 use crate::app::action::Action;
 use crate::app::command::{Pane, SettingsCommand};
 use crate::app::settings::ColorRange;
-use crate::domain::colormap::{ColorMap, Range};
 use crate::ui::cx::Cx;
 use crate::ui::theme::SMALL;
 use crate::ui::widget::colorbar::{Asked, Colorbar};
 use crate::ui::widget::texture::Histogram;
+use touch2touch_core::colormap::{ColorMap, Range};
 
 /// Where a picture takes little of the locked range, a way to see more of it.
 pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {

@@ -4,14 +4,14 @@ use eframe::egui::{Align2, Color32, ColorImage, FontId, Rect, Ui, pos2, vec2};
 
 use crate::app::keys::ImprintSource;
 use crate::app::state::{Lookup, State};
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::Grid;
-use crate::domain::rig::PadId;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::widget::colorbar::gradient;
 use crate::ui::widget::image_canvas::CanvasOutput;
-use crate::work::influence::Influence;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::Grid;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::influence::Influence;
 
 /// The colors end here, degrees to the square millimeter: the same in every pair, so that they can be compared.
 const END_DEG_PER_MM2: f32 = 0.02;

@@ -5,11 +5,11 @@ use eframe::egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, StrokeKind,
 use super::Memory;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskTool;
-use crate::domain::rig::PadId;
 use crate::ui::cx::Cx;
 use crate::ui::theme::CONTACT;
 use crate::ui::widget::image_canvas::{CanvasMap, CanvasOutput};
 use crate::ui::widget::texture::outline;
+use touch2touch_core::rig::PadId;
 
 /// How much larger than in the picture.
 const TIMES: f32 = 8.0;

@@ -1,6 +1,6 @@
 //! [`Link`]: where the pixels of one sensor lie in the picture of the other.
 
-use crate::domain::rig::{PadId, Rig};
+use touch2touch_core::rig::{PadId, Rig};
 
 /// Which part of a depth picture the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
 /// degrees.

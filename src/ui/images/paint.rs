@@ -5,11 +5,11 @@ use eframe::egui::{Color32, Key, Ui};
 use super::Memory;
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
-use crate::domain::rig::PadId;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{CONTACT, GHOST, IGNORED, PROPOSED};
 use crate::ui::widget::image_canvas::CanvasOutput;
 use crate::ui::widget::texture::{dashes, mask_image, outline};
+use touch2touch_core::rig::PadId;
 
 /// Whether a held key takes everything off the imprint, so that the data itself is seen.
 pub(super) fn is_bared(ui: &Ui) -> bool {

@@ -2,12 +2,12 @@
 
 use eframe::egui::{Align2, Color32, ColorImage, FontId, Painter, Rect, Shape, Stroke, TextureId, Ui, pos2, vec2};
 
-use crate::domain::colormap::ColorMap;
-use crate::domain::grid::Grid;
-use crate::domain::metrics::Joint;
-use crate::domain::postprocess::Histogram;
-use crate::domain::units::{fixed, mm};
 use crate::ui::theme::Palette;
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::metrics::Joint;
+use touch2touch_core::postprocess::Histogram;
+use touch2touch_core::units::{fixed, mm};
 
 /// Bars with the ends of their axis. Heights by the root of the counts: the untouched background is most of an imprint.
 pub(super) fn histogram(painter: &Painter, area: Rect, of: &Histogram, scale: f64, color: Color32, p: &Palette) {

@@ -10,7 +10,7 @@ use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{PROPOSED, SMALL, section};
-use crate::work::propose::FARTHEST_M;
+use touch2touch_work::propose::FARTHEST_M;
 
 /// Source, number, and the way to accept or reject.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -8,7 +8,7 @@ use super::super::cx::Cx;
 use super::super::theme::{SMALL, caption, section};
 use super::super::widget::cut::cut_in_the_middle;
 use crate::app::labels::Review;
-use crate::work::label_stats::{Counts, Effort, LabelStats};
+use touch2touch_work::label_stats::{Counts, Effort, LabelStats};
 
 /// Height of a tool's row, points.
 const ROW: f32 = 18.0;

@@ -9,9 +9,6 @@ use super::{Memory, layers, other_side, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
-use crate::domain::cloud::surface;
-use crate::domain::mesh::TriMesh;
-use crate::domain::rig::PerPad;
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
@@ -21,7 +18,10 @@ use crate::gpu::scene::SceneData;
 use crate::gpu::view::Plane;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::theme::{self, CONTACT, GHOST, Palette};
-use crate::work::cloud::{Clouds, FingerCloud};
+use touch2touch_core::cloud::surface;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::PerPad;
+use touch2touch_work::cloud::{Clouds, FingerCloud};
 
 /// Points as the renderer takes them, made once per cloud.
 pub(super) struct SceneCloud {

@@ -9,13 +9,13 @@ use crate::app::labels::StrokeIn3d;
 use crate::app::settings::MaskTool;
 use crate::app::state::State;
 use crate::app::workbench::SceneTool;
-use crate::domain::label::DrawTool;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::pen::{self, Easel};
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::widget::image_canvas::CanvasMap;
-use crate::work::cloud::Clouds;
+use touch2touch_core::label::DrawTool;
+use touch2touch_core::units;
+use touch2touch_work::cloud::Clouds;
 
 /// Whether the pointer draws on masks in the 3D views.
 pub(super) fn is_ready(state: &State) -> bool {

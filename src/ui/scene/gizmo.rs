@@ -10,11 +10,11 @@ use super::Memory;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{SceneTool, WorkbenchCommand};
-use crate::domain::hand::{HandAxis, HandPose};
 use crate::gpu::guides::AXIS_COLORS;
 use crate::gpu::view::Camera;
 use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
+use touch2touch_core::hand::{HandAxis, HandPose};
 
 /// How near the pointer must be to a handle, points.
 const NEAR: f32 = 9.0;

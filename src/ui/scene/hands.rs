@@ -8,10 +8,10 @@ use crate::app::keys::ImprintSource;
 use crate::app::settings::SceneLayer;
 use crate::app::state::State;
 use crate::app::workbench::{HandTry, Layer, SceneTool};
-use crate::domain::hand::{HandCost, HandPose, PoseDifference};
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
+use touch2touch_core::hand::{HandCost, HandPose, PoseDifference};
+use touch2touch_core::units;
 
 /// The tools, below the buttons that turn the view; those that do not fit are left to menu and keys.
 pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column: Rect) {

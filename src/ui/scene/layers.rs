@@ -10,18 +10,18 @@ use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
 use crate::app::settings::{LayerLook, LayerSize};
 use crate::app::workbench::Layer;
-use crate::domain::align::Observability;
-use crate::domain::align::reason::Reason;
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::frames::PlanarPose;
-use crate::domain::mesh::TriMesh;
-use crate::domain::rig::{PadId, PerPad};
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle};
 use crate::gpu::points::{CloudItem, PointColors, PointSize};
 use crate::ui::cx::Cx;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
+use touch2touch_core::align::Observability;
+use touch2touch_core::align::reason::Reason;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::{PadId, PerPad};
 
 /// Change of the contact distances (root mean square) that the drawn ellipse stands for, meters.
 pub(in crate::ui) const ELLIPSE_TOLERANCE_M: f64 = 5e-4;
@@ -61,7 +61,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
-    let colors = |fits: &Vec<crate::domain::align::PointFit>| match layer {
+    let colors = |fits: &Vec<touch2touch_core::align::PointFit>| match layer {
         Layer::Residuals => PointColors::Scalar(fits.iter().map(|fit| fit.residual_m).collect::<Arc<[f32]>>()),
         _ => PointColors::PerPoint(fits.iter().map(|fit| reason_rgb(Reason::from(fit.fate))).collect()),
     };

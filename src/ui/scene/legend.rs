@@ -12,13 +12,13 @@ use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
 use crate::app::workbench::Layer;
-use crate::domain::align::reason::Reason;
-use crate::domain::colormap::ColorMap;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::colorbar::gradient;
+use touch2touch_core::align::reason::Reason;
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::units;
 
 /// Height of a row, points.
 const ROW: f32 = 17.0;

@@ -7,13 +7,13 @@ use super::{Memory, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::layers::reason_rgb;
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::line::Line;
-use crate::work::cloud::Clouds;
+use touch2touch_core::units;
+use touch2touch_work::cloud::Clouds;
 
 /// What a click does.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {

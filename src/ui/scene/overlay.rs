@@ -10,16 +10,16 @@ use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::SceneLayer;
 use crate::app::state::Absent;
-use crate::domain::align::Rung;
-use crate::domain::hand::PoseDifference;
-use crate::domain::units;
 use crate::gpu::guides;
 use crate::gpu::view::Camera;
 use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::{Palette, grade_color};
-use crate::work::pose::PoseResult;
-use crate::work::verdict::Grade;
+use touch2touch_core::align::Rung;
+use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::units;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::verdict::Grade;
 
 /// Scale bar, names of the axes, legend, buttons.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {

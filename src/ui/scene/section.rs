@@ -7,9 +7,9 @@ use crate::app::command::{Command, SettingsCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::settings::SceneLook;
 use crate::app::workbench::{SECTION_REACH_M, Section, SectionAxis, WorkbenchCommand};
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
+use touch2touch_core::units;
 
 /// The bar above the picture, while a plane cuts or only the window is shown.
 pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {

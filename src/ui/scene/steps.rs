@@ -10,15 +10,15 @@ use crate::app::inspect::{Inspected, Inspection};
 use crate::app::keys::ImprintSource;
 use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
-use crate::domain::colormap::ColorMap;
-use crate::domain::frames::PlanarPose;
-use crate::domain::units;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{MeshItem, Shading};
 use crate::gpu::scene::SceneData;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{DARK, Palette};
 use crate::ui::widget::colorbar::gradient;
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::units;
 
 /// Correspondences drawn at most: more hide each other.
 const MOST_LINES: usize = 300;

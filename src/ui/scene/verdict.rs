@@ -9,12 +9,12 @@ use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskSource;
 use crate::app::state::{Absent, Lookup, State};
-use crate::domain::align::MIN_POINTS;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::images;
 use crate::ui::theme::{SMALL, grade_color};
-use crate::work::verdict::Verdict;
+use touch2touch_core::align::MIN_POINTS;
+use touch2touch_core::units;
+use touch2touch_work::verdict::Verdict;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;

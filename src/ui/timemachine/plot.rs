@@ -6,10 +6,10 @@ use eframe::egui::{
 
 use super::table::root_mm;
 use crate::app::inspect::{InspectCommand, Inspected, Inspection};
-use crate::domain::align::TraceStep;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{Palette, mix};
+use touch2touch_core::align::TraceStep;
+use touch2touch_core::units;
 
 /// Room for the numbers at the left, points.
 const LEFT: f32 = 34.0;

@@ -5,12 +5,12 @@ use eframe::egui::{self, Align2, Color32, FontId, Role, Sense, Ui, WidgetInfo, p
 use super::pose_text;
 use crate::app::command::Command;
 use crate::app::inspect::{InspectCommand, Inspected, Pin};
-use crate::domain::frames::PlanarPose;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::scene;
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::line::Line;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::units;
 
 /// Height of a line, points.
 const LINE: f32 = 16.0;
@@ -111,7 +111,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         text(cx, ui, &format!("Next: {stop}"), "What the registration does from here");
     }
     if let (Some(requested), Some(applied)) = (shown.inspection.requested(shown.run), start) {
-        let same = crate::domain::align::basin::is_same_place(requested, applied);
+        let same = touch2touch_core::align::basin::is_same_place(requested, applied);
         let said = if same { "began as asked" } else { "asked for" };
         let color = if same { cx.p.weak } else { cx.p.caution };
         let line = if same {

@@ -8,12 +8,12 @@ use strum::IntoEnumIterator as _;
 
 use super::{Letter, color};
 use crate::app::settings::{STEPS, Versus};
-use crate::domain::rig::SensorKind;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::cut::cut_in_the_middle;
-use crate::work::bundles::BundleInfo;
-use crate::work::subject::{Mapping, SEEDS, Subject, Wish};
+use touch2touch_core::rig::SensorKind;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::subject::{Mapping, SEEDS, Subject, Wish};
 
 /// Width of a letter in a button, points.
 const LETTER: f32 = 5.8;

@@ -4,12 +4,12 @@ use eframe::egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 
 use super::{Letter, color};
 use crate::app::settings::Versus;
-use crate::domain::units;
 use crate::ui::cx::Cx;
 use crate::ui::theme::SMALL;
-use crate::work::compare::Comparison;
-use crate::work::pose::PoseResult;
-use crate::work::subject::Subject;
+use touch2touch_core::units;
+use touch2touch_work::compare::Comparison;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::subject::Subject;
 
 /// A column of the figures.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -8,9 +8,6 @@ use glam::DVec3;
 use super::{Letter, color};
 use crate::app::keys::{ApartKey, CloudKey, DatasetSeq};
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
-use crate::domain::colormap::Range;
-use crate::domain::rig::PerPad;
-use crate::domain::units;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
@@ -19,6 +16,9 @@ use crate::ui::scene::{DISTANCE_MAP, SceneMesh, distances, guides, model_edges, 
 use crate::ui::scene_view::{Grip, SceneView};
 use crate::ui::theme::{self, SMALL};
 use crate::ui::widget::empty;
+use touch2touch_core::colormap::Range;
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::units;
 
 /// Diameter of a point, meters.
 const POINT_M: f32 = 0.000_5;

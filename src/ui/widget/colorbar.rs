@@ -5,9 +5,9 @@ use eframe::egui::{
     pos2, vec2,
 };
 
-use crate::domain::colormap::{ColorMap, Range};
 use crate::ui::theme::{Palette, SMALL};
 use crate::ui::widget::texture::Histogram;
+use touch2touch_core::colormap::{ColorMap, Range};
 
 /// Height of the whole bar, points.
 pub const HEIGHT: f32 = 36.0;

@@ -6,10 +6,10 @@ use std::sync::Arc;
 
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureId, TextureOptions};
 
-use crate::domain::colormap::{ColorMap, Range};
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{Rect, difference};
-use crate::domain::picture::{self, Rgb8};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::label::{Rect, difference};
+use touch2touch_core::picture::{self, Rgb8};
 
 /// Bars in a histogram.
 pub const BINS: usize = 64;

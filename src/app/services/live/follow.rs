@@ -7,10 +7,10 @@ use std::time::Instant;
 
 use super::super::{DataSource, Followed, Following};
 use super::LiveSource;
-use crate::domain::dataset::Problem;
-use crate::io::follow::{Arrival, Follower};
-use crate::work::error::TaskError;
-use crate::work::labels::{Labels, Recovered, Reviews};
+use touch2touch_core::dataset::Problem;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::io::follow::{Arrival, Follower};
+use touch2touch_work::labels::{Labels, Recovered, Reviews};
 
 struct LiveFollowing {
     follower: Follower,

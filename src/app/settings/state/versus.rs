@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use crate::work::subject::Subject;
+use touch2touch_work::subject::Subject;
 
 /// How two imprints are held against each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]

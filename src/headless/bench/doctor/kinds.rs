@@ -4,11 +4,11 @@ use std::collections::BTreeMap;
 
 use glam::DVec3;
 
-use crate::domain::doubt::Cause;
-use crate::domain::grid::RgbGrid;
-use crate::domain::mesh::TriMesh;
-use crate::domain::read_as::{Depths, Images, Lay, ReadAs, Stored};
-use crate::domain::sample::{ColorTouch, PadTouch, Sample};
+use touch2touch_core::doubt::Cause;
+use touch2touch_core::grid::RgbGrid;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::read_as::{Depths, Images, Lay, ReadAs, Stored};
+use touch2touch_core::sample::{ColorTouch, PadTouch, Sample};
 
 /// Pairs with their tools, and the tools' CAD models.
 #[derive(Clone)]

@@ -2,18 +2,18 @@
 
 use rayon::prelude::*;
 
-use crate::domain::catalog;
-use crate::domain::frames::PlanarPose;
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::metrics::{self, AngleSummary};
-use crate::domain::pose::{Registration, ToolModel, register};
-use crate::domain::rig::{PadId, PerPad, lab};
-use crate::domain::sample::{DepthTouch, Sample};
-use crate::domain::sim::{self, SimConfig};
-use crate::domain::units::angle_error;
-use crate::infer::mask::MaskModel;
-use crate::work::cloud::contact_points;
-use crate::work::compare::LAB_PEAK_M;
+use touch2touch_core::catalog;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::metrics::{self, AngleSummary};
+use touch2touch_core::pose::{Registration, ToolModel, register};
+use touch2touch_core::rig::{PadId, PerPad, lab};
+use touch2touch_core::sample::{DepthTouch, Sample};
+use touch2touch_core::sim::{self, SimConfig};
+use touch2touch_core::units::angle_error;
+use touch2touch_work::cloud::contact_points;
+use touch2touch_work::compare::LAB_PEAK_M;
+use touch2touch_work::infer::mask::MaskModel;
 
 /// A grasp of a simulated tool.
 pub(in crate::headless::bench) struct Case {

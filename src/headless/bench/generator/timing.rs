@@ -6,14 +6,14 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::cases::Case;
-use crate::domain::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
-use crate::domain::grid::{DepthMap, RgbGrid};
-use crate::domain::postprocess::{RawPrediction, ShiftMode};
-use crate::domain::rig::{PadId, Rig, lab};
 use crate::headless::bench::figures::quantile;
-use crate::infer::bundle::{Bundle, TimestepType};
-use crate::infer::engine::{EngineChoice, EngineKind, Input};
-use crate::infer::generator::{Generator, Item, Observer, prepare};
+use touch2touch_core::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
+use touch2touch_core::rig::{PadId, Rig, lab};
+use touch2touch_work::infer::bundle::{Bundle, TimestepType};
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Input};
+use touch2touch_work::infer::generator::{Generator, Item, Observer, prepare};
 
 /// Pairs of runs for the overhead.
 const PAIRS: usize = 30;

@@ -14,10 +14,10 @@ use rand_chacha::rand_core::{RngCore as _, SeedableRng as _};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use crate::domain::grid::{DepthMap, Mask};
-use crate::domain::label::{CleanKind, CleanUp, DrawTool, Drawing, Ground, Paint, Provenance, grow, iou, islands};
-use crate::domain::rig::Rig;
-use crate::work::labels::HandMask;
+use touch2touch_core::grid::{DepthMap, Mask};
+use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Drawing, Ground, Paint, Provenance, grow, iou, islands};
+use touch2touch_core::rig::Rig;
+use touch2touch_work::labels::HandMask;
 
 /// The IoU with the true contact at which a mask is done.
 pub(super) const TARGET: f64 = 0.95;

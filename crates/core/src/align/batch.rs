@@ -1,0 +1,609 @@
+//! The field asked about many points at once: the inner loop of registration.
+//!
+//! Points lie in separate `f32` arrays of cell units about their centroid, a few lanes at a time and without branches,
+//! so that the compiler turns the arithmetic into vector instructions. The centroid is taken off in f64 first: no
+//! precision is lost to a far origin.
+
+use glam::DVec2;
+
+use super::ANGLE_SCALE_M;
+use crate::field::{CELL_M, DistanceField};
+use crate::frames::PlanarPose;
+
+/// Points per step: as many as keep the reads of a step in flight together.
+const LANES: usize = 16;
+/// Adding it to a number below leaves the number's integer part in the low bits.
+const MAGIC: f32 = 8_388_608.0;
+const MAGIC_MASK: u32 = 0x7f_ffff;
+/// Least share of a point's curvature that counts where the kernel bends down.
+const FLAT: f32 = 0.1;
+
+/// Points about their centroid, in cells, as separate coordinates; padded to whole steps.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cloud {
+    y: Vec<f32>,
+    z: Vec<f32>,
+    len: usize,
+    /// Further points that lie inside the silhouette wherever this cloud is used: they fit and pay nothing.
+    resting: usize,
+}
+
+impl Cloud {
+    /// From points about their centroid, meters.
+    pub(super) fn new(about_centroid: impl ExactSizeIterator<Item = DVec2>) -> Self {
+        let len = about_centroid.len();
+        let padded = len.next_multiple_of(LANES);
+        let (mut y, mut z) = (Vec::with_capacity(padded), Vec::with_capacity(padded));
+        for p in about_centroid {
+            y.push((p.x * (1.0 / CELL_M)) as f32);
+            z.push((p.y * (1.0 / CELL_M)) as f32);
+        }
+        y.resize(padded, 0.0);
+        z.resize(padded, 0.0);
+        Self { y, z, len, resting: 0 }
+    }
+
+    /// The same points, those far from the centroid first: they move most, so they decide soonest.
+    pub(super) fn outermost_first(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.len).collect();
+        let squared = |i: usize| self.y[i] * self.y[i] + self.z[i] * self.z[i];
+        order.sort_by(|&a, &b| squared(b).total_cmp(&squared(a)));
+        let at = |i: usize, from: &[f32]| order.get(i).map_or(0.0, |&o| from[o]);
+        let (y, z) = (0..self.y.len()).map(|i| (at(i, &self.y), at(i, &self.z))).unzip();
+        Self { y, z, len: self.len, resting: self.resting }
+    }
+
+    /// Points that it stands for.
+    pub(super) fn len(&self) -> usize {
+        self.len + self.resting
+    }
+
+    /// Points that are looked up.
+    pub(super) fn asked(&self) -> usize {
+        self.len
+    }
+
+    /// Greatest distance of a point from the centroid, meters.
+    pub(super) fn radius(&self) -> f64 {
+        let squared = self.y.iter().zip(&self.z).map(|(y, z)| y * y + z * z).fold(0f32, f32::max);
+        f64::from(squared.sqrt()) * CELL_M
+    }
+
+    fn chunks(&self) -> impl Iterator<Item = (&[f32; LANES], &[f32; LANES])> {
+        self.y.as_chunks().0.iter().zip(self.z.as_chunks().0)
+    }
+}
+
+/// `object_from_grasp` about the centroid of a cloud: `q = R(phi) (p - centroid) + place`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct State {
+    pub(super) phi: f64,
+    /// Where the centroid lies in the object frame, meters.
+    pub(super) place: DVec2,
+}
+
+impl State {
+    pub(super) fn from_pose(grasp_from_object: PlanarPose, centroid: DVec2) -> Self {
+        let inverse = grasp_from_object.inverse();
+        Self { phi: inverse.theta_rad, place: inverse.transform_yz(centroid) }
+    }
+
+    pub(super) fn to_pose(self, centroid: DVec2) -> PlanarPose {
+        let shift = self.place - DVec2::from_angle(self.phi).rotate(centroid);
+        PlanarPose { theta_rad: self.phi, y_m: shift.x, z_m: shift.y }.inverse()
+    }
+
+    /// The state after a step of (angle times [`ANGLE_SCALE_M`], y, z).
+    pub(super) fn moved(self, step: [f64; 3]) -> Self {
+        Self { phi: self.phi + step[0] / ANGLE_SCALE_M, place: self.place + DVec2::new(step[1], step[2]) }
+    }
+
+    /// Whether descents from both will end in the same place.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        (self.phi - other.phi).abs() * ANGLE_SCALE_M < 3e-4 && self.place.distance(other.place) < 3e-4
+    }
+}
+
+/// Sums over the points at one state.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Sums {
+    /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`ANGLE_SCALE_M`], y, z):
+    /// 00 01 02 11 12 22.
+    pub(super) h: [f64; 6],
+    /// Weighted slope of half the squared residuals, meters.
+    pub(super) g: [f64; 3],
+    /// Geman-McClure cost, square meters.
+    pub(super) cost: f64,
+    /// Sum of the weights.
+    pub(super) weight: f64,
+    /// Points within the kernel's width of the silhouette, or on it.
+    pub(super) inliers: usize,
+    /// Squared residuals of those, square meters.
+    pub(super) inlier_squares: f64,
+}
+
+/// A state in the field's cell units.
+struct Motion {
+    cos: f32,
+    sin: f32,
+    y: f32,
+    z: f32,
+}
+
+impl Motion {
+    fn new(field: &DistanceField, state: State) -> Self {
+        let turn = DVec2::from_angle(state.phi);
+        let place = (state.place - field.origin) * (1.0 / CELL_M);
+        Self { cos: turn.x as f32, sin: turn.y as f32, y: place.x as f32, z: place.y as f32 }
+    }
+}
+
+/// Moments of the slopes about the cloud's centroid, object frame.
+pub(super) struct Moments {
+    /// Points that tell.
+    pub(super) count: usize,
+    /// Sum of their arms about the centroid, meters.
+    pub(super) arms: DVec2,
+    /// Sums of the products of (slope by the angle, meters; slope by y; slope by z): 00 01 02 11 12 22.
+    pub(super) products: [f64; 6],
+}
+
+/// What was read for the points of a step: arms about the centroid (cells), distance (meters), slope (meters per cell).
+struct Read {
+    ay: [f32; LANES],
+    az: [f32; LANES],
+    r: [f32; LANES],
+    gy: [f32; LANES],
+    gz: [f32; LANES],
+    /// Cells, and whether a lane lies off the grid.
+    index: [usize; LANES],
+    off: bool,
+}
+
+/// The size of a box of states.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Extent {
+    /// Half widths: angle (radians), y, z (meters).
+    pub(super) half: [f64; 3],
+    /// Farthest way of a point in it: meters, and meters for each meter from the centroid.
+    pub(super) shift: f64,
+    pub(super) turn: f64,
+}
+
+impl Extent {
+    pub(super) fn new(half: [f64; 3]) -> Self {
+        Self { half, shift: half[1].hypot(half[2]), turn: 2.0 * (0.5 * half[0]).sin() }
+    }
+
+    /// The farthest way of a point at most `radius` from the centroid, meters.
+    pub(super) fn way(&self, radius: f64) -> f64 {
+        self.shift + self.turn * radius
+    }
+}
+
+/// For each cell, between which values the slope of the field lies in a window around it: middle and half range by y
+/// and z, meters per cell.
+pub(super) struct Slopes {
+    cells: Vec<[f32; 4]>,
+    /// How far the window reaches from anywhere in the cell, meters.
+    pub(super) reach: f64,
+}
+
+/// Where the lanes lie on the grid.
+struct Located {
+    /// Cell and position within it, 0 to 1.
+    index: [usize; LANES],
+    fy: [f32; LANES],
+    fz: [f32; LANES],
+    /// Whether a lane lies off the grid; it was moved onto it.
+    off: bool,
+}
+
+impl DistanceField {
+    /// Cost, slope and curvature in one pass. `state` maps the cloud's centroid frame to the object frame.
+    pub(super) fn sums(&self, cloud: &Cloud, state: State, kernel: f64) -> Sums {
+        let motion = Motion::new(self, state);
+        let kernel_m = kernel as f32;
+        let square = kernel_m * kernel_m;
+        let bend_scale = 4.0 / square;
+        let mut h = [[0f32; LANES]; 6];
+        let mut g = [[0f32; LANES]; 3];
+        let [mut cost, mut weight, mut inliers, mut squares] = [[0f32; LANES]; 4];
+        let mut left = cloud.len;
+        // Neighbors in an image are neighbors here: often all of a step are on the silhouette.
+        let mut whole_steps = 0;
+        for (y, z) in cloud.chunks() {
+            let Read { ay, az, mut r, gy, gz, .. } = self.read(&motion, y, z);
+            if left < LANES {
+                r[left..].fill(0.0);
+            }
+            left = left.saturating_sub(LANES);
+            if r.iter().all(|r| *r <= 0.0) {
+                whole_steps += 1;
+                continue;
+            }
+            for l in 0..LANES {
+                // On the silhouette: no cost, no pull, but it fits.
+                let pulls = if r[l] > 0.0 { 1.0 } else { 0.0 };
+                let r = if r[l] > 0.0 { r[l] } else { 0.0 };
+                let r2 = r * r;
+                let ratio = square / (square + r2);
+                let w = ratio * ratio;
+                cost[l] += r2 * ratio;
+                weight[l] += w;
+                let near = if r <= kernel_m { 1.0 } else { 0.0 };
+                inliers[l] += near;
+                squares[l] += near * r2;
+                let (j0, j1, j2) = (gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]);
+                let w = w * pulls;
+                let bend = 1.0 - bend_scale * r2 * ratio;
+                let bent = if bend > FLAT { bend } else { FLAT };
+                let (g0, g1, g2) = (w * j0, w * j1, w * j2);
+                let (w0, w1, w2) = (bent * g0, bent * g1, bent * g2);
+                h[0][l] += w0 * j0;
+                h[1][l] += w0 * j1;
+                h[2][l] += w0 * j2;
+                h[3][l] += w1 * j1;
+                h[4][l] += w1 * j2;
+                h[5][l] += w2 * j2;
+                g[0][l] += g0 * r;
+                g[1][l] += g1 * r;
+                g[2][l] += g2 * r;
+            }
+        }
+        let total = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        // Slopes were taken per cell: meters per cell to meters per meter, arms in cells to meters.
+        let slope = [1.0 / ANGLE_SCALE_M, 1.0 / CELL_M, 1.0 / CELL_M];
+        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        let fitting = cloud.resting + whole_steps * LANES;
+        let padding = cloud.y.len() - cloud.len;
+        Sums {
+            h: std::array::from_fn(|i| total(h[i]) * slope[pairs[i].0] * slope[pairs[i].1]),
+            g: std::array::from_fn(|i| total(g[i]) * slope[i]),
+            cost: total(cost),
+            weight: total(weight) + fitting as f64 - padding as f64,
+            inliers: total(inliers) as usize + fitting - padding,
+            inlier_squares: total(squares),
+        }
+    }
+
+    /// The part of the cloud that may come to lie outside the silhouette while no point moves farther than `margin`
+    /// (meters) from where `state` puts it. The other points rest.
+    pub(super) fn restless(&self, cloud: &Cloud, state: State, margin: f64) -> Cloud {
+        let motion = Motion::new(self, state);
+        let margin = -margin as f32;
+        let mut kept = Cloud {
+            y: Vec::with_capacity(cloud.y.len()),
+            z: Vec::with_capacity(cloud.y.len()),
+            len: 0,
+            resting: cloud.resting,
+        };
+        let mut left = cloud.len;
+        for (y, z) in cloud.chunks() {
+            let read = self.read(&motion, y, z);
+            for l in 0..LANES.min(left) {
+                if read.r[l] > margin {
+                    kept.y.push(y[l]);
+                    kept.z.push(z[l]);
+                }
+            }
+            left = left.saturating_sub(LANES);
+        }
+        kept.len = kept.y.len();
+        kept.resting += cloud.len - kept.len;
+        let padded = kept.len.next_multiple_of(LANES);
+        kept.y.resize(padded, 0.0);
+        kept.z.resize(padded, 0.0);
+        kept
+    }
+
+    /// Moments of the slopes of all points up to `reach` (meters) outside the silhouette.
+    pub(super) fn moments(&self, cloud: &Cloud, state: State, reach: f64) -> Moments {
+        let motion = Motion::new(self, state);
+        let reach = reach as f32;
+        let mut sums = [[0f32; LANES]; 9];
+        let mut left = cloud.len;
+        for (y, z) in cloud.chunks() {
+            let Read { ay, az, mut r, gy, gz, .. } = self.read(&motion, y, z);
+            if left < LANES {
+                r[left..].fill(f32::INFINITY);
+            }
+            left = left.saturating_sub(LANES);
+            for l in 0..LANES {
+                let tells = if r[l] >= 0.0 && r[l] <= reach { 1.0 } else { 0.0 };
+                let (j0, j1, j2) = (gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]);
+                let (t1, t2) = (tells * j1, tells * j2);
+                sums[0][l] += tells * j0 * j0;
+                sums[1][l] += t1 * j0;
+                sums[2][l] += t2 * j0;
+                sums[3][l] += t1 * j1;
+                sums[4][l] += t1 * j2;
+                sums[5][l] += t2 * j2;
+                sums[6][l] += tells * ay[l];
+                sums[7][l] += tells * az[l];
+                sums[8][l] += tells;
+            }
+        }
+        let total = sums.map(|lanes| lanes.iter().map(|v| f64::from(*v)).sum::<f64>());
+        let (slope, arm) = (1.0 / CELL_M, CELL_M);
+        Moments {
+            count: total[8] as usize,
+            arms: DVec2::new(total[6], total[7]) * arm,
+            products: [
+                total[0],
+                total[1] * slope,
+                total[2] * slope,
+                total[3] * slope * slope,
+                total[4] * slope * slope,
+                total[5] * slope * slope,
+            ],
+        }
+    }
+
+    /// What the cloud costs at least anywhere in a box of states about `state`, and what it costs at `state` itself
+    /// (square meters).
+    ///
+    /// Without `slopes`: in the box a point moves by at most its way, its distance to the silhouette shrinks by no more
+    /// than that (see [`widened`]), and the kernel grows with the distance. The sums stop at `enough`.
+    ///
+    /// With `slopes`, of a window at least as wide as every way: where the field is nearly straight within the way of a
+    /// point, the kernel of its distance lies above its tangent less what bends, and tangents of different points
+    /// cancel. Near the best pose that is a far better bound, because there the sum has no slope.
+    pub(super) fn bound(
+        &self,
+        cloud: &Cloud,
+        state: State,
+        kernel: f64,
+        extent: Extent,
+        slopes: Option<&Slopes>,
+        enough: f64,
+    ) -> (f64, f64) {
+        /// Steps between two looks at the sum.
+        const LOOK: usize = 4;
+        /// Below this share of the kernel's width it bends up, so that it lies above its tangent.
+        const CONVEX: f32 = 0.577;
+        let motion = Motion::new(self, state);
+        let square = (kernel * kernel) as f32;
+        let convex_m = CONVEX * kernel as f32;
+        let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
+        let bow = 0.5 * (extent.half[0] * extent.half[0]) as f32;
+        let zero = [0f32; LANES];
+        let (mut low, mut here) = (zero, zero);
+        let mut slope = [zero; 3];
+        let mut left = cloud.len;
+        let sum = |lanes: &[f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        for (i, (y, z)) in cloud.chunks().enumerate() {
+            let Read { ay, az, mut r, index, off, .. } = self.read(&motion, y, z);
+            if left < LANES {
+                r[left..].fill(0.0);
+            }
+            left = left.saturating_sub(LANES);
+            let (mut arm, mut way, mut least, mut at) = (zero, zero, zero, zero);
+            for l in 0..LANES {
+                arm[l] = (y[l] * y[l] + z[l] * z[l]).sqrt();
+                way[l] = shift + turn * arm[l];
+                let r0 = if r[l] > 0.0 { r[l] } else { 0.0 };
+                let near = r[l] - widened(way[l]);
+                let near = if near > 0.0 { near } else { 0.0 };
+                at[l] = r0 * r0 * square / (square + r0 * r0);
+                least[l] = near * near * square / (square + near * near);
+                here[l] += at[l];
+            }
+            let Some(slopes) = slopes.filter(|_| !off) else {
+                for l in 0..LANES {
+                    low[l] += least[l];
+                }
+                if slopes.is_none() && i % LOOK == LOOK - 1 && sum(&low) >= enough {
+                    break;
+                }
+                continue;
+            };
+            let mut ranges = [zero; 4];
+            for (l, index) in index.iter().enumerate() {
+                let cell = slopes.cells[*index];
+                for (range, value) in ranges.iter_mut().zip(cell) {
+                    range[l] = value;
+                }
+            }
+            let [my, mz, hy, hz] = ranges;
+            for l in 0..LANES {
+                let r0 = if r[l] > 0.0 { r[l] } else { 0.0 };
+                let ratio = square / (square + r0 * r0);
+                let pull = 2.0 * r0 * ratio * ratio;
+                let change = widened(way[l]);
+                let bends = if r0 + change > convex_m { 0.25 * change * change } else { 0.0 };
+                let steep = my[l].abs() + mz[l].abs();
+                let lost = pull * ((hy[l] + hz[l]) * way[l] + steep * bow * arm[l]) + bends;
+                let tangent = if lost < 0.5 * (at[l] - least[l]) { 1.0 } else { 0.0 };
+                low[l] += tangent * (at[l] - lost) + (1.0 - tangent) * least[l];
+                let pull = tangent * pull;
+                slope[0][l] += pull * (mz[l] * ay[l] - my[l] * az[l]);
+                slope[1][l] += pull * my[l];
+                slope[2][l] += pull * mz[l];
+            }
+        }
+        let fall: f64 = slope
+            .iter()
+            .zip(extent.half)
+            .zip([1.0, 1.0 / CELL_M, 1.0 / CELL_M])
+            .map(|((lanes, half), scale)| sum(lanes).abs() * half * scale)
+            .sum();
+        // Less what the sums may have been rounded up.
+        ((sum(&low) * (1.0 - 1e-5) - fall * (1.0 + 1e-5)).max(0.0), sum(&here))
+    }
+
+    /// The part of the cloud that may lie outside the silhouette somewhere in a box of states as in
+    /// [`Self::bound`]; `into` is overwritten. The others cost nothing anywhere in it.
+    pub(super) fn undecided(&self, cloud: &Cloud, state: State, extent: Extent, into: &mut Cloud) {
+        let motion = Motion::new(self, state);
+        let (shift, turn) = ((extent.shift / CELL_M) as f32, extent.turn as f32);
+        into.y.clear();
+        into.z.clear();
+        let mut left = cloud.len;
+        for (y, z) in cloud.chunks() {
+            let r = self.read(&motion, y, z).r;
+            for l in 0..LANES.min(left) {
+                if r[l] + widened(shift + turn * (y[l] * y[l] + z[l] * z[l]).sqrt()) > 0.0 {
+                    into.y.push(y[l]);
+                    into.z.push(z[l]);
+                }
+            }
+            left = left.saturating_sub(LANES);
+        }
+        into.len = into.y.len();
+        into.resting = cloud.resting + cloud.len - into.len;
+        let padded = into.len.next_multiple_of(LANES);
+        into.y.resize(padded, 0.0);
+        into.z.resize(padded, 0.0);
+    }
+
+    /// What the field says about a step of points.
+    #[inline]
+    fn read(&self, motion: &Motion, y: &[f32; LANES], z: &[f32; LANES]) -> Read {
+        let zero = [0f32; LANES];
+        let mut read = Read { ay: zero, az: zero, r: zero, gy: zero, gz: zero, index: [0; LANES], off: false };
+        for l in 0..LANES {
+            read.ay[l] = motion.cos * y[l] - motion.sin * z[l];
+            read.az[l] = motion.sin * y[l] + motion.cos * z[l];
+        }
+        let at = self.locate(motion, &read.ay, &read.az);
+        let [a, b, c, d] = self.corners_of(&at);
+        for l in 0..LANES {
+            let (ab, cd) = (b[l] - a[l], d[l] - c[l]);
+            let (near, far) = (a[l] + ab * at.fy[l], c[l] + cd * at.fy[l]);
+            read.r[l] = near + (far - near) * at.fz[l];
+            read.gy[l] = ab + (cd - ab) * at.fz[l];
+            read.gz[l] = far - near;
+        }
+        if at.off {
+            self.correct_off_grid(motion, &mut read);
+        }
+        (read.index, read.off) = (at.index, at.off);
+        read
+    }
+
+    /// [`Slopes`] for windows of one, two and four cells around each cell.
+    pub(super) fn slopes(&self) -> [Slopes; 3] {
+        // Kept as greatest values of (-y, y, -z, z), so that joining windows is one maximum.
+        let (columns, rows) = (self.columns, self.rows);
+        // At the border of the grid nothing is known of what comes behind.
+        let unknown = [CELL_M as f32 * 100.0; 4];
+        let mut greatest = vec![unknown; columns * rows];
+        for row in 1..rows - 2 {
+            for column in 1..columns - 2 {
+                let at = row * columns + column;
+                let [a, b] = [self.values[at], self.values[at + 1]];
+                let [c, d] = [self.values[at + columns], self.values[at + columns + 1]];
+                let (near, far, left, right) = (b - a, d - c, c - a, d - b);
+                greatest[at] = [-near.min(far), near.max(far), -left.min(right), left.max(right)];
+            }
+        }
+        let mut window = 0;
+        [1usize, 2, 4].map(|reach| {
+            greatest = widen(&greatest, columns, reach - window);
+            window = reach;
+            let cells = greatest
+                .iter()
+                .map(|[down, up, back, front]| {
+                    [0.5 * (up - down), 0.5 * (front - back), 0.5 * (up + down), 0.5 * (front + back)]
+                })
+                .collect();
+            Slopes { cells, reach: reach as f64 * CELL_M }
+        })
+    }
+
+    #[inline]
+    fn locate(&self, motion: &Motion, ay: &[f32; LANES], az: &[f32; LANES]) -> Located {
+        let (last_y, last_z) = ((self.columns - 1) as f32, (self.rows - 1) as f32);
+        let columns = self.columns as f32;
+        let mut at = Located { index: [0; LANES], fy: [0.0; LANES], fz: [0.0; LANES], off: false };
+        let mut bits = [0u32; LANES];
+        let mut off = 0u32;
+        for l in 0..LANES {
+            let (gy, gz) = (ay[l] + motion.y, az[l] + motion.z);
+            let (cy, cz) = (clamp(gy, last_y), clamp(gz, last_z));
+            off |= u32::from(cy != gy) | u32::from(cz != gz);
+            let (column, row) = (whole(cy, last_y - 1.0), whole(cz, last_z - 1.0));
+            at.fy[l] = cy - column;
+            at.fz[l] = cz - row;
+            // Exact: a field has fewer than 2^23 cells.
+            bits[l] = (row * columns + column + MAGIC).to_bits() & MAGIC_MASK;
+        }
+        at.index = bits.map(|b| b as usize);
+        at.off = off != 0;
+        at
+    }
+
+    /// Values at the four corners around each lane.
+    #[inline]
+    fn corners_of(&self, at: &Located) -> [[f32; LANES]; 4] {
+        let mut corners = [[0f32; LANES]; 4];
+        let reach = self.columns + 2;
+        for (l, index) in at.index.iter().enumerate() {
+            let cell = &self.values[*index..][..reach];
+            corners[0][l] = cell[0];
+            corners[1][l] = cell[1];
+            corners[2][l] = cell[reach - 2];
+            corners[3][l] = cell[reach - 1];
+        }
+        corners
+    }
+
+    /// Replaces what was read for lanes off the grid.
+    #[cold]
+    fn correct_off_grid(&self, motion: &Motion, read: &mut Read) {
+        for l in 0..LANES {
+            let grid = DVec2::new(f64::from(read.ay[l] + motion.y), f64::from(read.az[l] + motion.z));
+            let sample = self.sample(self.origin + grid * CELL_M);
+            if !sample.on_grid {
+                read.r[l] = sample.distance as f32;
+                read.gy[l] = (sample.gradient.x * CELL_M) as f32;
+                read.gz[l] = (sample.gradient.y * CELL_M) as f32;
+            }
+        }
+    }
+}
+
+/// By how much (meters) the interpolated field can differ between two places `way` cells apart.
+///
+/// Interpolating is taking the mean over the four cells with weights that are a product of two two-valued
+/// distributions. Coupled monotonically, the weights of two places differ by `way` in the mean, with a variance of at
+/// most 1/4 along each axis; so the mean distance is at most `sqrt(way^2 + 1/2)`, and also at most the sum along the
+/// axes, `sqrt(2) way`.
+#[inline]
+fn widened(way: f32) -> f32 {
+    let (far, near) = ((way * way + 0.5).sqrt(), std::f32::consts::SQRT_2 * way);
+    (if far < near { far } else { near }) * CELL_M as f32
+}
+
+/// The greatest values within `reach` cells along both axes.
+fn widen(values: &[[f32; 4]], columns: usize, reach: usize) -> Vec<[f32; 4]> {
+    let greater =
+        |a: [f32; 4], b: [f32; 4]| -> [f32; 4] { std::array::from_fn(|i| if b[i] > a[i] { b[i] } else { a[i] }) };
+    let (mut from, mut to) = (values.to_vec(), values.to_vec());
+    let count = values.len();
+    // Rows run into each other at their ends, which only makes windows at the border larger.
+    for step in std::iter::repeat_n(1, reach).chain(std::iter::repeat_n(columns, reach)) {
+        let inner = from[..count - 2 * step].iter().zip(&from[step..]).zip(&from[2 * step..]);
+        for (out, ((a, b), c)) in to[step..count - step].iter_mut().zip(inner) {
+            *out = greater(greater(*a, *b), *c);
+        }
+        std::mem::swap(&mut from, &mut to);
+    }
+    from
+}
+
+/// Between 0 and `high`; not a number becomes 0.
+#[inline]
+fn clamp(x: f32, high: f32) -> f32 {
+    let x = if x > 0.0 { x } else { 0.0 };
+    if x < high { x } else { high }
+}
+
+/// The integer part, at most `high`, of a number from 0 to 2^22.
+#[inline]
+fn whole(x: f32, high: f32) -> f32 {
+    let rounded = (x + MAGIC) - MAGIC;
+    let below = if rounded > x { rounded - 1.0 } else { rounded };
+    if below < high { below } else { high }
+}

@@ -1,0 +1,228 @@
+//! How well contact points determine a planar pose, and which motion they leave open.
+
+use glam::DVec2;
+use nalgebra::Matrix3;
+
+use super::ANGLE_SCALE_M;
+use super::batch::{Cloud, State};
+use crate::field::DistanceField;
+use crate::frames::PlanarPose;
+use crate::linear::eigen_symmetric;
+use crate::units::fixed;
+
+/// Smallest eigenvalue below which a pose counts as not determined.
+///
+/// Separates straight rods (at most 0.0084) from tools with an angle or a junction (at least 0.0229).
+pub const DEGENERATE_BELOW: f64 = 0.015;
+/// Points this far outside the silhouette, meters, still tell about it.
+const REACH_M: f64 = 0.002;
+/// Fewer telling points than this tell nothing.
+pub(super) const MIN_TELLING: usize = 8;
+
+/// Curvature of the fit at its end, per telling point.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Observability {
+    /// Eigenvalues of the mean outer product of the residuals' slopes, ascending. Angles are scaled by
+    /// [`ANGLE_SCALE_M`], so all are comparable; the two shifts alone would add up to 1.
+    pub eigenvalues: [f64; 3],
+    /// The motion of the tool that changes the residuals least, in the grasp frame: angle times
+    /// [`ANGLE_SCALE_M`], y, z; unit length, sign arbitrary. The angle turns about `center`.
+    pub weakest: [f64; 3],
+    /// The three motions that belong to `eigenvalues`, in the same order and form as `weakest` (which is the first).
+    pub motions: [[f64; 3]; 3],
+    /// Mean of the telling points, `(y, z)`, meters, grasp frame.
+    pub center: DVec2,
+    /// Points up to 2 mm outside the silhouette: those that tell.
+    pub telling: usize,
+    /// Whether the weakest motion is not determined.
+    pub degenerate: bool,
+}
+
+impl Observability {
+    /// The weakest motion in words, such as `slides along (y 0.05, z 1.00)` or `turns about its center`.
+    pub fn weakest_text(&self) -> String {
+        let [turn, y, z] = self.weakest;
+        if turn.abs() > y.hypot(z) {
+            "turns about its center".to_owned()
+        } else {
+            // One of the two opposite signs, always the same one.
+            let sign = if z < 0.0 || (z == 0.0 && y < 0.0) { -1.0 } else { 1.0 };
+            let along = DVec2::new(y, z) * (sign / y.hypot(z));
+            format!("slides along (y {}, z {})", fixed(along.x, 2), fixed(along.y, 2))
+        }
+    }
+
+    /// The pose moved by `share` (-1 to 1) of at most 2 mm and 2 degrees along the weakest motion.
+    pub fn moved_along_weakest(&self, grasp_from_object: PlanarPose, share: f64) -> PlanarPose {
+        /// How far the motion is shown: seen at a glance, and still next to the part.
+        const SHIFT_M: f64 = 0.002;
+        const TURN_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
+        let [turn, y, z] = self.weakest;
+        let turn = turn / ANGLE_SCALE_M;
+        // The farther of the two reaches its limit.
+        let scale = share / (y.hypot(z) / SHIFT_M).max(turn.abs() / TURN_RAD).max(1e-9);
+        let origin = DVec2::new(grasp_from_object.y_m, grasp_from_object.z_m);
+        let moved =
+            self.center + DVec2::from_angle(turn * scale).rotate(origin - self.center) + DVec2::new(y, z) * scale;
+        PlanarPose { theta_rad: grasp_from_object.theta_rad + turn * scale, y_m: moved.x, z_m: moved.y }
+    }
+
+    /// How far the tool can move before the distances of the telling points change by `tolerance_m` (root mean
+    /// square): the inverse of the curvature. Nothing is larger than `limit_m` (angles: over [`ANGLE_SCALE_M`]).
+    pub fn ellipse(&self, tolerance_m: f64, limit_m: f64) -> MotionEllipse {
+        let mut c = [[0.0; 3]; 3];
+        for (value, v) in self.eigenvalues.iter().zip(&self.motions) {
+            let reach = (tolerance_m / value.max(0.0).sqrt()).min(limit_m);
+            for i in 0..3 {
+                for j in 0..3 {
+                    c[i][j] += reach * reach * v[i] * v[j];
+                }
+            }
+        }
+        // Half axes of the shifts alone, whatever the angle does meanwhile: the lower right block.
+        let (mean, half) = (0.5 * (c[1][1] + c[2][2]), 0.5 * (c[1][1] - c[2][2]));
+        let spread = half.hypot(c[1][2]);
+        let direction = DVec2::from_angle(0.5 * c[1][2].atan2(half));
+        let length = |square: f64| square.max(0.0).sqrt();
+        MotionEllipse {
+            center: self.center,
+            half_axes: [direction * length(mean + spread), direction.perp() * length(mean - spread)],
+            turn_rad: length(c[0][0]) / ANGLE_SCALE_M,
+        }
+    }
+
+    /// Standard deviations of angle (radians), y and z (meters) if the distances had independent errors of `noise_m`:
+    /// what noise alone does. A wrong mask does more.
+    pub fn deviations(&self, noise_m: f64) -> [f64; 3] {
+        let n = self.telling.max(1) as f64;
+        let variance = |i: usize| -> f64 {
+            self.eigenvalues.iter().zip(&self.motions).map(|(value, v)| v[i] * v[i] / value.max(1e-12)).sum()
+        };
+        let [turn, y, z] = [0, 1, 2].map(|i| noise_m * (variance(i) / n).sqrt());
+        [turn / ANGLE_SCALE_M, y, z]
+    }
+}
+
+/// Shifts and turns of equal effect on the fit, about the mean of the telling points.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct MotionEllipse {
+    /// Its middle, `(y, z)`, meters, grasp frame.
+    pub center: DVec2,
+    /// Half axes of the shifts, `(y, z)`, meters, the longer one first.
+    pub half_axes: [DVec2; 2],
+    /// The same for the angle, radians.
+    pub turn_rad: f64,
+}
+
+/// Looks at the slopes of all points near the outline, at the given pose. Points are `(y, z)`, meters, grasp frame;
+/// those that are not finite are ignored. Too few telling points count as degenerate with zero eigenvalues.
+pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_object: PlanarPose) -> Observability {
+    let finite: Vec<DVec2> = points_yz.iter().copied().filter(|p| p.is_finite()).collect();
+    let centroid = finite.iter().sum::<DVec2>() / finite.len().max(1) as f64;
+    let cloud = Cloud::new(finite.iter().map(|p| *p - centroid));
+    of_cloud(&cloud, centroid, field, State::from_pose(grasp_from_object, centroid))
+}
+
+/// The same for a cloud about its centroid (`(y, z)`, meters, grasp frame).
+pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, state: State) -> Observability {
+    let moments = field.moments(cloud, state, REACH_M);
+    let count = moments.count;
+    // From the object frame, where the field is, back to the hand.
+    let turn = DVec2::from_angle(-state.phi);
+    let arm = if count > 0 { moments.arms / count as f64 } else { DVec2::ZERO };
+    let center = centroid + turn.rotate(arm);
+    let unknown = Observability {
+        eigenvalues: [0.0; 3],
+        weakest: [0.0, 1.0, 0.0],
+        motions: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+        center,
+        telling: count,
+        degenerate: true,
+    };
+    if count < MIN_TELLING {
+        return unknown;
+    }
+    // Slopes by the angle were taken about the centroid; about the telling points' own center they are
+    // j0 - slope . perp(arm).
+    let [m00, m01, m02, m11, m12, m22] = moments.products.map(|m| m / count as f64);
+    let p = arm.perp();
+    let h01 = m01 - (m11 * p.x + m12 * p.y);
+    let h02 = m02 - (m12 * p.x + m22 * p.y);
+    let h00 = m00 - 2.0 * (m01 * p.x + m02 * p.y) + m11 * p.x * p.x + 2.0 * m12 * p.x * p.y + m22 * p.y * p.y;
+    let cross = turn.rotate(DVec2::new(h01, h02)) / ANGLE_SCALE_M;
+    let (c, s) = (turn.x, turn.y);
+    let h11 = c * c * m11 - 2.0 * c * s * m12 + s * s * m22;
+    let h12 = c * s * (m11 - m22) + (c * c - s * s) * m12;
+    let h22 = s * s * m11 + 2.0 * c * s * m12 + c * c * m22;
+    let h = [[h00 / (ANGLE_SCALE_M * ANGLE_SCALE_M), cross.x, cross.y], [cross.x, h11, h12], [cross.y, h12, h22]];
+    let Some((eigenvalues, vectors)) = eigen_symmetric(Matrix3::from(h)) else { return unknown };
+    // A mean of squares: below zero is rounding.
+    let eigenvalues: [f64; 3] = eigenvalues.map(|e| e.max(0.0)).into();
+    let motions: [[f64; 3]; 3] = vectors.into();
+    Observability {
+        eigenvalues,
+        weakest: motions[0],
+        motions,
+        center,
+        telling: count,
+        degenerate: eigenvalues[0] < DEGENERATE_BELOW,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::testing::{disc, filled};
+    use crate::mesh::TriMesh;
+    use glam::DVec3;
+
+    /// A rod along z, and points on it and a little beside it.
+    fn rod() -> (DistanceField, Vec<DVec2>) {
+        let mesh: TriMesh = crate::align::testing::cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.04));
+        let half = DVec2::new(0.0035, 0.02);
+        (DistanceField::from_mesh(&mesh).unwrap(), filled(&[half], 0.0, 4000, PlanarPose::default(), 0.0, 1))
+    }
+
+    #[test]
+    fn a_rod_slides_and_its_ellipse_lies_along_it() {
+        let (field, points) = rod();
+        let o = observability(&points, &field, PlanarPose::default());
+        assert!(o.degenerate);
+        assert_eq!(o.weakest_text(), "slides along (y 0.00, z 1.00)");
+        let e = o.ellipse(5e-4, 0.01);
+        assert!(e.half_axes[0].y.abs() > 0.0099 && e.half_axes[0].x.abs() < 1e-4, "{e:?}");
+        assert!(e.half_axes[1].length() < 1e-3, "{e:?}");
+        let [turn, y, z] = o.deviations(3e-4);
+        assert!(z > 100.0 * y && turn.to_degrees() < 1.0, "{turn} {y} {z}");
+        // It is shown by moving 2 mm along itself, and back again.
+        for share in [-1.0, 0.5, 1.0] {
+            let moved = o.moved_along_weakest(PlanarPose::default(), share);
+            assert!((moved.z_m.abs() - 0.002 * f64::abs(share)).abs() < 1e-6 && moved.y_m.abs() < 1e-5, "{moved:?}");
+        }
+    }
+
+    #[test]
+    fn a_disc_turns_about_its_center() {
+        let field = DistanceField::from_mesh(&disc(0.01, 96)).unwrap();
+        let points: Vec<DVec2> = (0..2000).map(|i| DVec2::from_angle(f64::from(i)) * 0.0104).collect();
+        let pose = PlanarPose { theta_rad: 0.0, y_m: 0.001, z_m: -0.002 };
+        let at: Vec<DVec2> = points.iter().map(|p| pose.transform_yz(*p)).collect();
+        let o = observability(&at, &field, pose);
+        assert!(o.degenerate);
+        assert_eq!(o.weakest_text(), "turns about its center");
+        let moved = o.moved_along_weakest(pose, 1.0);
+        assert!(((moved.theta_rad - pose.theta_rad).abs().to_degrees() - 2.0).abs() < 1e-6);
+        assert!((moved.y_m - pose.y_m).hypot(moved.z_m - pose.z_m) < 1e-4, "about its own middle");
+        assert!(o.ellipse(5e-4, 0.01).turn_rad > 0.4);
+    }
+
+    #[test]
+    fn nothing_to_tell_from_is_bounded_by_the_limit() {
+        let (field, _) = rod();
+        let o = observability(&[], &field, PlanarPose::default());
+        let e = o.ellipse(5e-4, 0.01);
+        assert!(e.half_axes.iter().all(|a| (a.length() - 0.01).abs() < 1e-12), "{e:?}");
+        assert!(o.deviations(3e-4).iter().all(|d| d.is_finite()));
+        assert!(o.moved_along_weakest(PlanarPose::default(), 1.0).is_finite());
+    }
+}

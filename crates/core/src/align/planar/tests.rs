@@ -1,0 +1,300 @@
+use std::sync::OnceLock;
+
+use glam::DVec3;
+use proptest::prelude::*;
+
+use super::*;
+use crate::align::register::{Ask, Register as _, Scene};
+use crate::align::testing::{cross, cross_contacts, cuboid, disc, filled};
+use crate::align::{Stop, TraceStep};
+use crate::tool::ToolModel;
+use crate::units::angle_error;
+
+fn field() -> &'static DistanceField {
+    static FIELD: OnceLock<DistanceField> = OnceLock::new();
+    FIELD.get_or_init(|| DistanceField::from_mesh(&cross()).unwrap())
+}
+
+fn pose(degrees: f64, y_m: f64, z_m: f64) -> PlanarPose {
+    PlanarPose { theta_rad: degrees.to_radians(), y_m, z_m }
+}
+
+fn errors(found: PlanarPose, truth: PlanarPose) -> (f64, f64) {
+    let shift = (found.y_m - truth.y_m).hypot(found.z_m - truth.z_m);
+    (angle_error(found.theta_rad, truth.theta_rad).to_degrees(), shift)
+}
+
+/// `outer` after `inner`.
+fn compose(outer: PlanarPose, inner: PlanarPose) -> PlanarPose {
+    let shift = outer.transform_yz(DVec2::new(inner.y_m, inner.z_m));
+    PlanarPose { theta_rad: outer.theta_rad + inner.theta_rad, y_m: shift.x, z_m: shift.y }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn recovers_poses_of_the_prior(
+        degrees in -22.5..22.5f64, y in -0.005..0.005f64, z in -0.005..0.005f64, seed in 0..1000u64,
+    ) {
+        let truth = pose(degrees, y, z);
+        let report = align(&cross_contacts(1200, truth, 3e-4, seed), field(), &AlignConfig::default()).unwrap();
+        let (angle, shift) = errors(report.grasp_from_object, truth);
+        // 512 points with 0.3 mm noise, of which only those at the outline tell: several times the usual scatter.
+        prop_assert!(angle < 1.3 && shift < 5e-4, "{angle} deg, {shift} m");
+        prop_assert!(report.converged && report.within_prior && !report.is_degenerate());
+        prop_assert!((report.lab_angle_rad() + report.grasp_from_object.theta_rad).abs() < 1e-12);
+    }
+
+    #[test]
+    fn moving_the_hand_moves_the_answer_with_it(
+        degrees in -180.0..180.0f64, y in -100.0..100.0f64, z in -1e5..1e5f64, seed in 0..1000u64,
+    ) {
+        let truth = pose(7.0, 0.002, -0.003);
+        let points = cross_contacts(600, truth, 3e-4, seed);
+        let starts = [-15.0, 0.0, 15.0].map(|d| pose(d, 0.0, 0.0)).to_vec();
+        let still = align(&points, field(), &AlignConfig { starts, ..AlignConfig::default() }).unwrap();
+        let motion = pose(degrees, y, z);
+        let moved: Vec<DVec2> = points.iter().map(|p| motion.transform_yz(*p)).collect();
+        let starts = [-15.0, 0.0, 15.0].map(|d| compose(motion, pose(d, 0.0, 0.0))).to_vec();
+        let config = AlignConfig { starts, ..AlignConfig::default() };
+        let report = align(&moved, field(), &config).unwrap();
+        let (angle, _) = errors(report.grasp_from_object, compose(motion, still.grasp_from_object));
+        // The look-ups are in f32: rounding may end a descent one step of some micrometers earlier.
+        prop_assert!(angle < 0.02, "{angle} deg off after {motion:?}");
+        // Where the tool's points end up, rather than the translation: that one is about a far origin.
+        let corner = DVec2::new(0.01, 0.02);
+        let expected = motion.transform_yz(still.grasp_from_object.transform_yz(corner));
+        let distance = report.grasp_from_object.transform_yz(corner).distance(expected);
+        prop_assert!(distance < 1e-5, "{distance} m off after {motion:?}");
+    }
+
+    #[test]
+    fn points_that_are_not_finite_change_nothing(seed in 0..1000u64, places in proptest::collection::vec(0..600usize, 1..40)) {
+        let points = cross_contacts(600, pose(-9.0, 0.001, 0.002), 3e-4, seed);
+        let clean = align(&points, field(), &AlignConfig::default()).unwrap();
+        let mut spoilt = points;
+        for (i, place) in places.iter().enumerate() {
+            let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][i % 3];
+            spoilt.insert(*place, if i % 2 == 0 { DVec2::new(bad, 0.0) } else { DVec2::new(0.0, bad) });
+        }
+        let report = align(&spoilt, field(), &AlignConfig::default()).unwrap();
+        prop_assert_eq!(report.grasp_from_object, clean.grasp_from_object);
+        prop_assert_eq!(report.not_finite, places.len());
+    }
+}
+
+#[test]
+fn a_blob_that_is_not_the_tool_is_let_go() {
+    let truth = pose(12.0, -0.002, 0.003);
+    let mut points = cross_contacts(900, truth, 3e-4, 3);
+    // A quarter of the points in a disc beside the crossing.
+    for i in 0..300 {
+        let radius = 0.004 * (f64::from(i) / 300.0).sqrt();
+        points.push(DVec2::new(0.001, 0.018) + DVec2::from_angle(f64::from(i) * 2.4) * radius);
+    }
+    let config = AlignConfig { record: true, ..AlignConfig::default() };
+    let report = align(&points, field(), &config).unwrap();
+    let (angle, shift) = errors(report.grasp_from_object, truth);
+    // The blob still pulls a little; a squared cost would be off by several degrees.
+    assert!(angle < 1.2 && shift < 8e-4, "{angle} deg, {shift} m");
+    let gone = report.fits[900..].iter().filter(|f| f.fate == Fate::BeyondGate).count();
+    assert!(gone > 150, "{gone} of the blob's 300 points are beyond the gate");
+    assert!(report.fits[..900].iter().all(|f| f.fate != Fate::BeyondGate));
+}
+
+#[test]
+fn a_rod_is_flagged_and_stays_where_it_started_along_itself() {
+    // A 120 mm rod of which the hand sees the middle 40 mm.
+    for (degrees, seed) in [(12.3, 1), (-17.0, 2), (0.0, 3), (3.3, 4)] {
+        let mesh = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06));
+        let rod = DistanceField::from_mesh(&mesh).unwrap();
+        let truth = pose(degrees, 0.0, 0.0);
+        let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, truth, 3e-4, seed);
+        let report = align(&points, &rod, &AlignConfig::default()).unwrap();
+        let (angle, _) = errors(report.grasp_from_object, truth);
+        assert!(angle < 1.0, "{angle} deg");
+        let seen = report.observability.unwrap();
+        assert!(report.is_degenerate() && seen.eigenvalues[0] < 0.005, "{seen:?}");
+        let axis = DVec2::from_angle(truth.theta_rad).perp();
+        let weak = DVec2::new(seen.weakest[1], seen.weakest[2]);
+        assert!(weak.dot(axis).abs() > 5f64.to_radians().cos(), "{weak} is not along {axis}");
+        assert!(seen.weakest_text().starts_with("slides along"));
+        let slid = DVec2::new(report.grasp_from_object.y_m, report.grasp_from_object.z_m).dot(axis);
+        assert!(slid.abs() < 1e-4, "slid by {slid} m");
+    }
+}
+
+#[test]
+fn a_disc_may_turn_and_says_so() {
+    let field = DistanceField::from_mesh(&disc(0.012, 96)).unwrap();
+    let points: Vec<DVec2> = (0..800)
+        .map(|i| {
+            let radius = 0.0122 * (f64::from(i) / 800.0).sqrt();
+            DVec2::new(0.002, 0.001) + DVec2::from_angle(f64::from(i) * 2.399_963) * radius
+        })
+        .collect();
+    let report = align(&points, &field, &AlignConfig::default()).unwrap();
+    assert!(report.is_degenerate());
+    assert_eq!(report.observability.unwrap().weakest_text(), "turns about its center");
+    let place = DVec2::new(report.grasp_from_object.y_m, report.grasp_from_object.z_m);
+    assert!((place - DVec2::new(0.002, 0.001)).length() < 5e-4, "{place}");
+}
+
+#[test]
+fn degenerate_sets_and_wrong_units_are_errors() {
+    let config = AlignConfig::default();
+    let points = cross_contacts(600, PlanarPose::default(), 1e-4, 1);
+    assert_eq!(align(&[], field(), &config), Err(AlignError::TooFewPoints { got: 0, needed: MIN_POINTS }));
+    assert_eq!(align(&points[..31], field(), &config), Err(AlignError::TooFewPoints { got: 31, needed: MIN_POINTS }));
+    let nan = vec![DVec2::NAN; 500];
+    assert_eq!(align(&nan, field(), &config), Err(AlignError::TooFewPoints { got: 0, needed: MIN_POINTS }));
+    let spot = vec![DVec2::new(0.003, 0.004); 50];
+    assert_eq!(align(&spot, field(), &config), Err(AlignError::Coincident { extent_m: 0.0 }));
+    let away: Vec<DVec2> = points.iter().map(|p| *p + DVec2::new(0.2, 0.0)).collect();
+    assert!(matches!(align(&away, field(), &config), Err(AlignError::NoOverlap { .. })));
+    // Millimeters taken for meters: the 60 mm tool would be a building.
+    let millimeters: Vec<DVec2> = points.iter().map(|p| *p * 1000.0).collect();
+    assert!(matches!(align(&millimeters, field(), &config), Err(AlignError::NoOverlap { .. })));
+    // The other way round everything shrinks to one spot.
+    let shrunk: Vec<DVec2> = points.iter().map(|p| *p * 1e-3).collect();
+    assert!(matches!(align(&shrunk, field(), &config), Err(AlignError::Coincident { .. })));
+    let huge: Vec<DVec2> = points.iter().map(|p| *p + DVec2::new(1e300, 0.0)).collect();
+    assert!(matches!(align(&huge, field(), &config), Err(AlignError::TooFewPoints { .. })));
+}
+
+#[test]
+fn settings_that_make_no_sense_are_refused() {
+    let points = cross_contacts(100, PlanarPose::default(), 1e-4, 1);
+    let with = |change: fn(&mut AlignConfig)| {
+        let mut config = AlignConfig::default();
+        change(&mut config);
+        align(&points, field(), &config).map(|_| ())
+    };
+    assert_eq!(with(|_| ()), Ok(()));
+    assert_eq!(with(|c| c.starts = vec![pose(0.0, f64::NAN, 0.0)]), Err(AlignError::Config { what: "starts" }));
+    assert_eq!(with(|c| c.rungs.clear()), Err(AlignError::Config { what: "rungs" }));
+    assert_eq!(with(|c| c.rungs = vec![Rung::Fixed]), Err(AlignError::Config { what: "rungs" }));
+    assert_eq!(with(|c| c.prior.shift_m = 0.0), Err(AlignError::Config { what: "prior" }));
+    assert_eq!(with(|c| c.prior.theta_rad = f64::INFINITY), Err(AlignError::Config { what: "prior" }));
+    assert_eq!(with(|c| c.kernels_m.clear()), Err(AlignError::Config { what: "kernels_m" }));
+    assert_eq!(with(|c| c.kernels_m[1] = 0.0), Err(AlignError::Config { what: "kernels_m" }));
+    assert_eq!(with(|c| c.points = 3), Err(AlignError::Config { what: "points" }));
+    assert_eq!(with(|c| c.scout_points = 0), Err(AlignError::Config { what: "scout_points" }));
+    assert_eq!(with(|c| c.keep = 0), Err(AlignError::Config { what: "keep" }));
+    assert_eq!(with(|c| c.max_iterations = 0), Err(AlignError::Config { what: "max_iterations" }));
+}
+
+#[test]
+fn recording_changes_nothing_and_tells_the_whole_way() {
+    let points = cross_contacts(900, pose(15.0, 0.003, -0.001), 3e-4, 9);
+    let starts = [-15.0, 0.0, 15.0].map(|d| pose(d, 0.0, 0.0)).to_vec();
+    let config = AlignConfig { starts, ..AlignConfig::default() };
+    let plain = align(&points, field(), &config).unwrap();
+    assert_eq!((plain.trace.capacity(), plain.fits.capacity(), plain.ladder.len()), (0, 0, 0));
+    let config = AlignConfig { record: true, ..config };
+    let recorded = align(&points, field(), &config).unwrap();
+    assert_eq!(plain, AlignReport { trace: Vec::new(), fits: Vec::new(), ..recorded.clone() });
+    assert_eq!(recorded.fits.len(), points.len());
+    for (run, start) in config.starts.iter().enumerate() {
+        let steps: Vec<&TraceStep> = recorded.trace.iter().filter(|t| t.run == run).collect();
+        let (angle, shift) = errors(steps[0].grasp_from_object, *start);
+        assert!(steps[0].iteration == 0 && angle < 1e-9 && shift < 1e-12, "state 0 is the start as applied");
+        let run = &recorded.runs[run];
+        assert!(run.stop == Stop::Merged || steps.last().unwrap().grasp_from_object == run.end);
+        for pair in steps.windows(2) {
+            let same = pair[0].kernel_m == pair[1].kernel_m && pair[0].points == pair[1].points;
+            assert!(!same || pair[1].cost_m2 < pair[0].cost_m2, "every accepted step lowers the cost");
+        }
+    }
+    assert_eq!(recorded.start, config.starts[recorded.winner]);
+    let winner = &recorded.runs[recorded.winner];
+    assert!(recorded.runs.iter().all(|r| r.cost_m2 >= winner.cost_m2));
+}
+
+/// A cross with a share of the points in a blob beside it, which no pose explains.
+fn with_blob(share: f64) -> Vec<DVec2> {
+    let blob = (1200.0 * share) as usize;
+    let mut points = cross_contacts(1200 - blob, pose(8.0, 0.001, -0.002), 3e-4, 7);
+    points.extend((0..blob).map(|i| {
+        let radius = 0.004 * (i as f64 / blob as f64).sqrt();
+        DVec2::new(0.021, 0.022) + DVec2::from_angle(i as f64 * 2.4) * radius
+    }));
+    points
+}
+
+#[test]
+fn every_rung_is_reached_by_the_scene_that_needs_it() {
+    use Rung::{Certified, Grid, Several, Single};
+    let climb = |points: &[DVec2], config: &AlignConfig| {
+        let report = align(points, field(), config).unwrap();
+        assert_eq!(report.ladder.last().unwrap().rung, report.rung);
+        assert_eq!(report.lookups, report.ladder.iter().map(|a| a.lookups).sum::<usize>());
+        assert_eq!(report.certificate.is_some(), report.rung == Certified);
+        let (angle, _) = errors(report.grasp_from_object, pose(8.0, 0.001, -0.002));
+        assert!(angle < 1.5, "{angle} deg on the rung {}", report.rung);
+        report.ladder.iter().map(|a| (a.rung, a.verdict)).collect::<Vec<_>>()
+    };
+    let config = AlignConfig::default();
+    assert_eq!(climb(&with_blob(0.0), &config), [(Single, Verdict::Accepted)]);
+    // A fifth is a bad mask: five starts agree, and the answer is believed.
+    assert_eq!(climb(&with_blob(0.225), &config), [(Single, Verdict::Cost), (Several, Verdict::Accepted)]);
+    // A third is too much for every test: all is searched, and the answer carries its proof.
+    let refused = climb(&with_blob(0.33), &config);
+    assert_eq!(refused.iter().map(|a| a.0).collect::<Vec<_>>(), [Single, Several, Grid, Certified]);
+    assert!(refused[..3].iter().all(|a| matches!(a.1, Verdict::Cost | Verdict::OutsidePrior)), "{refused:?}");
+    assert_eq!(refused[3].1, Verdict::Last);
+}
+
+#[test]
+fn a_provisional_answer_is_the_answer_unless_that_takes_a_proof() {
+    let (mesh, config) = (cross(), AlignConfig::default());
+    let tool = ToolModel::new(mesh).unwrap();
+    for (share, settled) in [(0.0, true), (0.225, true), (0.33, false)] {
+        let points: Vec<DVec3> = with_blob(share).into_iter().map(|p| DVec3::new(0.0, p.x, p.y)).collect();
+        let run = |ask| config.run(&Scene::new(&points), &tool, ask).unwrap();
+        let (provisional, whole) = (run(Ask { provisional: true, ..Ask::default() }), run(Ask::default()));
+        assert_eq!(provisional.needs_no_proof(), settled);
+        assert_eq!(provisional == whole, settled);
+        assert!(provisional.certificate.is_none() && whole.certificate.is_some() != settled);
+    }
+}
+
+#[test]
+fn a_far_pose_is_found_by_more_starts() {
+    // A gripper that may hold the tool anywhere within 20 mm: one start slides off along a bar.
+    let truth = pose(8.0, -0.015, -0.016);
+    let points = cross_contacts(1200, truth, 3e-4, 7);
+    let prior = Prior { theta_rad: 0.2, shift_m: 0.02 };
+    for second in [Rung::Several, Rung::Grid] {
+        let config = AlignConfig { rungs: vec![Rung::Single, second], prior, ..AlignConfig::default() };
+        let report = align(&points, field(), &config).unwrap();
+        let climbed: Vec<_> = report.ladder.iter().map(|a| (a.rung, a.verdict)).collect();
+        assert_eq!(climbed, [(Rung::Single, Verdict::OutsidePrior), (second, Verdict::Accepted)]);
+        let (angle, shift) = errors(report.grasp_from_object, truth);
+        assert!(angle < 0.5 && shift < 3e-4, "{angle} deg, {shift} m");
+    }
+}
+
+#[test]
+fn a_single_rung_is_taken_as_it_is() {
+    for rung in [Rung::Single, Rung::Several, Rung::Grid, Rung::Certified] {
+        let config = AlignConfig { rungs: vec![rung], ..AlignConfig::default() };
+        let report = align(&with_blob(0.33), field(), &config).unwrap();
+        assert_eq!((report.rung, report.ladder.len(), report.ladder[0].verdict), (rung, 1, Verdict::Last));
+        assert!(rung.to_string().len() > 3 && report.ladder[0].cost_m2 > 0.2e-6);
+        assert_eq!((report.trace.capacity(), report.fits.capacity()), (0, 0));
+        let recorded = align(&with_blob(0.33), field(), &AlignConfig { record: true, ..config }).unwrap();
+        assert_eq!(report, AlignReport { trace: Vec::new(), fits: Vec::new(), ..recorded.clone() });
+        assert!(!recorded.trace.is_empty());
+    }
+}
+
+#[test]
+fn a_rod_does_not_climb() {
+    let rod = DistanceField::from_mesh(&cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06))).unwrap();
+    let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, pose(9.0, 0.001, 0.0), 3e-4, 1);
+    let report = align(&points, &rod, &AlignConfig::default()).unwrap();
+    assert!(report.is_degenerate());
+    assert_eq!((report.rung, report.ladder[0].verdict), (Rung::Single, Verdict::Last));
+}

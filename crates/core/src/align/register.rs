@@ -1,0 +1,122 @@
+//! [`Register`]: what every registration is, so that the studio, the bench and the command line run all alike.
+
+use glam::{DVec2, DVec3};
+
+use super::{AlignConfig, AlignError, AlignReport, Cleaned, Rung, align, clean};
+use crate::field::DistanceField;
+use crate::frames::PlanarPose;
+use crate::tool::ToolModel;
+
+/// What a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
+const REACH_M: f64 = 0.012;
+/// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
+const MIN_SHARE: f64 = 0.05;
+
+/// Contact points to align, in space and in the plane of the tool.
+#[derive(Clone, Debug)]
+pub struct Scene<'a> {
+    points: &'a [DVec3],
+    yz: Vec<DVec2>,
+}
+
+impl<'a> Scene<'a> {
+    /// Points in the grasp frame, meters. Those that are not finite are dropped and counted by the registrations.
+    pub fn new(points: &'a [DVec3]) -> Self {
+        Self { points, yz: points.iter().map(|p| DVec2::new(p.y, p.z)).collect() }
+    }
+
+    /// The points in the grasp frame, meters.
+    pub fn points(&self) -> &'a [DVec3] {
+        self.points
+    }
+
+    /// The same points along the closing axis: `(y, z)`, meters.
+    pub fn yz(&self) -> &[DVec2] {
+        &self.yz
+    }
+}
+
+/// What is asked of a registration beyond its own settings.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Ask<'a> {
+    /// Poses to start from, `grasp_from_object`; the registration's own without them. Not empty.
+    pub starts: Option<&'a [PlanarPose]>,
+    /// Keep per-iteration states and per-point residuals.
+    pub record: bool,
+    /// Leave the proof out, so that there is an answer at once; one that passes all tests is the same without.
+    pub provisional: bool,
+}
+
+/// A registration with its settings.
+pub trait Register {
+    /// Finds the tool's pose in the hand.
+    ///
+    /// The result depends on the arguments alone: not on threads, clocks or earlier calls.
+    ///
+    /// # Errors
+    /// [`AlignError`]; nothing is guessed from too few, coincident or misplaced points.
+    fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError>;
+}
+
+impl Register for AlignConfig {
+    fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
+        let mut config = self.clone();
+        config.record = ask.record;
+        if ask.provisional && config.rungs.iter().any(|rung| *rung != Rung::Certified) {
+            config.rungs.retain(|rung| *rung != Rung::Certified);
+        }
+        if let Some(starts) = ask.starts {
+            if starts.is_empty() {
+                // Without any, the ladder would choose.
+                return Err(AlignError::Config { what: "starts" });
+            }
+            config.starts = starts.to_vec();
+        }
+        align(scene.yz(), &tool.field, &config)
+    }
+}
+
+/// The finite points of a scene.
+pub(super) struct CleanScene {
+    /// Meters, grasp frame.
+    pub(super) points: Vec<DVec3>,
+    /// For each offered point whether it is in `points`.
+    pub(super) kept: Vec<bool>,
+    /// Mean of the points.
+    pub(super) centroid: DVec3,
+    /// Points left out.
+    pub(super) not_finite: usize,
+}
+
+/// Drops points that are not finite and refuses sets without a size; see [`clean`].
+pub(super) fn clean_scene(scene: &Scene<'_>, needed: usize) -> Result<CleanScene, AlignError> {
+    const MAX_COORDINATE_M: f64 = 1e6;
+    let usable = |p: &DVec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M;
+    let kept: Vec<bool> = scene.points().iter().map(usable).collect();
+    let points: Vec<DVec3> = scene.points().iter().copied().filter(usable).collect();
+    let yz: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
+    let Cleaned { centroid, .. } = clean(&yz, needed)?;
+    let x = points.iter().map(|p| p.x - points[0].x).sum::<f64>() / points.len() as f64 + points[0].x;
+    let not_finite = kept.len() - points.len();
+    Ok(CleanScene { points, kept, centroid: DVec3::new(x, centroid.x, centroid.y), not_finite })
+}
+
+/// Refuses points of which next to none come near the silhouette at any start: a nearest neighbor always exists,
+/// and its distance alone does not say that there is nothing to align.
+pub(super) fn check_overlap(
+    yz: impl Iterator<Item = DVec2> + Clone,
+    field: &DistanceField,
+    starts: &[PlanarPose],
+) -> Result<(), AlignError> {
+    let share_at = |start: &PlanarPose| {
+        let object_from_grasp = start.inverse();
+        let (mut near, mut all) = (0usize, 0usize);
+        for p in yz.clone() {
+            all += 1;
+            near += usize::from(field.sample(object_from_grasp.transform_yz(p)).distance <= REACH_M);
+        }
+        near as f64 / all.max(1) as f64
+    };
+    let share = starts.iter().map(share_at).fold(0.0, f64::max);
+    if share < MIN_SHARE { Err(AlignError::NoOverlap { share }) } else { Ok(()) }
+}

@@ -1,0 +1,234 @@
+//! Points lifted from an imprint to the grasp frame.
+//!
+//! The imprint is an argument of its own, so that a *predicted* imprint goes through the measured camera.
+
+use glam::{DVec2, DVec3};
+
+use super::grid::{DepthMap, Mask};
+use super::mesh::TriMesh;
+use super::sample::DepthCamera;
+
+/// Why an imprint cannot be lifted.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum CloudError {
+    /// Two images that must cover the same pixels do not.
+    #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
+    Size {
+        /// Which image differs.
+        what: &'static str,
+        /// Its width and height.
+        size: [usize; 2],
+        /// The imprint's width and height.
+        imprint: [usize; 2],
+    },
+    /// More columns or rows than a pixel address holds.
+    #[error("an imprint of {} x {} pixels is too large: at most 65535 on a side", .size[0], .size[1])]
+    TooLarge {
+        /// Width and height.
+        size: [usize; 2],
+    },
+    /// Focal lengths or principal point cannot be a camera's, or the transform is not finite.
+    #[error("the camera's {what} cannot be right: read them again from the source")]
+    Camera {
+        /// Which part of the camera.
+        what: &'static str,
+    },
+}
+
+/// Points of one finger with the pixel each came from.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Lifted {
+    /// Meters, grasp frame, row by row.
+    pub points: Vec<DVec3>,
+    /// Column and row in the imprint, one per point.
+    pub pixels: Vec<[u16; 2]>,
+    /// Pixels of the mask without a usable depth: NaN, infinite, zero or negative. They have no point.
+    pub invalid: usize,
+    /// Pixels that the mask leaves out.
+    pub outside_mask: usize,
+}
+
+/// Lifts the pixels of `imprint` that `mask` contains (all without one) to the grasp frame.
+///
+/// Depth is `camera.depth_reference - imprint`, in meters along the optical axis. Pixels whose depth or reference
+/// is NaN, infinite, zero or negative are counted in [`Lifted::invalid`] and left out.
+///
+/// # Errors
+/// [`CloudError`] if sizes differ or the camera's numbers cannot be right.
+///
+/// # Source
+/// The lab's `ICP_dataset_cal.py` lines 426-463 (pinhole with crop offset, camera to grasp); the lab does not drop
+/// invalid pixels.
+pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<Lifted, CloudError> {
+    check(imprint, camera)?;
+    if let Some(mask) = mask {
+        same_size("mask", mask.size(), imprint)?;
+    }
+    let mut lifted = Lifted::default();
+    let taken = mask.map_or(imprint.len(), |m| m.as_slice().iter().filter(|&&m| m).count());
+    lifted.points.reserve_exact(taken);
+    lifted.pixels.reserve_exact(taken);
+    lifted.outside_mask = imprint.len() - taken;
+    for y in 0..imprint.height() {
+        for x in 0..imprint.width() {
+            if mask.is_some_and(|m| !m[(x, y)]) {
+                continue;
+            }
+            if let Some(point) = lift_pixel(imprint, camera, x, y) {
+                lifted.points.push(point);
+                lifted.pixels.push([x as u16, y as u16]);
+            } else {
+                lifted.invalid += 1;
+            }
+        }
+    }
+    Ok(lifted)
+}
+
+/// The point of one pixel, meters, grasp frame; `None` outside the images and where the depth is unusable.
+pub fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
+    let reference = *camera.depth_reference.get(x, y)?;
+    let depth = reference - imprint.get(x, y)?;
+    if !(reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0) {
+        return None;
+    }
+    let in_camera = camera.lift(x as f64, y as f64, f64::from(depth));
+    Some(camera.grasp_from_camera.transform_point3(in_camera))
+}
+
+/// The pixel position (column, row; not rounded) that sees a point given in the grasp frame, meters.
+///
+/// `None` behind the camera, for a point that is not finite, and for a camera whose transform has no inverse.
+pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
+    let p = camera.grasp_from_camera.inverse().transform_point3(in_grasp);
+    let (u, v) = camera.project(p)?;
+    (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
+}
+
+/// Whether the camera can lift `imprint` at all.
+pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
+    same_size("reference depth", camera.depth_reference.size(), imprint)?;
+    let size = imprint.size();
+    if size.iter().any(|&n| n > usize::from(u16::MAX)) {
+        return Err(CloudError::TooLarge { size });
+    }
+    if !camera.intrinsics.is_plausible() {
+        return Err(CloudError::Camera { what: "intrinsics" });
+    }
+    if !camera.grasp_from_camera.is_finite() {
+        return Err(CloudError::Camera { what: "position in the grasp frame" });
+    }
+    Ok(())
+}
+
+pub(super) fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
+    if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
+}
+
+/// Neighbors farther apart than this are no surface: the membrane jumps there, or a pixel flies, meters.
+const JUMP_M: f64 = 0.002_5;
+
+/// The surface through points of neighboring pixels (`pixels` in row order, one per point), cut where it jumps. Its
+/// vertices are the points, in their order.
+pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
+    let at = |x: u16, y: u16| {
+        let found = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
+        points.get(found).filter(|p| p.is_finite()).map(|p| (found as u32, *p))
+    };
+    let mut triangles = Vec::new();
+    let mut add = |corners: [Option<(u32, DVec3)>; 3]| {
+        if let [Some(a), Some(b), Some(c)] = corners
+            && [a.1 - b.1, b.1 - c.1, c.1 - a.1].iter().all(|edge| edge.length_squared() <= JUMP_M * JUMP_M)
+        {
+            triangles.push([a.0, b.0, c.0]);
+        }
+    };
+    for &[x, y] in pixels {
+        let (Some(right), Some(below)) = (x.checked_add(1), y.checked_add(1)) else { continue };
+        let (a, b, c, d) = (at(x, y), at(right, y), at(x, below), at(right, below));
+        add([a, c, b]);
+        add([b, c, d]);
+    }
+    TriMesh { vertices: points.to_vec(), triangles }
+}
+
+#[cfg(test)]
+pub(super) mod testing {
+    use super::*;
+    use crate::rig::lab;
+    use crate::sensor::Intrinsics;
+    use glam::{DAffine3, DMat3};
+
+    /// A camera as on the lab's rig: optical axis 35 degrees off the closing axis, 93 mm from the grasp origin.
+    pub(crate) fn camera(width: usize, height: usize) -> DepthCamera {
+        let x = DVec3::new(0.5729, 0.0, -0.8196).normalize();
+        let z = DVec3::new(0.8196, 0.0, 0.5729).normalize();
+        DepthCamera {
+            depth_reference: DepthMap::filled(width, height, 0.09),
+            intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
+            crop: lab::BUBBLE.crop,
+            grasp_from_camera: DAffine3::from_mat3_translation(
+                DMat3::from_cols(x, DVec3::Y, z),
+                DVec3::new(-0.0764, 0.0, -0.0541),
+            ),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::lab;
+
+    const WIDTH: usize = lab::BUBBLE.width;
+    const HEIGHT: usize = lab::BUBBLE.height;
+
+    fn imprint() -> DepthMap {
+        DepthMap::from_fn(WIDTH, HEIGHT, |x, y| 1e-4 * ((x * 7 + y * 13) % 100) as f32)
+    }
+
+    #[test]
+    fn every_pixel_comes_back_to_its_place() {
+        let camera = testing::camera(WIDTH, HEIGHT);
+        let lifted = lift(&imprint(), &camera, None).unwrap();
+        assert_eq!(lifted.points.len(), WIDTH * HEIGHT);
+        for (point, pixel) in lifted.points.iter().zip(&lifted.pixels) {
+            let back = project(&camera, *point).unwrap();
+            assert!((back - DVec2::new(pixel[0].into(), pixel[1].into())).length() < 1e-9);
+        }
+        assert_eq!(project(&camera, DVec3::new(-1.0, 0.0, -1.0)), None);
+        assert_eq!(project(&camera, DVec3::NAN), None);
+    }
+
+    #[test]
+    fn unusable_depth_is_dropped_and_counted() {
+        let mut camera = testing::camera(4, 2);
+        let mut imprint = DepthMap::filled(4, 2, 0.001);
+        imprint[(0, 0)] = f32::NAN;
+        imprint[(1, 0)] = f32::NEG_INFINITY;
+        imprint[(2, 0)] = 0.09; // depth zero, as a dropped pixel reads
+        imprint[(3, 0)] = 0.1;
+        camera.depth_reference[(0, 1)] = 0.0;
+        imprint[(0, 1)] = -0.09; // the depth itself looks fine, but it was never compared with anything
+        let mut mask = Mask::filled(4, 2, true);
+        mask[(3, 1)] = false;
+        let lifted = lift(&imprint, &camera, Some(&mask)).unwrap();
+        assert_eq!((lifted.invalid, lifted.outside_mask), (5, 1));
+        assert_eq!(lifted.pixels, [[1, 1], [2, 1]]);
+    }
+
+    #[test]
+    fn cameras_that_do_not_fit_are_refused() {
+        let camera = testing::camera(4, 2);
+        assert!(matches!(lift(&imprint(), &camera, None), Err(CloudError::Size { what: "reference depth", .. })));
+        let small = DepthMap::filled(4, 2, 0.0);
+        let mask = Mask::filled(2, 4, true);
+        assert!(matches!(lift(&small, &camera, Some(&mask)), Err(CloudError::Size { what: "mask", .. })));
+        let mut broken = camera.clone();
+        broken.intrinsics.fx = f64::NAN;
+        assert_eq!(lift(&small, &broken, None), Err(CloudError::Camera { what: "intrinsics" }));
+        let mut lost = camera;
+        lost.grasp_from_camera.translation.x = f64::INFINITY;
+        assert!(matches!(lift(&small, &lost, None), Err(CloudError::Camera { .. })));
+    }
+}

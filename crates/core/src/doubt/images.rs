@@ -1,0 +1,301 @@
+//! Touched against untouched images of some pairs: what no camera takes, and what another reading sets right.
+
+use super::{Cause, Doubt, Felt, median};
+use crate::grid::RgbGrid;
+use crate::read_as::{Images, Lay, ReadAs, Stored};
+use crate::resample::bilinear_rgb;
+use crate::rig::{PerPad, Rig, lab};
+use crate::sample::{ColorImages, ColorTouch, Sample};
+use crate::turn::Turn;
+use crate::units::counted;
+use crate::upright;
+
+/// Share of the images that must show the same.
+const MOST: f64 = 0.8;
+/// An image whose brightest value is no larger is on the scale 0..1.
+const UNIT: f64 = 1.5;
+/// One whose brightest value is larger is on the scale 0..255.
+const BYTES: f64 = 8.0;
+/// Where nothing touches the gel the difference is about 0, levels of 255: sound images have a median of up to 5 in each
+/// channel.
+const OFF: f64 = 12.0;
+/// A reading that brings that median down to this share of it explains it.
+const EXPLAINED: f64 = 0.4;
+/// Differences beyond this, levels, are steps that no gel makes over more than a few pixels.
+const STEP: f32 = 128.0;
+/// Share of such pixels from which wrapping is tried.
+const STEPS: f64 = 0.002;
+/// By wrapping back the image becomes smoother by this much.
+const SMOOTHER: f64 = 0.85;
+/// Untouched images of one finger change less from pair to pair than touched ones: by this factor the other way round, and
+/// by so many levels.
+const VARIES: f64 = 0.5;
+const VARIES_LEVELS: f64 = 1.0;
+/// Sure readings of the light that it takes, and the share of them that must agree.
+const LIGHTS: usize = 3;
+const LIGHTS_AGREE: f64 = 0.75;
+/// Side of the square that the light is read from, pixels.
+const SIDE: usize = 128;
+
+/// What is wrong with the color images of some pairs.
+pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
+    let touches: Vec<&ColorTouch> =
+        felt.iter().flat_map(|felt| felt.sample.pads.iter().flatten()).filter_map(|touch| touch.color()).collect();
+    let images: Vec<&ColorImages> = touches.iter().filter_map(|touch| touch.images.as_ref()).collect();
+    if images.is_empty() {
+        return None;
+    }
+    let faces: Vec<Face> = images.iter().map(|images| Face::of(images)).collect();
+    let colored = felt.iter().any(|felt| is_gelslim(&felt.sample.rig));
+    plain(&faces, colored).or_else(|| stored(&images, &faces)).or_else(|| swapped(felt)).or_else(|| laid(felt, &faces))
+}
+
+/// What there is to say of one touch at a glance.
+struct Face {
+    /// Whether touched and untouched image are equal, pixel by pixel.
+    same: bool,
+    touch: Plain,
+    reference: Plain,
+}
+
+/// One image.
+struct Plain {
+    /// Largest value.
+    most: f64,
+    /// Smallest value.
+    least: f64,
+    /// Median of each channel.
+    median: [f64; 3],
+    /// Median of each channel, modulo 256 nearest to 0.
+    wrapped: [f64; 3],
+    /// Whether the three channels are equal.
+    gray: bool,
+}
+
+impl Plain {
+    fn of(image: &RgbGrid) -> Self {
+        let values = || image.as_slice().iter().flatten().map(|v| f64::from(*v));
+        let some = || image.as_slice().iter().step_by(7);
+        let channel = |c: usize| median(some().map(|p| f64::from(p[c]))).unwrap_or(0.0);
+        let wrapped = |c: usize| median(some().map(|p| wrap(f64::from(p[c])))).unwrap_or(0.0);
+        let unequal = image.as_slice().iter().filter(|p| (p[0] - p[1]).abs().max((p[1] - p[2]).abs()) > 1e-3).count();
+        Self {
+            most: values().fold(f64::NEG_INFINITY, f64::max),
+            least: values().fold(f64::INFINITY, f64::min),
+            median: [0, 1, 2].map(channel),
+            wrapped: [0, 1, 2].map(wrapped),
+            gray: unequal * 100 <= image.len(),
+        }
+    }
+
+    fn single(&self) -> bool {
+        self.most - self.least < 1e-3
+    }
+}
+
+impl Face {
+    fn of(images: &ColorImages) -> Self {
+        let same = images.raw.as_slice() == images.reference.as_slice();
+        Self { same, touch: Plain::of(&images.raw), reference: Plain::of(&images.reference) }
+    }
+}
+
+fn most(faces: &[Face], shows: impl Fn(&Face) -> bool) -> Option<String> {
+    let count = faces.iter().filter(|face| shows(face)).count();
+    let enough = count > 0 && count as f64 >= MOST * faces.len() as f64;
+    enough.then(|| format!("{count} of {}", counted(faces.len(), "image")))
+}
+
+/// Whether the color sensor is a GelSlim, of which is known that its light is colored, and where it comes from.
+fn is_gelslim(rig: &Rig) -> bool {
+    rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key)
+}
+
+/// What shows at a glance. `colored`: the sensor's light has colors.
+fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
+    let broken = |cause, what: String, hint: &str| Some(Doubt { cause, what, hint: hint.into() });
+    if let Some(of) = most(faces, |face| face.same && !face.touch.single()) {
+        let what = format!("touched and untouched image are the same, pixel by pixel: {of}");
+        return broken(Cause::SameImages, what, "store the image that was taken before the touch as the untouched one");
+    }
+    let unit = |plain: &Plain| plain.most <= UNIT && !plain.single();
+    let bytes = |plain: &Plain| plain.most > BYTES;
+    for (which, touch, reference) in
+        [(Images::Both, true, true), (Images::Touch, true, false), (Images::Reference, false, true)]
+    {
+        let is = |unit_scale: bool, plain: &Plain| if unit_scale { unit(plain) } else { bytes(plain) };
+        if let Some(of) = most(faces, |face| is(touch, &face.touch) && is(reference, &face.reference)) {
+            return Some(Doubt::stored(ReadAs::Image255(which), &format!("they reach no more than 1: {of}")));
+        }
+    }
+    if !colored {
+        return None;
+    }
+    if let Some(of) = most(faces, |face| face.touch.gray && face.reference.gray && !face.touch.single()) {
+        let what = format!("the three channels are equal: {of} are gray");
+        return broken(Cause::Gray, what, "store the camera's colors: without them no model can read the gel's slopes");
+    }
+    None
+}
+
+/// Differences and wrapped values stored as images, channels in another order, an untouched image that is none.
+fn stored(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
+    let size = |values: [f64; 3]| values.iter().map(|v| v.abs()).sum::<f64>() / 3.0;
+    let minus = |a: [f64; 3], b: [f64; 3]| std::array::from_fn(|c| a[c] - b[c]);
+    let reversed = |[a, b, c]: [f64; 3]| [c, b, a];
+    let typical = |of: &dyn Fn(&Face) -> f64| median(faces.iter().map(of)).unwrap_or(0.0);
+    let off = typical(&|face| size(minus(face.touch.median, face.reference.median)));
+    let wrapped = typical(&|face| size(face.touch.wrapped));
+    let gray = typical(&|face| size(face.touch.median.map(|v| v - 128.0)));
+    let signed = typical(&|face| size(face.touch.median));
+    let without = most(faces, |face| face.reference.single());
+    if off > OFF || without.is_some() {
+        let negative = most(faces, |face| face.touch.least < -1.0).is_some();
+        let bgr = typical(&|face| size(minus(reversed(face.touch.median), face.reference.median)));
+        let unwrapped = typical(&|face| size(minus(face.touch.median, face.reference.median).map(wrap)));
+        // Which of the two is in the other order shows in the light: a GelSlim's is blue.
+        let red = |plain: &dyn Fn(&Face) -> [f64; 3]| typical(&|face| plain(face)[0] - plain(face)[2]);
+        let which = if red(&|face| face.touch.median) > red(&|face| face.reference.median) {
+            Images::Touch
+        } else {
+            Images::Reference
+        };
+        let mut tried = vec![(ReadAs::ImageIsDifference(Stored::Gray), gray)];
+        if negative {
+            tried.push((ReadAs::ImageIsDifference(Stored::Signed), signed));
+        } else {
+            tried.push((ReadAs::ImageIsDifference(Stored::Wrapped), wrapped));
+        }
+        if without.is_none() {
+            tried.extend([(ReadAs::ImageBgr(which), bgr), (ReadAs::ImageUnwrap, unwrapped)]);
+        }
+        let best = tried.into_iter().min_by(|(_, a), (_, b)| a.total_cmp(b));
+        if let Some((read_as, left)) = best.filter(|(_, left)| *left < OFF && *left <= EXPLAINED * off.max(OFF)) {
+            let figures = format!(
+                "where nothing touches the gel the difference is {off:.0} levels of 255, read otherwise {left:.0} (median of {})",
+                counted(faces.len(), "image")
+            );
+            return Some(Doubt::stored(read_as, &figures));
+        }
+    }
+    if let Some(of) = without {
+        return Some(Doubt {
+            cause: Cause::NoReference,
+            what: format!("the untouched image is a single color: {of}"),
+            hint: "store the image that was taken before the touch".into(),
+        });
+    }
+    wrapped_around(images, faces)
+}
+
+/// The value modulo 256 that is nearest to 0.
+fn wrap(v: f64) -> f64 {
+    (v + 128.0).rem_euclid(256.0) - 128.0
+}
+
+/// Images that went on at 0 behind 255, or at -128 behind 127.
+fn wrapped_around(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
+    let negative = most(faces, |face| face.touch.least < -1.0 && face.reference.least < -1.0);
+    let (mut steps, mut rough, mut smooth, mut count) = (0usize, 0.0, 0.0, 0usize);
+    for images in images {
+        for y in (0..images.raw.height()).step_by(5) {
+            let difference: Vec<f32> = images
+                .raw
+                .row(y)
+                .iter()
+                .zip(images.reference.row(y))
+                .flat_map(|(a, b)| (0..3).map(move |c| a[c] - b[c]))
+                .collect();
+            count += difference.len();
+            steps += difference.iter().filter(|d| d.abs() > STEP).count();
+            for pair in difference.windows(4) {
+                rough += f64::from((pair[3] - pair[0]).abs());
+                smooth += (wrap(f64::from(pair[3])) - wrap(f64::from(pair[0]))).abs();
+            }
+        }
+    }
+    let share = steps as f64 / count.max(1) as f64;
+    let found = negative.is_some() || (share > STEPS && smooth < SMOOTHER * rough);
+    found.then(|| {
+        let figures = format!(
+            "{:.1} % of the differences are larger than 128 levels, and without the steps of 256 the images are {:.0} % smoother",
+            100.0 * share,
+            100.0 * (1.0 - smooth / rough.max(1e-9))
+        );
+        Doubt::stored(ReadAs::ImageUnwrap, &figures)
+    })
+}
+
+/// An untouched image that changes from pair to pair, beside a touched one that does not.
+fn swapped(felt: &[Felt<'_>]) -> Option<Doubt> {
+    let mut by_pad: PerPad<Vec<[Vec<f64>; 2]>> = PerPad::default();
+    for felt in felt {
+        for (pad, touch) in felt.sample.pads.entries() {
+            let Some(images) = touch.color().and_then(|color| color.images.as_ref()) else { continue };
+            by_pad[pad].get_or_insert_default().push([&images.raw, &images.reference].map(blocks));
+        }
+    }
+    let (mut changes, mut fingers) = ([Vec::new(), Vec::new()], 0);
+    for of_pad in by_pad.iter().flatten() {
+        for pair in of_pad.windows(2).filter(|pair| pair[0][0].len() == pair[1][0].len()) {
+            for (which, changes) in changes.iter_mut().enumerate() {
+                let change = pair[0][which].iter().zip(&pair[1][which]).map(|(a, b)| (a - b).abs());
+                changes.push(change.sum::<f64>() / pair[0][which].len().max(1) as f64);
+            }
+        }
+        fingers += 1;
+    }
+    let [touched, untouched] = [median(changes[0].iter().copied())?, median(changes[1].iter().copied())?];
+    (fingers > 0 && untouched > VARIES_LEVELS && touched < VARIES * untouched).then(|| {
+        let figures = format!(
+            "from pair to pair the untouched image changes by {untouched:.1} levels, the touched one by {touched:.1} (median of {})",
+            counted(changes[0].len(), "comparison")
+        );
+        Doubt::stored(ReadAs::ImageSwapReference, &figures)
+    })
+}
+
+/// Means of an image over blocks, channel by channel: without noise and markers.
+fn blocks(image: &RgbGrid) -> Vec<f64> {
+    bilinear_rgb(&area(image), 32, 24).as_slice().iter().flatten().map(|v| f64::from(*v)).collect()
+}
+
+/// Halved three times: bilinear alone would leave pixels out.
+fn area(image: &RgbGrid) -> RgbGrid {
+    (0..3).fold(image.clone(), |image, _| {
+        let [width, height] = image.size();
+        if width < 64 || height < 48 { image } else { bilinear_rgb(&image, width / 2, height / 2) }
+    })
+}
+
+/// Images that lie otherwise than the light says.
+fn laid(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
+    let turns: Vec<Turn> = felt.iter().flat_map(|felt| of_light(felt.sample)).collect();
+    let upright = turns.iter().filter(|turn| **turn == Turn::default()).count();
+    let best = Turn::all().max_by_key(|turn| turns.iter().filter(|t| *t == turn).count())?;
+    let agree = turns.iter().filter(|turn| **turn == best).count();
+    if best == Turn::default() || agree < LIGHTS || (agree as f64) < LIGHTS_AGREE * turns.len() as f64 {
+        return None;
+    }
+    let red = median(faces.iter().map(|face| face.reference.median[0] - face.reference.median[2]))?;
+    let read_as = match (best.quarters % 4, best.mirrored) {
+        // Red and blue stand on either side, so that exchanging them mirrors the light; but a GelSlim's is blue.
+        (2, true) if red > 0.0 => ReadAs::ImageBgr(Images::Both),
+        (2, true) => ReadAs::ImageLay(Lay::MirrorRows),
+        (0, true) => ReadAs::ImageLay(Lay::MirrorColumns),
+        (2, false) => ReadAs::ImageLay(Lay::Turn),
+        _ => return None,
+    };
+    let figures = format!("by the light {agree} of {} lie so, and {upright} upright", counted(turns.len(), "image"));
+    Some(Doubt::stored(read_as, &figures))
+}
+
+/// How the images of a sample lie by their light, where it tells surely. Only a GelSlim's light is known.
+fn of_light(sample: &Sample) -> Vec<Turn> {
+    if !is_gelslim(&sample.rig) {
+        return Vec::new();
+    }
+    let colors = sample.pads.iter().flatten().filter_map(|touch| touch.color());
+    let read = |color: &ColorTouch| upright::best(&bilinear_rgb(&area(&color.difference), SIDE, SIDE));
+    colors.filter_map(read).filter(|reading| reading.is_sure()).map(|reading| reading.turn).collect()
+}

@@ -1,0 +1,319 @@
+//! Imprints against CAD models, under every reading of both.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
+
+use glam::DVec3;
+
+use super::fit::{angle_error_rad, likeness, registered};
+use super::{Cause, Doubt, Gain, median};
+use crate::contact::without_grain;
+use crate::field::DistanceField;
+use crate::mesh::TriMesh;
+use crate::read_as::{Depths, Lay, ReadAs};
+use crate::sample::{PadTouch, Sample};
+use crate::units::counted;
+
+/// Mean likeness of imprints that lie on their tools. Simulated ones have 0.6 to 0.85, wrongly read ones 0.5 and less.
+const LIES_ON: f64 = 0.5;
+/// By how much more a reading must have it: what a sound data set gains by another reading is 0.01.
+const CLEARLY: f64 = 0.08;
+/// The same of a CAD model, of which there may be a single pair.
+const CLEARLY_OF_TOOL: f64 = 0.15;
+/// Pairs whose likeness is at least this are not tried with other CAD models.
+const GOOD: f64 = 0.65;
+/// Imprints of less mean likeness have nothing to do with their tools.
+const NOTHING: f64 = 0.15;
+/// Imprints of a tool do not belong to its CAD model where their mean likeness is less than this share of the other tools',
+/// which must be beyond doubt. A poor membrane alone has half of it.
+const NOT_ITS_MODEL: f64 = 0.3;
+const OTHERS_LIE_ON: f64 = 0.55;
+/// Angles differ from here on, radians.
+const ANGLES_DIFFER_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
+
+/// The readings that are tried.
+fn readings() -> Vec<ReadAs> {
+    let mut all = vec![ReadAs::NegateTheta];
+    for depths in [Depths::Imprints, Depths::Whole] {
+        all.push(ReadAs::SwapFingers(depths));
+        all.extend([Lay::MirrorColumns, Lay::MirrorRows, Lay::Turn].map(|lay| ReadAs::Lay(depths, lay)));
+        all.extend([0.1, 0.5, 2.0, 10.0].map(|factor| ReadAs::Scale(depths, factor)));
+    }
+    all.extend([0.5, 0.8, 1.25, 2.0].map(ReadAs::ScaleCamera));
+    all
+}
+
+/// How a CAD model is to be turned or mirrored: which of its axes, with which sign, becomes x, y and z.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Axes {
+    from: [usize; 3],
+    negative: [bool; 3],
+}
+
+impl Axes {
+    /// All that change the outline, which is seen along x: the sign of x does not count.
+    fn all() -> Vec<Self> {
+        let orders = [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]];
+        let signs = [[false, false], [true, false], [false, true], [true, true]];
+        let all = orders.iter().flat_map(|&from| signs.map(|[y, z]| Self { from, negative: [false, y, z] }));
+        all.skip(1).collect()
+    }
+
+    /// The model turned so.
+    pub fn apply(self, mesh: &TriMesh) -> TriMesh {
+        let turned = |p: &DVec3| {
+            let p = p.to_array();
+            let sign = |i: usize| if self.negative[i] { -1.0 } else { 1.0 };
+            DVec3::from_array(std::array::from_fn(|i| sign(i) * p[self.from[i]]))
+        };
+        TriMesh { vertices: mesh.vertices.iter().map(turned).collect(), triangles: mesh.triangles.clone() }
+    }
+}
+
+impl fmt::Display for Axes {
+    /// `x = x, y = -z, z = y`.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for i in 0..3 {
+            let sign = if self.negative[i] { "-" } else { "" };
+            let comma = if i == 0 { "" } else { ", " };
+            write!(f, "{comma}{} = {sign}{}", ["x", "y", "z"][i], ["x", "y", "z"][self.from[i]])?;
+        }
+        Ok(())
+    }
+}
+
+/// Pairs with a CAD model, their imprints without grain.
+struct Pairs<'a> {
+    samples: Vec<Sample>,
+    tools: Vec<&'a str>,
+    fields: BTreeMap<&'a str, DistanceField>,
+}
+
+impl<'a> Pairs<'a> {
+    fn of(samples: &[Sample], named: &[Option<&'a str>], meshes: &'a BTreeMap<String, TriMesh>) -> Self {
+        let fields: BTreeMap<&str, DistanceField> = meshes
+            .iter()
+            .filter_map(|(name, mesh)| Some((name.as_str(), DistanceField::from_mesh(mesh).ok()?)))
+            .collect();
+        let (mut taken, mut tools) = (Vec::new(), Vec::new());
+        for (sample, tool) in samples.iter().zip(named) {
+            let Some(tool) = tool.filter(|tool| fields.contains_key(tool)) else { continue };
+            if !sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()) {
+                continue;
+            }
+            let mut sample = sample.clone();
+            for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
+                depth.imprint = without_grain(&depth.imprint, 1);
+            }
+            taken.push(sample);
+            tools.push(tool);
+        }
+        Self { samples: taken, tools, fields }
+    }
+
+    /// The likeness of a sample, at its true pose where that is known.
+    fn score(sample: &Sample, field: &DistanceField) -> f64 {
+        let pose = sample.grasp_from_object.or_else(|| registered(sample, field));
+        pose.map_or(0.0, |pose| likeness(sample, field, pose))
+    }
+
+    fn scores(&self, read_as: &[ReadAs]) -> Vec<f64> {
+        let score = |(sample, tool): (&Sample, &&str)| Self::score(&ReadAs::all(read_as, sample), &self.fields[*tool]);
+        self.samples.iter().zip(&self.tools).map(score).collect()
+    }
+
+    /// Mean likeness of the pairs of a tool with this outline.
+    fn of_tool(&self, tool: &str, field: &DistanceField) -> f64 {
+        let of = self.samples.iter().zip(&self.tools).filter(|(_, named)| **named == tool);
+        let scores: Vec<f64> = of.map(|(sample, _)| Self::score(sample, field)).collect();
+        scores.iter().sum::<f64>() / scores.len().max(1) as f64
+    }
+}
+
+/// What is wrong with the imprints of some pairs, or with their CAD models.
+pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
+    let pairs = Pairs::of(samples, named, meshes);
+    if pairs.samples.is_empty() {
+        return None;
+    }
+    let stored = pairs.scores(&[]);
+    let read = best_reading(&pairs, &stored);
+    let mean = stored.iter().sum::<f64>() / stored.len() as f64;
+    let models = tools_in_doubt(&pairs, &stored);
+    // CAD models are blamed where that explains more than any one reading of all pairs.
+    let best_read = read.as_ref().map_or(mean, |(_, gain)| gain.read);
+    if let Some((doubt, with)) = of_models(&pairs, meshes, &models, &stored)
+        && with > best_read
+    {
+        return Some(doubt);
+    }
+    if let Some((read_as, gain)) = read {
+        return Some(Doubt::stored(read_as, &figures(&pairs, &stored, read_as, &gain)));
+    }
+    if let Some(doubt) = one_model(&pairs, &models, &stored) {
+        return Some(doubt);
+    }
+    (mean < NOTHING).then(|| Doubt {
+        cause: Cause::Unexplained,
+        what: format!(
+            "the imprints do not lie on their CAD models at the true poses (likeness {mean:.2} in {}, where sound data have 0.6), \
+             and nothing that was tried explains it",
+            counted(stored.len(), "pair")
+        ),
+        hint: "check that poses, CAD models and imprints are of the same grasps, and their frames".into(),
+    })
+}
+
+/// CAD models that do not fit where those of other tools do, and that none of them replaces.
+fn one_model(pairs: &Pairs<'_>, doubted: &[(&str, f64)], stored: &[f64]) -> Option<Doubt> {
+    let tools: BTreeSet<&str> = pairs.tools.iter().copied().collect();
+    let typical = median(stored.iter().copied()).filter(|typical| *typical >= OTHERS_LIE_ON)?;
+    let bad: Vec<&(&str, f64)> = doubted.iter().filter(|(_, score)| *score < NOT_ITS_MODEL * typical).collect();
+    if bad.is_empty() || 2 * bad.len() > tools.len() {
+        return None;
+    }
+    let said: Vec<String> = bad.iter().map(|(tool, score)| format!("{tool} {score:.2}")).collect();
+    let names: Vec<String> = bad.iter().map(|(tool, _)| (*tool).to_owned()).collect();
+    Some(Doubt {
+        what: format!(
+            "the imprints of {} do not lie on their CAD models, where those of the others do (likeness {}): none of the other \
+             models fits either",
+            counted(bad.len(), "tool"),
+            said.join(", ")
+        ),
+        hint: "check that the CAD models are those tools', in the object frame".into(),
+        cause: Cause::NotItsModel(names),
+    })
+}
+
+/// The reading that explains the pairs best, if one does.
+fn best_reading(pairs: &Pairs<'_>, stored: &[f64]) -> Option<(ReadAs, Gain)> {
+    let known = pairs.samples.iter().any(|sample| sample.grasp_from_object.is_some());
+    readings()
+        .into_iter()
+        .filter(|read_as| known || *read_as != ReadAs::NegateTheta)
+        .map(|read_as| (read_as, Gain::between(stored, &pairs.scores(&[read_as]))))
+        .filter(|(_, gain)| gain.explains(LIES_ON, CLEARLY))
+        .max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))
+}
+
+/// By what a reading of the imprints is better.
+fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> String {
+    let errors = |readings: &[ReadAs]| {
+        let error = |(sample, tool): (&Sample, &&str)| {
+            angle_error_rad(&ReadAs::all(readings, sample), &pairs.fields[*tool]).map(f64::to_degrees)
+        };
+        median(pairs.samples.iter().zip(&pairs.tools).filter_map(error))
+    };
+    let (before, after) = (errors(&[]), errors(&[read_as]));
+    let angles = match (before, after) {
+        (Some(before), Some(after)) if (before - after).to_radians() > ANGLES_DIFFER_RAD => {
+            format!(
+                "read otherwise, the registered angle is off by a median of {after:.1}° instead of {before:.1}°, and the"
+            )
+        }
+        _ => "read otherwise, the".into(),
+    };
+    let mean = stored.iter().sum::<f64>() / stored.len().max(1) as f64;
+    format!(
+        "{angles} imprints lie on their CAD models with a likeness of {:.2} instead of {mean:.2}, better on {} of {}",
+        gain.read,
+        gain.better,
+        counted(stored.len(), "pair")
+    )
+}
+
+/// The tools whose pairs do not lie on their CAD models, with their mean likeness.
+fn tools_in_doubt<'a>(pairs: &Pairs<'a>, stored: &[f64]) -> Vec<(&'a str, f64)> {
+    let mut by_tool: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
+    for (tool, score) in pairs.tools.iter().zip(stored) {
+        by_tool.entry(tool).or_default().push(*score);
+    }
+    let mean = |(tool, scores): (_, Vec<f64>)| (tool, scores.iter().sum::<f64>() / scores.len() as f64);
+    by_tool.into_iter().map(mean).filter(|(_, mean)| *mean < GOOD).collect()
+}
+
+/// Other CAD models, or the same with other axes, where they explain the tools in doubt; with the mean likeness of all pairs
+/// that follows.
+fn of_models(
+    pairs: &Pairs<'_>,
+    meshes: &BTreeMap<String, TriMesh>,
+    doubted: &[(&str, f64)],
+    stored: &[f64],
+) -> Option<(Doubt, f64)> {
+    let others = other_models(pairs, doubted);
+    let turned = other_axes(pairs, meshes, doubted);
+    let explained = |tools: &[(&str, f64)]| {
+        let gained: f64 =
+            tools.iter().map(|(tool, gain)| gain * pairs.tools.iter().filter(|t| *t == tool).count() as f64).sum();
+        (stored.iter().sum::<f64>() + gained) / stored.len() as f64
+    };
+    let by_others = explained(&others.iter().map(|(tool, _, gain)| (*tool, *gain)).collect::<Vec<_>>());
+    let by_axes = turned.as_ref().map_or(0.0, |(_, tools)| explained(tools));
+    let mean = stored.iter().sum::<f64>() / stored.len() as f64;
+    if others.is_empty() && turned.is_none() {
+        return None;
+    }
+    if let Some((axes, tools)) = turned.filter(|_| by_axes > by_others) {
+        let names: Vec<String> = tools.iter().map(|(tool, _)| (*tool).to_owned()).collect();
+        let what = format!(
+            "the CAD models of {} have other axes ({}): with {axes} of the file the imprints lie on them with a likeness of \
+             {by_axes:.2} instead of {mean:.2}",
+            counted(names.len(), "tool"),
+            names.join(", ")
+        );
+        let hint = "export them in the object frame: x along the gripper's closing axis, z away from the wrist".into();
+        return Some((Doubt { cause: Cause::Axes(names, axes), what, hint }, by_axes));
+    }
+    let list: Vec<(String, String)> =
+        others.iter().map(|(tool, other, _)| ((*tool).to_owned(), (*other).to_owned())).collect();
+    let said: Vec<String> = list.iter().map(|(tool, other)| format!("{tool} was felt as {other}")).collect();
+    let what = format!(
+        "the CAD models of {} are those of other tools ({}): with the others the imprints lie on them with a likeness of \
+         {by_others:.2} instead of {mean:.2}",
+        counted(list.len(), "tool"),
+        said.join(", ")
+    );
+    let hint = "put the right files into tools_stls, or correct the names of the pairs".into();
+    Some((Doubt { cause: Cause::OtherTool(list), what, hint }, by_others))
+}
+
+/// For each tool in doubt the other one whose model its pairs lie on, with the gain.
+fn other_models<'a>(pairs: &Pairs<'a>, doubted: &[(&'a str, f64)]) -> Vec<(&'a str, &'a str, f64)> {
+    let mut found = Vec::new();
+    for &(tool, as_is) in doubted {
+        let others = pairs.fields.iter().filter(|(other, _)| **other != tool);
+        let scores = others.map(|(other, field)| (*other, pairs.of_tool(tool, field)));
+        let best = scores.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        if let Some((other, score)) = best.filter(|(_, score)| *score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL) {
+            found.push((tool, other, score - as_is));
+        }
+    }
+    found
+}
+
+/// The axes with which most of the tools in doubt are explained, and those with their gains.
+fn other_axes<'a>(
+    pairs: &Pairs<'a>,
+    meshes: &BTreeMap<String, TriMesh>,
+    doubted: &[(&'a str, f64)],
+) -> Option<(Axes, Vec<(&'a str, f64)>)> {
+    let mut best: Option<(Axes, Vec<(&str, f64)>)> = None;
+    let total = |tools: &[(&str, f64)]| tools.iter().map(|(_, gain)| gain).sum::<f64>();
+    for axes in Axes::all() {
+        let mut tools = Vec::new();
+        for &(tool, as_is) in doubted {
+            let Some(field) = meshes.get(tool).and_then(|mesh| DistanceField::from_mesh(&axes.apply(mesh)).ok()) else {
+                continue;
+            };
+            let score = pairs.of_tool(tool, &field);
+            if score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL {
+                tools.push((tool, score - as_is));
+            }
+        }
+        if !tools.is_empty() && best.as_ref().is_none_or(|(_, known)| total(&tools) > total(known)) {
+            best = Some((axes, tools));
+        }
+    }
+    best
+}

@@ -1,0 +1,353 @@
+//! The table as text, Markdown, LaTeX and CSV.
+
+use super::{Estimate, Group, Row, TableMetrics};
+use crate::sample::Scale;
+
+/// A column of the table.
+#[derive(Clone, Copy)]
+pub struct Column {
+    /// With the unit.
+    pub heading: &'static str,
+    /// What it shows.
+    pub tip: &'static str,
+    /// Digits after the point.
+    pub decimals: usize,
+    /// Whether more of it is better.
+    pub larger_is_better: bool,
+    /// Its figure.
+    pub get: fn(&TableMetrics) -> Option<Estimate>,
+    /// Its name in files.
+    key: &'static str,
+}
+
+fn plain(value: Option<f64>) -> Option<Estimate> {
+    value.map(|value| Estimate { value, interval: None })
+}
+
+const fn column(
+    heading: &'static str,
+    key: &'static str,
+    decimals: usize,
+    larger_is_better: bool,
+    get: fn(&TableMetrics) -> Option<Estimate>,
+    tip: &'static str,
+) -> Column {
+    Column { heading, tip, decimals, larger_is_better, get, key }
+}
+
+/// The columns of a group, in the paper's order.
+const COLUMNS: [Column; 15] = [
+    column("PSNR dB", "psnr_db", 1, true, |f| f.psnr_db, "Against the measured imprint, decibels; peak 22.5 mm"),
+    column(
+        "clean dB",
+        "psnr_noise_free_db",
+        1,
+        true,
+        |f| f.psnr_noise_free_db,
+        "PSNR against the simulator's imprint before camera noise, decibels",
+    ),
+    column("SSIM", "ssim", 2, true, |f| f.ssim, "Structural similarity; range of the tool's predictions (the lab's)"),
+    column(
+        "raw dB",
+        "psnr_raw_db",
+        1,
+        true,
+        |f| f.psnr_raw_db,
+        "PSNR of pictures as they are, in the assumed meters and not stretched to 0..1, decibels",
+    ),
+    column("raw SSIM", "ssim_raw", 2, true, |f| f.ssim_raw, "Structural similarity of pictures as they are"),
+    column(
+        "line dB",
+        "psnr_line_db",
+        1,
+        true,
+        |f| f.psnr_line_db,
+        "PSNR of pictures after the straight line that fits best: the worth of the shape alone, decibels",
+    ),
+    column("SSIM 22.5", "ssim_peak", 2, true, |f| f.ssim_peak, "Structural similarity with the range 22.5 mm"),
+    column(
+        "clean SSIM",
+        "ssim_noise_free",
+        2,
+        true,
+        |f| f.ssim_noise_free,
+        "SSIM against the simulator's imprint before camera noise, range of the tool's predictions",
+    ),
+    column(
+        "FD",
+        "frechet_classifier",
+        2,
+        false,
+        |f| plain(f.frechet),
+        "Fréchet distance in the features of the tool classifier: not to be compared with a published FID",
+    ),
+    column("FID", "fid", 0, false, |f| plain(f.fid), "As published, with the features of an Inception network"),
+    column("angle °", "angle_deg", 1, false, |f| f.angle_deg, "Mean error of the in-hand angle, degrees"),
+    column("≤5° %", "success_5", 1, true, |f| f.success_5, "Share of grasps within 5 degrees, percent"),
+    column("≤10° %", "success_10", 1, true, |f| f.success_10, "Share of grasps within 10 degrees, percent"),
+    column(
+        "tool %",
+        "tool_accuracy",
+        1,
+        true,
+        |f| f.tool_accuracy,
+        "Share of imprints whose tool the classifier names, percent",
+    ),
+    column("s/image", "seconds_per_image", 3, false, |f| plain(f.seconds), "Median time to generate an image, seconds"),
+];
+
+/// What the columns mean, a line each.
+pub const NOTES: [&str; 7] = [
+    "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
+    "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
+     imprints says how much that noise costs",
+    "raw, line: of pictures whose scale was assumed, as they are and after the straight line that fits best; PSNR itself \
+     stretches both pictures to 0..1, where no noise-free picture passes 20 dB",
+    "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
+     cannot be compared with a published FID, nor between groups of different size",
+    "FID: published, with the features of an Inception network",
+    "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
+    "tool: share of imprints whose tool the classifier names",
+];
+
+/// What PSNR and SSIM mean.
+pub fn conventions(scale: Scale) -> &'static str {
+    match scale {
+        Scale::Measured => {
+            "PSNR: squared error pooled over a tool's images, peak 22.5 mm; SSIM: 11 x 11 window, zero padding, range of \
+             the tool's predictions (the lab's conventions), and with the range 22.5 mm; against the measured imprint"
+        }
+        Scale::Assumed => {
+            "PSNR and SSIM: each image stretched to 0..1 on its own, peak and range 1, then the mean (the source lost \
+             its scale)"
+        }
+    }
+}
+
+/// The columns that some row fills.
+pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
+    let any = |column: &&Column| rows.iter().flat_map(|r| &r.groups).any(|f| (column.get)(f).is_some());
+    COLUMNS.iter().filter(any).collect()
+}
+
+fn groups(rows: &[Row]) -> Vec<Group> {
+    let mut groups: Vec<Group> =
+        rows.iter().flat_map(|r| &r.groups).filter(|f| f.grasps > 0).map(|f| f.group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    groups
+}
+
+fn of(row: &Row, group: Group) -> Option<&TableMetrics> {
+    row.groups.iter().find(|f| f.group == group)
+}
+
+/// A figure without its interval; `-` for none.
+fn number(estimate: Option<Estimate>, decimals: usize) -> String {
+    estimate.map_or_else(|| "-".into(), |e| format!("{:.decimals$}", e.value))
+}
+
+fn with_interval(estimate: Option<Estimate>, decimals: usize) -> String {
+    match estimate {
+        Some(Estimate { value, interval: Some([low, high]) }) => {
+            format!("{value:.decimals$} [{low:.decimals$} {high:.decimals$}]")
+        }
+        other => number(other, decimals),
+    }
+}
+
+/// A table per column group, for people.
+pub fn text(rows: &[Row]) -> String {
+    let columns = columns(rows);
+    let mut out = String::new();
+    for group in groups(rows) {
+        let present: Vec<(&Row, &TableMetrics)> = rows.iter().filter_map(|r| Some((r, of(r, group)?))).collect();
+        let name = present.iter().map(|(r, _)| r.method.chars().count()).max().unwrap_or(0).max(8);
+        let cells: Vec<Vec<String>> = present
+            .iter()
+            .map(|(_, f)| columns.iter().map(|c| with_interval((c.get)(f), c.decimals)).collect())
+            .collect();
+        let width = |i: usize| {
+            cells.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).max(columns[i].heading.chars().count())
+        };
+        let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+        out += &format!("{}\n", group.label());
+        out += &format!("  {:<name$}  {:>6}", "method", "grasps");
+        for (column, width) in columns.iter().zip(&widths) {
+            out += &format!("  {:>width$}", column.heading);
+        }
+        out.push('\n');
+        for ((row, figures), cells) in present.iter().zip(&cells) {
+            out += &format!("  {:<name$}  {:>6}", row.method, figures.grasps);
+            for (cell, width) in cells.iter().zip(&widths) {
+                out += &format!("  {cell:>width$}");
+            }
+            out.push('\n');
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// One table with the column groups side by side, as the paper prints it.
+pub fn markdown(rows: &[Row]) -> String {
+    let (columns, groups) = (columns(rows), groups(rows));
+    let mut out = String::from("| method |");
+    let mut rule = String::from("|---|");
+    for group in &groups {
+        for column in &columns {
+            out += &format!(" {}: {} |", group.short(), column.heading);
+            rule.push_str("--:|");
+        }
+    }
+    out += &format!("\n{rule}\n");
+    for row in rows {
+        let star = if row.published { " (published, real data)" } else { "" };
+        out += &format!("| {}{star} |", row.method.replace('|', "/"));
+        for group in &groups {
+            for column in &columns {
+                out += &format!(" {} |", number(of(row, *group).and_then(column.get), column.decimals));
+            }
+        }
+        out.push('\n');
+    }
+    out
+}
+
+/// The paper's columns, as far as some row fills them.
+const IN_PAPER: [&str; 7] = ["psnr_db", "ssim", "frechet_classifier", "fid", "angle_deg", "success_5", "success_10"];
+
+/// Text for LaTeX: what it takes for commands is escaped, signs that its fonts lack are written out.
+fn tex(text: &str) -> String {
+    let mut out = String::new();
+    for c in text.chars() {
+        match c {
+            '%' | '&' | '#' | '$' | '_' | '{' | '}' => out.extend(['\\', c]),
+            '\\' => out.push_str("\\textbackslash{}"),
+            '~' => out.push_str("\\textasciitilde{}"),
+            '^' => out.push_str("\\textasciicircum{}"),
+            '<' | '>' | '|' => out.push_str(&format!("${c}$")),
+            '°' => out.push_str("$^\\circ$"),
+            '≤' => out.push_str("$\\le$"),
+            '–' | '—' => out.push_str("--"),
+            c if c.is_ascii_control() => out.push(' '),
+            c => out.push(c),
+        }
+    }
+    out
+}
+
+/// The table in the paper's form as a LaTeX document that compiles by itself: its columns side by side for each group,
+/// the best of what was computed here in bold. The lines between `tabular` can be taken into another document.
+pub fn latex(rows: &[Row]) -> String {
+    let columns: Vec<&Column> = columns(rows).into_iter().filter(|c| IN_PAPER.contains(&c.key)).collect();
+    let groups = groups(rows);
+    let mut out = String::from(
+        "\\documentclass{article}\n\\usepackage[utf8]{inputenc}\n\\usepackage[T1]{fontenc}\n\
+         \\usepackage[landscape,margin=1.5cm]{geometry}\n\\begin{document}\n\\pagestyle{empty}\n\\small\n\
+         \\setlength{\\tabcolsep}{4pt}\n\\noindent\n",
+    );
+    out += &format!(
+        "\\begin{{tabular}}{{l{}}}\n\\hline\n",
+        format!("|{}", "r".repeat(columns.len())).repeat(groups.len())
+    );
+    for (i, group) in groups.iter().enumerate() {
+        let side = if i + 1 < groups.len() { "c|" } else { "c" };
+        out += &format!(" & \\multicolumn{{{}}}{{{side}}}{{{}}}", columns.len(), tex(group.label()));
+    }
+    out += " \\\\\nMethod";
+    for column in groups.iter().flat_map(|_| &columns) {
+        let arrow = if column.larger_is_better { "$\\uparrow$" } else { "$\\downarrow$" };
+        out += &format!(" & {} {arrow}", tex(column.heading));
+    }
+    out += " \\\\\n\\hline\n";
+    let figure = |row: &Row, group: Group, column: &Column| of(row, group).and_then(column.get);
+    let best = |group: Group, column: &Column| {
+        let ours = rows.iter().filter(|row| !row.published && !row.upper_bound);
+        let values = ours.filter_map(|row| figure(row, group, column)).map(|e| e.value).filter(|v| v.is_finite());
+        let sign = if column.larger_is_better { 1.0 } else { -1.0 };
+        values.max_by(|a, b| (sign * a).total_cmp(&(sign * b)))
+    };
+    for row in rows {
+        out += &tex(&row.method);
+        for (group, column) in groups.iter().flat_map(|group| columns.iter().map(move |column| (*group, *column))) {
+            let found = figure(row, group, column);
+            let text = number(found, column.decimals);
+            let own = !row.published && !row.upper_bound;
+            let bold = own && found.is_some_and(|e| Some(e.value) == best(group, column));
+            out += &if bold { format!(" & \\textbf{{{text}}}") } else { format!(" & {text}") };
+        }
+        out += " \\\\\n";
+    }
+    out + "\\hline\n\\end{tabular}\n\\end{document}\n"
+}
+
+/// One line per method and column group with every figure and its interval.
+pub fn csv(rows: &[Row]) -> String {
+    let mut out = String::from("method,published,group,tools,grasps,images,without_pose");
+    for name in COLUMNS.map(|c| c.key) {
+        out += &format!(",{name},{name}_low,{name}_high");
+    }
+    out.push('\n');
+    for row in rows {
+        for f in row.groups.iter().filter(|f| f.grasps > 0) {
+            let method = row.method.replace('"', "\"\"");
+            let group = f.group.short();
+            out += &format!(
+                "\"{method}\",{},{group},{},{},{},{}",
+                row.published, f.tools, f.grasps, f.images, f.without_pose
+            );
+            for column in &COLUMNS {
+                let estimate = (column.get)(f);
+                let text = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
+                let interval = estimate.and_then(|e| e.interval);
+                out += &format!(
+                    ",{},{},{}",
+                    text(estimate.map(|e| e.value)),
+                    text(interval.map(|i| i[0])),
+                    text(interval.map(|i| i[1]))
+                );
+            }
+            out.push('\n');
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::paper_rows;
+    use super::*;
+
+    #[test]
+    fn every_form_holds_every_row_and_leaves_out_empty_columns() {
+        let mut rows = paper_rows();
+        rows[0].method = "odd \"name\" | with, signs".into();
+        let text = text(&rows);
+        assert!(text.contains("Unseen tools") && text.contains("20.4") && !text.contains("tool %"), "{text}");
+        let markdown = markdown(&rows);
+        let lines: Vec<&str> = markdown.lines().collect();
+        assert_eq!(lines.len(), 2 + rows.len());
+        let bars = |line: &str| line.matches('|').count();
+        assert!(lines.iter().all(|l| bars(l) == bars(lines[0])), "{markdown}");
+        let latex = latex(&rows);
+        let body: Vec<&str> = latex.lines().filter(|line| line.ends_with("\\\\")).collect();
+        assert_eq!(body.len(), 2 + rows.len(), "{latex}");
+        // Two groups of as many columns, in each line; the group's names span them.
+        let cells = |line: &str| line.matches(" & ").count();
+        assert!(body[1..].iter().all(|l| cells(l) == cells(body[1])) && cells(body[1]) % 2 == 0, "{latex}");
+        assert!(body[0].contains(&format!("\\multicolumn{{{}}}", cells(body[1]) / 2)), "{latex}");
+        assert!(
+            body[2].starts_with("odd \"name\" $|$ with, signs & ") && latex.contains("$\\le$5$^\\circ$ \\%"),
+            "{latex}"
+        );
+        // Braces close, and every bare percent sign would begin a comment.
+        assert_eq!(latex.matches('{').count(), latex.matches('}').count());
+        assert_eq!(latex.matches('%').count(), latex.matches("\\%").count());
+        let csv = csv(&rows);
+        assert_eq!(csv.lines().count(), 1 + 2 * rows.len());
+        assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,828,0,26.1,,"), "{csv}");
+        let commas = |line: &str| line.replace("with, signs", "").matches(',').count();
+        assert!(csv.lines().all(|l| commas(l) == commas(csv.lines().next().unwrap())));
+    }
+}

@@ -1,0 +1,229 @@
+//! [`CleanUp`]: what can be done to a whole mask, as a value with its size in millimeters.
+
+use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+use super::morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
+use crate::grid::Mask;
+
+/// A kind of clean-up.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum CleanKind {
+    /// Sets what is enclosed.
+    FillHoles,
+    /// Keeps the largest island.
+    LargestIsland,
+    /// Removes islands smaller than a disc of this diameter.
+    DropSmall,
+    /// Removes what a disc of this radius does not fit into.
+    Open,
+    /// Fills what a disc of this radius does not fit into outside.
+    Close,
+    /// Each pixel as most of those within this radius.
+    Smooth,
+    /// Adds what is within this distance.
+    Grow,
+    /// Removes what is within this distance of the outside.
+    Shrink,
+    /// Removes islands that touch the edge of the image.
+    ClearBorder,
+    /// Leaves nothing: to begin anew.
+    Clear,
+}
+
+impl CleanKind {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::FillHoles => "Fill holes",
+            Self::LargestIsland => "Largest island",
+            Self::DropSmall => "Drop small",
+            Self::Open => "Open",
+            Self::Close => "Close",
+            Self::Smooth => "Smooth",
+            Self::Grow => "Grow",
+            Self::Shrink => "Shrink",
+            Self::ClearBorder => "Clear border",
+            Self::Clear => "Clear",
+        }
+    }
+
+    /// Whether it has a size.
+    pub fn is_sized(self) -> bool {
+        !matches!(self, Self::FillHoles | Self::LargestIsland | Self::ClearBorder | Self::Clear)
+    }
+}
+
+/// A clean-up.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CleanUp {
+    /// What is done.
+    pub kind: CleanKind,
+    /// Radius, distance or (of [`CleanKind::DropSmall`]) diameter, millimeters; without meaning where the kind has none.
+    pub size_mm: f64,
+}
+
+impl From<CleanKind> for CleanUp {
+    /// With a size of one millimeter.
+    fn from(kind: CleanKind) -> Self {
+        Self { kind, size_mm: 1.0 }
+    }
+}
+
+impl CleanUp {
+    /// The mask cleaned. A size that is no number, or smaller than a pixel, changes nothing.
+    #[must_use]
+    pub fn apply(self, mask: &Mask, px_per_mm: f64) -> Mask {
+        let px = (self.size_mm * px_per_mm).max(0.0);
+        match self.kind {
+            CleanKind::FillHoles => fill_holes(mask),
+            CleanKind::LargestIsland => largest_island(mask),
+            CleanKind::DropSmall => {
+                let area = (std::f64::consts::PI * px * px / 4.0).ceil();
+                if area.is_finite() { remove_islands(mask, area as usize) } else { mask.clone() }
+            }
+            CleanKind::Open => grow(&shrink(mask, px), px),
+            CleanKind::Close => {
+                // What is set stays set where the disc is cut by the edge of the image.
+                let closed = shrink(&grow(mask, px), px);
+                Mask::from_fn(mask.width(), mask.height(), |x, y| closed[(x, y)] || mask[(x, y)])
+            }
+            CleanKind::Smooth => smooth(mask, px),
+            CleanKind::Grow => grow(mask, px),
+            CleanKind::Shrink => shrink(mask, px),
+            CleanKind::ClearBorder => clear_border(mask),
+            CleanKind::Clear => mask.map(|_| false),
+        }
+    }
+}
+
+/// Each pixel as most of those within `radius_px`, those outside the image not counted; it stays as it is at a tie.
+fn smooth(mask: &Mask, radius_px: f64) -> Mask {
+    let (width, height) = (mask.width(), mask.height());
+    // Beyond the diagonal everything is reached.
+    let radius = radius_px.max(0.0).min((width + height) as f64);
+    let reach = radius.floor() as usize;
+    // Running sums along rows: a disc is then one subtraction per row.
+    let sums: Vec<u32> = (0..height)
+        .flat_map(|y| {
+            let row = mask.row(y).iter().scan(0u32, |sum, &on| {
+                *sum += u32::from(on);
+                Some(*sum)
+            });
+            std::iter::once(0).chain(row).collect::<Vec<_>>()
+        })
+        .collect();
+    let half: Vec<usize> =
+        (0..=reach).map(|dy| (radius * radius - (dy * dy) as f64).max(0.0).sqrt() as usize).collect();
+    Mask::from_fn(width, height, |x, y| {
+        let (mut on, mut all) = (0, 0);
+        for ny in y.saturating_sub(reach)..=(y + reach).min(height - 1) {
+            let half = half[ny.abs_diff(y)];
+            let (left, right) = (x.saturating_sub(half), (x + half).min(width - 1));
+            let row = ny * (width + 1);
+            on += sums[row + right + 1] - sums[row + left];
+            all += (right + 1 - left) as u32;
+        }
+        match (2 * on).cmp(&all) {
+            std::cmp::Ordering::Equal => mask[(x, y)],
+            order => order == std::cmp::Ordering::Greater,
+        }
+    })
+}
+
+fn clear_border(mask: &Mask) -> Mask {
+    let (labels, sizes) = islands(mask);
+    let (width, height) = (mask.width(), mask.height());
+    let mut touches = vec![false; sizes.len() + 1];
+    for y in 0..height {
+        for x in 0..width {
+            if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
+                touches[labels[(x, y)] as usize] = true;
+            }
+        }
+    }
+    labels.map(|&label| label != 0 && !touches[label as usize])
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+
+    fn count(mask: &Mask) -> usize {
+        mask.as_slice().iter().filter(|&&v| v).count()
+    }
+
+    fn clean(kind: CleanKind, size_mm: f64, mask: &Mask) -> Mask {
+        CleanUp { kind, size_mm }.apply(mask, 2.0)
+    }
+
+    /// A disc of 10 px, a speck, a whisker on the disc, a hole in it, and an island at the edge.
+    fn scene() -> Mask {
+        Mask::from_fn(60, 40, |x, y| {
+            let (dx, dy) = (x as f64 - 25.0, y as f64 - 20.0);
+            let disc = dx * dx + dy * dy <= 100.0 && (x, y) != (25, 20);
+            let whisker = (35..45).contains(&x) && y == 20;
+            disc || whisker || (x, y) == (50, 5) || x >= 57 && y > 30
+        })
+    }
+
+    #[test]
+    fn each_does_what_it_says() {
+        let scene = scene();
+        assert!(clean(CleanKind::FillHoles, f64::NAN, &scene)[(25, 20)]);
+        let largest = clean(CleanKind::LargestIsland, 0.0, &scene);
+        assert!(!largest[(50, 5)] && !largest[(58, 35)] && largest[(40, 20)]);
+        let dropped = clean(CleanKind::DropSmall, 1.0, &scene);
+        assert!(!dropped[(50, 5)] && dropped[(58, 35)], "27 px are more than a disc of 2 px across");
+        let opened = clean(CleanKind::Open, 1.0, &scene);
+        assert!(!opened[(42, 20)] && !opened[(50, 5)] && opened[(25, 12)]);
+        assert!(clean(CleanKind::Close, 1.0, &scene)[(25, 20)]);
+        let smooth = clean(CleanKind::Smooth, 1.0, &scene);
+        assert!(smooth[(25, 20)] && !smooth[(42, 20)] && !smooth[(50, 5)]);
+        let border = clean(CleanKind::ClearBorder, 0.0, &scene);
+        assert!(!border[(58, 35)] && border[(25, 12)] && border[(50, 5)]);
+        assert_eq!(count(&clean(CleanKind::Clear, 0.0, &scene)), 0);
+        assert!(count(&clean(CleanKind::Grow, 1.0, &scene)) > count(&scene));
+        assert!(count(&clean(CleanKind::Shrink, 1.0, &scene)) < count(&scene));
+    }
+
+    #[test]
+    fn a_size_below_a_pixel_or_none_changes_nothing_and_empty_masks_stay_empty() {
+        let scene = scene();
+        for kind in CleanKind::iter() {
+            assert_eq!(kind.key().parse(), Ok(kind));
+            if kind.is_sized() {
+                for size in [0.0, 0.2, -3.0, f64::NAN] {
+                    assert!(clean(kind, size, &scene) == scene, "{kind:?} {size}");
+                }
+            }
+            for size in [1.0, 1e300, f64::INFINITY] {
+                assert_eq!(count(&clean(kind, size, &Mask::filled(9, 7, false))), 0, "{kind:?} {size}");
+                assert_eq!(clean(kind, size, &Mask::filled(0, 0, false)).len(), 0);
+            }
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! [`Provenance`]: where the value of a pixel of a corrected mask comes from.
+
+use serde::{Deserialize, Serialize};
+
+use super::clean_up::CleanUp;
+use crate::frames::PlanarPose;
+use crate::hand::HandPose;
+use crate::units::{text_deg, text_mm};
+
+/// Which pose of the tool a CAD distance was measured at. Poses are `grasp_from_object`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum CadPose {
+    /// The true one.
+    Truth,
+    /// The one that a registration answered.
+    Registered(PlanarPose),
+    /// One that a person moved there.
+    Nudged(HandPose),
+}
+
+impl CadPose {
+    fn text(self) -> String {
+        let pose = |pose: PlanarPose| {
+            // On screen a pose has the lab's sign: that of its inverse.
+            let angle = text_deg(-pose.theta_rad);
+            format!("{angle}, y {}, z {}", text_mm(pose.y_m), text_mm(pose.z_m))
+        };
+        match self {
+            Self::Truth => "the true pose".into(),
+            Self::Registered(at) => format!("the registered pose ({})", pose(at)),
+            Self::Nudged(at) => format!("a pose moved by hand ({})", pose(at.planar)),
+        }
+    }
+}
+
+/// Where the value of a pixel comes from.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "snake_case")]
+pub enum Provenance {
+    /// Nothing: nobody and nothing said that it is contact.
+    #[default]
+    Nothing,
+    /// A person looked at it and painted it.
+    Hand {
+        /// Who.
+        person: String,
+    },
+    /// Imprint above a depth.
+    Threshold {
+        /// The depth, meters.
+        min_m: f32,
+    },
+    /// The deepest share of the pixels.
+    TopPercent {
+        /// The share, percent.
+        percent: f32,
+    },
+    /// Distance to the CAD model.
+    Cad {
+        /// The greatest distance of contact, meters.
+        within_m: f32,
+        /// Where the model lay.
+        at: CadPose,
+    },
+    /// A mask model.
+    Model {
+        /// Its name.
+        name: String,
+        /// The identity of its bundle: a hash of its files.
+        id: String,
+        /// The least probability of contact, where it is not the bundle's own.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        probability: Option<f32>,
+    },
+    /// The simulator.
+    Truth,
+    /// No contact: the imprint is flat.
+    Flat,
+    /// A depth, because what was asked found no contact.
+    Depth {
+        /// The depth, meters.
+        min_m: f32,
+        /// What was asked.
+        instead_of: String,
+    },
+    /// Grown from what a person painted.
+    Grown,
+    /// A copy of another mask.
+    Copied {
+        /// Of which, in words.
+        from: String,
+        /// How it was moved in the grasp frame before, where it was.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        moved: Option<PlanarPose>,
+    },
+    /// A clean-up of what was there.
+    CleanUp {
+        /// Which.
+        what: CleanUp,
+    },
+    /// A file that another program wrote.
+    Imported {
+        /// Its name.
+        file: String,
+    },
+    /// What a file says that knew no other provenance.
+    Told {
+        /// Its words.
+        text: String,
+    },
+}
+
+impl Provenance {
+    /// What a file says in words.
+    pub fn told(text: impl Into<String>) -> Self {
+        let text = text.into();
+        if text.is_empty() { Self::Nothing } else { Self::Told { text } }
+    }
+
+    /// A person, by name; an empty one where nobody knows.
+    pub fn hand(person: impl Into<String>) -> Self {
+        Self::Hand { person: person.into() }
+    }
+
+    /// Whether a person looked at this very pixel.
+    pub fn is_hand(&self) -> bool {
+        matches!(self, Self::Hand { .. })
+    }
+
+    /// In words, with its numbers; empty for nothing.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Nothing => String::new(),
+            Self::Hand { person } if person.is_empty() => "By hand".into(),
+            Self::Hand { person } => format!("By hand, {person}"),
+            Self::Threshold { min_m } => format!("Threshold {}", text_mm((*min_m).into())),
+            Self::TopPercent { percent } => format!("Top {percent:.1} %"),
+            Self::Cad { within_m, at: CadPose::Truth } => format!("CAD within {}", text_mm((*within_m).into())),
+            Self::Cad { within_m, at } => format!("CAD within {} at {}", text_mm((*within_m).into()), at.text()),
+            Self::Model { name, probability, .. } => {
+                // Many models have it in their names.
+                let kind = if name.contains("UNet") { "" } else { "UNet " };
+                let least = probability.map_or(String::new(), |least| format!(", probability {least}"));
+                format!("{kind}{name}{least}")
+            }
+            Self::Truth => "Simulator truth".into(),
+            Self::Flat => "No contact: the imprint is flat".into(),
+            Self::Depth { min_m, instead_of } => {
+                format!("Depth {}: {instead_of} found no contact", text_mm((*min_m).into()))
+            }
+            Self::Grown => "Grown from strokes".into(),
+            Self::Copied { from, moved: None } => from.clone(),
+            Self::Copied { from, moved: Some(by) } => {
+                let turned = text_deg(-by.theta_rad);
+                format!("{from}, carried by {turned}, y {}, z {}", text_mm(by.y_m), text_mm(by.z_m))
+            }
+            Self::CleanUp { what } if what.kind.is_sized() => {
+                format!("{}, {}", what.kind.name(), text_mm(what.size_mm * 1e-3))
+            }
+            Self::CleanUp { what } => what.kind.name().into(),
+            Self::Imported { file } => format!("Imported from {file}"),
+            Self::Told { text } => text.clone(),
+        }
+    }
+}

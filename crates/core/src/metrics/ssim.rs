@@ -1,0 +1,215 @@
+//! Structural similarity as the lab computes it, with a stated range.
+
+use crate::grid::Grid;
+
+use super::MetricError;
+use super::image::check_size;
+
+/// Pixels across the window.
+const WINDOW: usize = 11;
+/// Standard deviation of the window, pixels.
+const SIGMA: f64 = 1.5;
+const K1: f64 = 0.01;
+const K2: f64 = 0.03;
+
+/// The `L` of the formula; the score depends on it strongly (one pair: 0.13 or 0.82).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SsimRange {
+    /// A stated range, in the unit of the images: 0.0225 m for the lab's depth, 1 for images scaled to 0..1.
+    Explicit(f64),
+    /// The lab's: largest minus smallest value of the *prediction*. Label it; a flat prediction has none.
+    OfPrediction,
+}
+
+/// A structural similarity.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ssim {
+    /// The mean of the map, borders included.
+    pub mean: f64,
+    /// The score of each pixel, -1 to 1.
+    pub map: Grid<f32>,
+    /// Pixels that were not finite in one of the images and were counted as equal.
+    pub ignored: usize,
+}
+
+/// Structural similarity with an 11 × 11 Gaussian window (σ = 1.5), zero padding of 5 pixels, K1 = 0.01, K2 = 0.03.
+///
+/// A common offset is taken out before the variances are formed, so that they do not cancel.
+///
+/// # Errors
+/// [`MetricError::Size`], [`MetricError::Nothing`], and [`MetricError::Range`] for a range that is not positive
+/// (a flat prediction with [`SsimRange::OfPrediction`]).
+///
+/// # Source
+/// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against an independent
+/// implementation by `tests/data/ssim.json`.
+pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Result<Ssim, MetricError> {
+    let mut one = ssim_ranges(prediction, truth, &[range])?;
+    Ok(one.remove(0))
+}
+
+/// [`ssim`] for several ranges at hardly more than the cost of one.
+///
+/// # Errors
+/// As [`ssim`], if any of the ranges cannot be used.
+pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRange]) -> Result<Vec<Ssim>, MetricError> {
+    check_size(prediction, truth)?;
+    let valid = |p: f32, t: f32| p.is_finite() && t.is_finite();
+    let pairs = || prediction.as_slice().iter().zip(truth.as_slice()).map(|(&p, &t)| (p, t));
+    let used = pairs().filter(|&(p, t)| valid(p, t)).count();
+    if used == 0 {
+        return Err(MetricError::Nothing);
+    }
+    let offset = pairs().filter(|&(p, t)| valid(p, t)).map(|(_, t)| f64::from(t)).sum::<f64>() / used as f64;
+    let ranges: Vec<f64> = ranges
+        .iter()
+        .map(|range| match *range {
+            SsimRange::Explicit(range) => range,
+            SsimRange::OfPrediction => {
+                let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
+                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+            }
+        })
+        .collect();
+    if let Some(&range) = ranges.iter().find(|&&range| !(range > 0.0 && range.is_finite())) {
+        return Err(MetricError::Range(range));
+    }
+
+    let (width, height) = (prediction.width(), prediction.height());
+    // Ignored pixels take the truth's mean in both images.
+    let centered = |pick: fn((f32, f32)) -> f32| -> Vec<f64> {
+        pairs().map(|(p, t)| if valid(p, t) { f64::from(pick((p, t))) - offset } else { 0.0 }).collect()
+    };
+    let (p, t) = (centered(|(p, _)| p), centered(|(_, t)| t));
+    let product = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a * b).collect() };
+    // Outside the image the lab pads with zero, which is -offset once the offset is taken out.
+    let blur = |values: &[f64], outside: f64| convolve(values, width, height, outside);
+    let (mean_p, mean_t) = (blur(&p, -offset), blur(&t, -offset));
+    let squared = offset * offset;
+    let (pp, tt, pt) =
+        (blur(&product(&p, &p), squared), blur(&product(&t, &t), squared), blur(&product(&p, &t), squared));
+
+    let of_range = |&range: &f64| {
+        let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
+        let scores: Vec<f64> = (0..p.len())
+            .map(|i| {
+                let (mp, mt) = (mean_p[i], mean_t[i]);
+                let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
+                let (mp, mt) = (mp + offset, mt + offset);
+                (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
+            })
+            .collect();
+        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
+        Ssim { mean, map, ignored: p.len() - used }
+    };
+    Ok(ranges.iter().map(of_range).collect())
+}
+
+/// The normalized Gaussian of the window, one axis.
+fn window() -> [f64; WINDOW] {
+    let mut weights = std::array::from_fn(|i| {
+        let x = i as f64 - (WINDOW / 2) as f64;
+        (-x * x / (2.0 * SIGMA * SIGMA)).exp()
+    });
+    let sum: f64 = weights.iter().sum();
+    weights.iter_mut().for_each(|w| *w /= sum);
+    weights
+}
+
+/// The windowed mean of each pixel, with `outside` beyond the borders.
+fn convolve(values: &[f64], width: usize, height: usize, outside: f64) -> Vec<f64> {
+    let weights = window();
+    let pass = |source: &[f64], length: usize, stride: usize, start: usize, out: &mut [f64]| {
+        for i in 0..length {
+            out[start + i * stride] = weights
+                .iter()
+                .enumerate()
+                .map(|(k, w)| {
+                    let j = (i + k).wrapping_sub(WINDOW / 2);
+                    w * if j < length { source[start + j * stride] } else { outside }
+                })
+                .sum();
+        }
+    };
+    let mut rows = vec![0.0; values.len()];
+    for y in 0..height {
+        pass(values, width, 1, y * width, &mut rows);
+    }
+    let mut out = vec![0.0; values.len()];
+    for x in 0..width {
+        pass(&rows, height, width, x, &mut out);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::Value;
+
+    fn textured(offset: f32) -> (Grid<f32>, Grid<f32>) {
+        let truth = Grid::from_fn(31, 24, |x, y| offset + 0.01 * ((x as f32 * 0.4).sin() + (y as f32 * 0.3).cos()));
+        let prediction = Grid::from_fn(31, 24, |x, y| truth[(x, y)] + 0.002 * ((x * 7 + y * 5) % 11) as f32 - 0.01);
+        (prediction, truth)
+    }
+
+    #[test]
+    fn agrees_with_an_independent_implementation() {
+        let reference: Value = serde_json::from_str(include_str!("../../tests/data/ssim.json")).unwrap();
+        for case in reference["cases"].as_array().unwrap() {
+            let grid = |key: &str| {
+                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+                let size = |k: &str| case[k].as_u64().unwrap() as usize;
+                Grid::from_vec(size("width"), size("height"), data).unwrap()
+            };
+            let range = match case["range"].as_f64() {
+                Some(range) => SsimRange::Explicit(range),
+                None => SsimRange::OfPrediction,
+            };
+            let found = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
+            let expected = case["ssim"].as_f64().unwrap();
+            // Both sides work in f64 on the same f32 pixels.
+            assert!((found.mean - expected).abs() < 1e-9, "{} for {expected}", found.mean);
+        }
+    }
+
+    #[test]
+    fn an_image_equals_itself_and_a_constant_equals_a_constant() {
+        let (prediction, truth) = textured(0.01);
+        for image in [&prediction, &truth, &Grid::filled(5, 3, 0.09)] {
+            let found = ssim(image, image, SsimRange::Explicit(0.0225)).unwrap();
+            assert!((found.mean - 1.0).abs() < 1e-12);
+        }
+        let flat = Grid::filled(20, 20, 0.09f32);
+        assert_eq!(ssim(&flat, &truth, SsimRange::Explicit(1.0)).err().map(|e| e.to_string().is_empty()), Some(false));
+        assert!(matches!(ssim(&flat, &flat, SsimRange::OfPrediction), Err(MetricError::Range(r)) if r == 0.0));
+        assert!(ssim(&flat, &flat, SsimRange::Explicit(f64::NAN)).is_err());
+    }
+
+    #[test]
+    fn a_large_offset_does_not_spoil_the_variances() {
+        for offset in [0.0, 0.09, 1.0] {
+            let (prediction, truth) = textured(offset);
+            let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
+            assert!(found.map.as_slice().iter().all(|s| (-1.0..=1.0).contains(s)), "offset {offset}");
+        }
+        // In f64 from f64 images there is no rounding of the pixels: the f32 images must agree within their own.
+        let (prediction, truth) = textured(1.0);
+        let back = |g: &Grid<f32>| g.map(|v| v - 1.0);
+        let inner = |g: Ssim| f64::from(g.map[(15, 12)]);
+        let near = inner(ssim(&prediction, &truth, SsimRange::Explicit(2.0)).unwrap());
+        let far = inner(ssim(&back(&prediction), &back(&truth), SsimRange::Explicit(2.0)).unwrap());
+        assert!((near - far).abs() < 1e-2);
+    }
+
+    #[test]
+    fn invalid_pixels_are_counted() {
+        let (mut prediction, truth) = textured(0.0);
+        prediction[(3, 3)] = f32::NAN;
+        let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
+        assert!(found.ignored == 1 && found.mean.is_finite());
+        let none = Grid::filled(31, 24, f32::NAN);
+        assert_eq!(ssim(&none, &truth, SsimRange::Explicit(1.0)), Err(MetricError::Nothing));
+    }
+}

@@ -1,0 +1,494 @@
+//! [`ReadAs`]: data read otherwise than they are stored, because they were stored wrongly.
+//!
+//! Each undoes one mistake that files cannot show by themselves: fingers swapped, pictures mirrored, a sign, a factor,
+//! the channels of an image, the untouched image in place of the touched one. They are applied to a loaded [`Sample`], in
+//! order, so that everything that comes after sees what was felt.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::grid::RgbGrid;
+use super::sample::{ColorImages, ColorTouch, DepthTouch, PadTouch, Sample};
+use super::turn::Turn;
+
+/// Largest factor, and one over the smallest.
+const MOST: f64 = 1e4;
+
+/// How a picture is laid down anew; each is its own inverse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Lay {
+    /// Left becomes right.
+    MirrorColumns,
+    /// Up becomes down.
+    MirrorRows,
+    /// By 180 degrees.
+    Turn,
+}
+
+impl Lay {
+    /// The same as a turn.
+    pub fn turn(self) -> Turn {
+        match self {
+            Self::MirrorColumns => Turn { quarters: 0, mirrored: true },
+            Self::MirrorRows => Turn { quarters: 2, mirrored: true },
+            Self::Turn => Turn { quarters: 2, mirrored: false },
+        }
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::MirrorColumns => "mirrored left to right",
+            Self::MirrorRows => "mirrored top to bottom",
+            Self::Turn => "turned by 180°",
+        }
+    }
+}
+
+/// Which pictures of a depth sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Depths {
+    /// The imprints.
+    Imprints,
+    /// The imprints and the depths without contact.
+    Whole,
+}
+
+/// Which of the two images of a color sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Images {
+    /// The touched one.
+    Touch,
+    /// The untouched one.
+    Reference,
+    /// Both.
+    Both,
+}
+
+/// How a difference is stored in place of the touched image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Stored {
+    /// As it is, with its sign.
+    Signed,
+    /// With gray added.
+    Gray,
+    /// In 8 bits without a sign: what is negative went on at 255.
+    Wrapped,
+}
+
+/// One way to read data otherwise than they are stored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ReadAs {
+    /// The fingers' depth pictures in each other's place.
+    SwapFingers(Depths),
+    /// The depth pictures laid down otherwise.
+    Lay(Depths, Lay),
+    /// The depths times a factor.
+    Scale(Depths, f64),
+    /// The depth cameras' focal lengths and centers times a factor.
+    ScaleCamera(f64),
+    /// The true angle with the other sign.
+    NegateTheta,
+    /// The fingers' color images in each other's place.
+    ImageSwapFingers,
+    /// The color images laid down otherwise.
+    ImageLay(Lay),
+    /// Red and blue in each other's place.
+    ImageBgr(Images),
+    /// The images times 255.
+    Image255(Images),
+    /// The touched and the untouched image in each other's place.
+    ImageSwapReference,
+    /// The touched image as the difference.
+    ImageIsDifference(Stored),
+    /// The difference of 8-bit images that wrapped around: brought back to -128..127.
+    ImageUnwrap,
+}
+
+impl fmt::Display for ReadAs {
+    /// The key.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let whole = |depths: Depths| if depths == Depths::Whole { "whole-" } else { "" };
+        match *self {
+            Self::SwapFingers(depths) => write!(f, "{}swap-fingers", whole(depths)),
+            Self::Lay(depths, lay) => write!(f, "{}{}", whole(depths), <&str>::from(lay)),
+            Self::Scale(depths, factor) => write!(f, "{}scale-depth={factor}", whole(depths)),
+            Self::ScaleCamera(factor) => write!(f, "scale-camera={factor}"),
+            Self::NegateTheta => f.write_str("negate-theta"),
+            Self::ImageSwapFingers => f.write_str("image-swap-fingers"),
+            Self::ImageLay(lay) => write!(f, "image-{}", <&str>::from(lay)),
+            Self::ImageBgr(images) => write!(f, "image-bgr={}", <&str>::from(images)),
+            Self::Image255(images) => write!(f, "image-255={}", <&str>::from(images)),
+            Self::ImageSwapReference => f.write_str("image-swap-reference"),
+            Self::ImageIsDifference(stored) => write!(f, "image-is-difference={}", <&str>::from(stored)),
+            Self::ImageUnwrap => f.write_str("image-unwrap"),
+        }
+    }
+}
+
+/// The keys, for people.
+pub const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
+                        includes the depth without contact), scale-camera=FACTOR, negate-theta, image-swap-fingers, \
+                        image-mirror-columns, image-mirror-rows, image-turn, image-swap-reference, image-unwrap, \
+                        image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped)";
+
+impl FromStr for ReadAs {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let unknown = || format!("{:?} is no way to read data: there are {KEYS}", clip(text));
+        let (key, value) = text.split_once('=').map_or((text, None), |(key, value)| (key, Some(value)));
+        let (bare, depths) = key.strip_prefix("whole-").map_or((key, Depths::Imprints), |bare| (bare, Depths::Whole));
+        let factor = || {
+            let factor = value.and_then(|value| value.parse::<f64>().ok());
+            let factor = factor.filter(|f| (1.0 / MOST..=MOST).contains(f));
+            factor.ok_or_else(|| format!("{:?} takes a factor from {} to {MOST}", clip(text), 1.0 / MOST))
+        };
+        let images = || value.map_or(Ok(Images::Both), |value| value.parse().map_err(|_| unknown()));
+        Ok(match (bare, value) {
+            ("swap-fingers", None) => Self::SwapFingers(depths),
+            ("scale-depth", _) => Self::Scale(depths, factor()?),
+            ("scale-camera", _) if bare == key => Self::ScaleCamera(factor()?),
+            ("negate-theta", None) if bare == key => Self::NegateTheta,
+            ("image-swap-fingers", None) if bare == key => Self::ImageSwapFingers,
+            ("image-swap-reference", None) if bare == key => Self::ImageSwapReference,
+            ("image-unwrap", None) if bare == key => Self::ImageUnwrap,
+            ("image-bgr", _) if bare == key => Self::ImageBgr(images()?),
+            ("image-255", _) if bare == key => Self::Image255(images()?),
+            ("image-is-difference", Some(stored)) if bare == key => {
+                Self::ImageIsDifference(stored.parse().map_err(|_| unknown())?)
+            }
+            (lay, None) => match lay.strip_prefix("image-").filter(|_| bare == key) {
+                Some(lay) => Self::ImageLay(lay.parse().map_err(|_| unknown())?),
+                None => Self::Lay(depths, lay.parse().map_err(|_| unknown())?),
+            },
+            _ => return Err(unknown()),
+        })
+    }
+}
+
+/// Several keys, with commas or spaces between them.
+///
+/// # Errors
+/// The first that is none.
+pub fn parse_list(text: &str) -> Result<Vec<ReadAs>, String> {
+    let keys = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|key| !key.is_empty());
+    keys.map(str::parse).collect()
+}
+
+/// What is read so already, read so once more: what is its own opposite ends instead.
+pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
+    let own_opposite = !matches!(
+        more,
+        ReadAs::Scale(..)
+            | ReadAs::ScaleCamera(_)
+            | ReadAs::Image255(_)
+            | ReadAs::ImageIsDifference(_)
+            | ReadAs::ImageUnwrap
+    );
+    let mut all = known.to_vec();
+    match known.iter().rposition(|one| own_opposite && *one == more) {
+        Some(at) => drop(all.remove(at)),
+        None => all.push(more),
+    }
+    all
+}
+
+/// Several keys as [`parse_list`] reads them.
+pub fn list(read_as: &[ReadAs]) -> String {
+    read_as.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn clip(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
+impl ReadAs {
+    /// What is wrong with data that must be read so.
+    pub fn mistake(self) -> String {
+        let imprints = |depths: Depths| match depths {
+            Depths::Imprints => "the imprints",
+            Depths::Whole => "the imprints with their depths without contact",
+        };
+        let images = |images: Images| match images {
+            Images::Touch => "the touched images alone",
+            Images::Reference => "the untouched images alone",
+            Images::Both => "the color images",
+        };
+        match self {
+            Self::SwapFingers(depths) => format!("{} of the fingers are swapped", imprints(depths)),
+            Self::Lay(depths, lay) => format!("{} are {}", imprints(depths), lay.text()),
+            Self::Scale(depths, factor) => format!("{} are {} times too large", imprints(depths), 1.0 / factor),
+            Self::ScaleCamera(factor) => format!("the camera matrices are {} times too large", 1.0 / factor),
+            Self::NegateTheta => "theta has the other sign".into(),
+            Self::ImageSwapFingers => "the color images of the fingers are swapped".into(),
+            Self::ImageLay(lay) => format!("the color images are {}", lay.text()),
+            Self::ImageBgr(which) => format!("{} are in the order blue, green, red", images(which)),
+            Self::Image255(which) => format!("{} are on the scale 0..1", images(which)),
+            Self::ImageSwapReference => "touched and untouched images are swapped".into(),
+            Self::ImageIsDifference(stored) => {
+                let how = match stored {
+                    Stored::Signed => "with their sign",
+                    Stored::Gray => "with gray added",
+                    Stored::Wrapped => "in 8 bits without a sign",
+                };
+                format!("differences are stored as touched images, {how}")
+            }
+            Self::ImageUnwrap => "images were stored in too few bits and wrapped around".into(),
+        }
+    }
+
+    /// Reads a sample so. What it does not have stays absent.
+    pub fn apply(self, sample: &mut Sample) {
+        match self {
+            Self::SwapFingers(depths) => swap_depths(sample, depths),
+            Self::Lay(depths, lay) => each_depth(sample, |touch| {
+                touch.imprint = lay.turn().apply(&touch.imprint);
+                if let (Depths::Whole, Some(camera)) = (depths, &mut touch.camera) {
+                    camera.depth_reference = lay.turn().apply(&camera.depth_reference);
+                }
+            }),
+            Self::Scale(depths, factor) => each_depth(sample, |touch| {
+                let scaled = |d: &f32| (f64::from(*d) * factor) as f32;
+                touch.imprint = touch.imprint.map(scaled);
+                if let (Depths::Whole, Some(camera)) = (depths, &mut touch.camera) {
+                    camera.depth_reference = camera.depth_reference.map(scaled);
+                }
+            }),
+            Self::ScaleCamera(factor) => each_depth(sample, |touch| {
+                if let Some(k) = touch.camera.as_mut().map(|camera| &mut camera.intrinsics) {
+                    for number in [&mut k.fx, &mut k.fy, &mut k.cx, &mut k.cy] {
+                        *number *= factor;
+                    }
+                }
+            }),
+            Self::NegateTheta => {
+                // The lab stores the angle and place of the inverse: its place stays.
+                sample.grasp_from_object = sample.grasp_from_object.map(|pose| {
+                    let mut stored = pose.inverse();
+                    stored.theta_rad = -stored.theta_rad;
+                    stored.inverse()
+                });
+            }
+            Self::ImageSwapFingers => {
+                let colors: Vec<_> = sample.pads.iter().map(|touch| color_of(touch.as_ref())).collect();
+                if let [Some(_), Some(_)] = &colors[..] {
+                    for (touch, color) in sample.pads.iter_mut().zip(colors.into_iter().rev()) {
+                        if let (Some(touch), Some(color)) = (touch.as_mut().and_then(PadTouch::color_mut), color) {
+                            *touch = color;
+                        }
+                    }
+                }
+            }
+            Self::ImageLay(lay) => each_color(sample, |touch| {
+                touch.difference = lay.turn().apply(&touch.difference);
+                if let Some(images) = &mut touch.images {
+                    images.raw = lay.turn().apply(&images.raw);
+                    images.reference = lay.turn().apply(&images.reference);
+                }
+            }),
+            Self::ImageBgr(which) => of_images(sample, which, |pixel| pixel.swap(0, 2)),
+            Self::Image255(which) => of_images(sample, which, |pixel| pixel.iter_mut().for_each(|v| *v *= 255.0)),
+            Self::ImageSwapReference => each_color(sample, |touch| {
+                if let Some(ColorImages { raw, reference }) = &mut touch.images {
+                    std::mem::swap(raw, reference);
+                }
+                touch.difference = touch.difference.map(|p| p.map(|v| -v));
+            }),
+            Self::ImageIsDifference(stored) => each_color(sample, |touch| {
+                let Some(images) = touch.images.take() else { return };
+                touch.difference = images.raw.map(|pixel| {
+                    pixel.map(|v| match stored {
+                        Stored::Signed => v,
+                        Stored::Gray => v - 128.0,
+                        Stored::Wrapped => wrapped(v),
+                    })
+                });
+            }),
+            Self::ImageUnwrap => each_color(sample, |touch| {
+                touch.difference = touch.difference.map(|pixel| pixel.map(wrapped));
+                // The touched image that gives this difference.
+                if let Some(ColorImages { raw, reference }) = &mut touch.images {
+                    *reference = reference.map(|pixel| pixel.map(|v| v.rem_euclid(256.0)));
+                    *raw = sum(reference, &touch.difference);
+                }
+            }),
+        }
+    }
+
+    /// A sample read in all these ways, one after the other.
+    #[must_use]
+    pub fn all(read_as: &[Self], sample: &Sample) -> Sample {
+        let mut sample = sample.clone();
+        read_as.iter().for_each(|one| one.apply(&mut sample));
+        sample
+    }
+}
+
+/// The value modulo 256 that is nearest to 0.
+fn wrapped(v: f32) -> f32 {
+    (v + 128.0).rem_euclid(256.0) - 128.0
+}
+
+fn sum(a: &RgbGrid, b: &RgbGrid) -> RgbGrid {
+    let mut out = a.clone();
+    for (p, q) in out.as_mut_slice().iter_mut().zip(b.as_slice()) {
+        p.iter_mut().zip(q).for_each(|(p, q)| *p += q);
+    }
+    out
+}
+
+fn color_of(touch: Option<&PadTouch>) -> Option<ColorTouch> {
+    touch?.color().cloned()
+}
+
+fn each_depth(sample: &mut Sample, change: impl Fn(&mut DepthTouch)) {
+    for touch in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
+        change(touch);
+        // It was known of what is stored.
+        touch.truth = None;
+    }
+}
+
+fn each_color(sample: &mut Sample, change: impl Fn(&mut ColorTouch)) {
+    sample.pads.iter_mut().flatten().filter_map(PadTouch::color_mut).for_each(change);
+}
+
+/// Changes the pixels of one or both images, or those of the difference where there is nothing else.
+fn of_images(sample: &mut Sample, which: Images, change: impl Fn(&mut [f32; 3])) {
+    each_color(sample, |touch| {
+        let all = |image: &mut RgbGrid| image.as_mut_slice().iter_mut().for_each(&change);
+        let Some(ColorImages { raw, reference }) = &mut touch.images else {
+            if which == Images::Both {
+                all(&mut touch.difference);
+            }
+            return;
+        };
+        if which != Images::Reference {
+            all(raw);
+        }
+        if which != Images::Touch {
+            all(reference);
+        }
+        touch.difference = sum(raw, &reference.map(|p| p.map(|v| -v)));
+    });
+}
+
+/// Exchanges the depth pictures of the two fingers; cameras stay where they are.
+fn swap_depths(sample: &mut Sample, depths: Depths) {
+    let felt: Vec<Option<DepthTouch>> =
+        sample.pads.iter().map(|touch| touch.as_ref().and_then(PadTouch::depth).cloned()).collect();
+    let [Some(right), Some(left)] = &felt[..] else { return };
+    for (touch, other) in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut).zip([left, right]) {
+        touch.imprint = other.imprint.clone();
+        touch.truth = None;
+        if let (Depths::Whole, Some(camera), Some(others)) = (depths, &mut touch.camera, &other.camera) {
+            camera.depth_reference = others.depth_reference.clone();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+    use crate::catalog::tools;
+    use crate::rig::lab;
+    use crate::sim::{Grasp, SimConfig, simulate};
+
+    fn all() -> Vec<ReadAs> {
+        let mut all = vec![ReadAs::NegateTheta, ReadAs::ScaleCamera(1.25), ReadAs::ImageUnwrap];
+        for depths in [Depths::Imprints, Depths::Whole] {
+            all.extend([ReadAs::SwapFingers(depths), ReadAs::Scale(depths, 0.5)]);
+            all.extend(Lay::iter().map(|lay| ReadAs::Lay(depths, lay)));
+        }
+        all.extend([ReadAs::ImageSwapFingers, ReadAs::ImageSwapReference]);
+        all.extend(Lay::iter().map(ReadAs::ImageLay));
+        all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::ImageBgr));
+        all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::Image255));
+        all.extend([Stored::Signed, Stored::Gray, Stored::Wrapped].map(ReadAs::ImageIsDifference));
+        all
+    }
+
+    #[test]
+    fn what_is_written_is_read_and_nothing_else_is() {
+        for read_as in all() {
+            assert_eq!(read_as.to_string().parse(), Ok(read_as));
+            assert!(
+                KEYS.contains(read_as.to_string().trim_start_matches("whole-").split('=').next().unwrap()),
+                "{read_as}"
+            );
+            assert!(!read_as.mistake().is_empty());
+        }
+        assert_eq!(parse_list(&list(&all())), Ok(all()));
+        assert_eq!(parse_list(" \n"), Ok(Vec::new()));
+        for wrong in [
+            "swap",
+            "whole-negate-theta",
+            "scale-depth",
+            "scale-depth=0",
+            "scale-depth=NaN",
+            "scale-camera=1e9",
+            "turn=1",
+            "image-",
+        ] {
+            assert!(wrong.parse::<ReadAs>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn what_is_its_own_opposite_ends_what_was_said_before() {
+        let swap = ReadAs::SwapFingers(Depths::Imprints);
+        assert_eq!(also(&[swap, ReadAs::NegateTheta], swap), [ReadAs::NegateTheta]);
+        let half = ReadAs::Scale(Depths::Imprints, 0.5);
+        assert_eq!(also(&[half], half), [half, half]);
+    }
+
+    /// What can be compared of a sample.
+    fn felt(sample: &Sample) -> Vec<f32> {
+        let mut all = vec![sample.grasp_from_object.unwrap().theta_rad as f32];
+        for touch in sample.pads.iter().flatten() {
+            all.extend(touch.color().unwrap().difference.as_slice().iter().flatten());
+            let depth = touch.depth().unwrap();
+            let camera = depth.camera.as_ref().unwrap();
+            all.extend(depth.imprint.as_slice().iter().chain(camera.depth_reference.as_slice()));
+            all.push(camera.intrinsics.fx as f32);
+        }
+        all
+    }
+
+    #[test]
+    fn each_changes_something_and_mistakes_are_undone() {
+        let grasp = Grasp { theta_rad: 0.2, x_m: 0.002, y_m: -0.001 };
+        let sample = simulate(&tools()[1], grasp, 1, &SimConfig::default());
+        for read_as in all().into_iter().filter(|read_as| *read_as != ReadAs::ImageUnwrap) {
+            let once = ReadAs::all(&[read_as], &sample);
+            assert_ne!(felt(&once), felt(&sample), "{read_as}");
+            if also(&[read_as], read_as).is_empty() {
+                assert_eq!(felt(&ReadAs::all(&[read_as], &once)), felt(&sample), "{read_as}");
+            }
+        }
+        let twice = ReadAs::all(&[ReadAs::ScaleCamera(0.8), ReadAs::ScaleCamera(1.25)], &sample);
+        assert_eq!(felt(&twice), felt(&sample));
+        // Images in 8 bits with a sign: the difference comes back.
+        let mut wrong = sample.clone();
+        each_color(&mut wrong, |touch| {
+            let images = touch.images.clone().unwrap();
+            let [raw, reference] = [images.raw, images.reference].map(|image| image.map(|pixel| pixel.map(wrapped)));
+            *touch = ColorTouch::from_images(raw, reference).unwrap();
+        });
+        assert_ne!(felt(&wrong), felt(&sample));
+        assert_eq!(felt(&ReadAs::all(&[ReadAs::ImageUnwrap], &wrong)), felt(&sample));
+        // The place of the grasp stays where the sign of its angle changes.
+        let stored = ReadAs::all(&[ReadAs::NegateTheta], &sample).grasp_from_object.unwrap().inverse();
+        let before = sample.grasp_from_object.unwrap().inverse();
+        assert!((stored.y_m - before.y_m).abs() < 1e-12 && (stored.theta_rad + before.theta_rad).abs() < 1e-12);
+        // What is not there stays so.
+        let nothing = Sample::default();
+        all().iter().for_each(|read_as| assert!(ReadAs::all(&[*read_as], &nothing).pads.is_empty()));
+        assert!(sample.pad(lab::LEFT).unwrap().depth().unwrap().truth.is_some());
+    }
+}

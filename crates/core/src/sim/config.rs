@@ -1,0 +1,232 @@
+//! The simulated sensors' settings.
+
+use glam::DVec2;
+
+use crate::noise::{Noise, Stream};
+use crate::rig::lab;
+
+/// One pair of sensors.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SimConfig {
+    /// The Soft Bubbles.
+    pub bubble: BubbleConfig,
+    /// The GelSlims.
+    pub gelslim: GelSlimConfig,
+}
+
+/// A Soft Bubble and its depth camera. Lengths in meters.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BubbleConfig {
+    /// How far the dome would reach past the tool's surface if the tool were not there.
+    pub press_m: f64,
+    /// Height of the dome over its rim.
+    pub dome_rise_m: f64,
+    /// Semi-axes of the rim along y and z.
+    pub rim_semi_axes_m: [f64; 2],
+    /// Where the rim's center is along z.
+    pub rim_center_z_m: f64,
+    /// Share of the displaced air that stays in the bubble and makes the rest bulge, 0..1.
+    pub air_kept: f64,
+    /// Deviation of the camera's noise in one frame.
+    pub noise_m: f64,
+    /// Deviation of the slow distortion of one frame.
+    pub drift_m: f64,
+    /// Deviation of the fixed grain.
+    pub texture_m: f64,
+    /// Largest speckle.
+    pub speckle_m: f64,
+    /// Speckles per pixel.
+    pub speckle_density: f64,
+    /// Weight of each neighbor in the camera's blur, 0..0.33.
+    pub blur: f32,
+    /// Share of the pixels at a depth step that fly between its two sides.
+    pub flying_share: f64,
+    /// Share of pixels that are dropped and read 0.
+    pub dropped_share: f64,
+    /// Deviation of the calibration's translation error (the true camera is where the sample says plus this).
+    pub calibration_m: f64,
+    /// Deviation of the calibration's angle error, radians.
+    pub calibration_rad: f64,
+    /// Which sensor: the seed of its fixed texture.
+    pub texture_seed: u64,
+}
+
+impl Default for BubbleConfig {
+    fn default() -> Self {
+        Self {
+            press_m: 0.0123,
+            dome_rise_m: 0.0145,
+            rim_semi_axes_m: [0.046, 0.066],
+            rim_center_z_m: 0.006,
+            air_kept: 0.45,
+            noise_m: 0.000_6,
+            drift_m: 0.000_25,
+            texture_m: 0.000_5,
+            speckle_m: 0.002_2,
+            speckle_density: 0.012,
+            blur: 0.18,
+            flying_share: 0.35,
+            dropped_share: 0.000_3,
+            calibration_m: 0.0,
+            calibration_rad: 0.0,
+            texture_seed: 1,
+        }
+    }
+}
+
+/// A GelSlim. Lengths in meters, brightness on the 0..255 scale.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GelSlimConfig {
+    /// How deep the tool is pushed in.
+    pub indentation_m: f64,
+    /// Relative deviation of the depth from grasp to grasp.
+    pub indentation_spread: f64,
+    /// Deviation of the angle between gel and tool, radians.
+    pub tilt_rad: f64,
+    /// How much less deep the gel presses towards the tool's tip, radians.
+    pub lean_rad: f64,
+    /// Length over which the gel rises beside a dent.
+    pub decay_m: f64,
+    /// Blur of the surface.
+    pub smoothing_m: f64,
+    /// Directions of the red, green and blue LED in the picture, radians from +x (right) towards +y (down).
+    pub led_angle_rad: [f64; 3],
+    /// Brightness change per unit of slope, per channel.
+    pub led_gain: [f64; 3],
+    /// Relative brightness gained towards an LED, at the picture's edge.
+    pub led_falloff: f64,
+    /// Mean brightness without contact.
+    pub base: [f64; 3],
+    /// Largest change of brightness.
+    pub saturation: f64,
+    /// Darkening of steep slopes.
+    pub shadow: f64,
+    /// Slow color change from touch to touch.
+    pub color_drift: f64,
+    /// Distance of the markers.
+    pub marker_pitch_m: f64,
+    /// Radius of a marker.
+    pub marker_radius_m: f64,
+    /// Offset of the marker grid, in pitches.
+    pub marker_phase: [f64; 2],
+    /// Rotation of the marker grid, radians.
+    pub marker_angle_rad: f64,
+    /// Widening of the marker grid at the picture's edge, relative.
+    pub marker_fan: f64,
+    /// How much of the light a marker takes, 0..1.
+    pub marker_darkness: f64,
+    /// Sideways movement per unit slope of the bulk.
+    pub marker_push_m: f64,
+    /// Smoothing of the bulk.
+    pub spread_m: f64,
+    /// Deviation of the grasp's shear.
+    pub shear_m: f64,
+    /// Deviation of the grasp's twist, radians.
+    pub twist_rad: f64,
+    /// Deviation of the camera's noise.
+    pub noise: f64,
+    /// Which sensor: the seed of its fixed traits.
+    pub sensor_seed: u64,
+}
+
+impl Default for GelSlimConfig {
+    fn default() -> Self {
+        Self {
+            indentation_m: 0.001,
+            indentation_spread: 0.08,
+            tilt_rad: 0.012,
+            lean_rad: 0.0,
+            decay_m: 0.000_8,
+            smoothing_m: 0.000_08,
+            led_angle_rad: lab::GELSLIM_LED_ANGLE_RAD,
+            led_gain: lab::GELSLIM_LED_GAIN,
+            led_falloff: 0.16,
+            base: [78.0, 102.0, 147.0],
+            saturation: 150.0,
+            shadow: 14.0,
+            color_drift: 2.0,
+            marker_pitch_m: 0.001_42,
+            marker_radius_m: 0.000_135,
+            marker_phase: [0.2, 0.4],
+            marker_angle_rad: 0.01,
+            marker_fan: 0.10,
+            marker_darkness: 0.55,
+            marker_push_m: 0.000_65,
+            spread_m: 0.001_6,
+            shear_m: 0.000_12,
+            twist_rad: 0.012,
+            noise: 2.4,
+            sensor_seed: 1,
+        }
+    }
+}
+
+impl GelSlimConfig {
+    /// Unit vectors towards the LEDs, picture axes.
+    pub(super) fn led_directions(&self) -> [DVec2; 3] {
+        self.led_angle_rad.map(DVec2::from_angle)
+    }
+}
+
+impl SimConfig {
+    /// Another pair of sensors, drawn around the nominal one: for training that must not depend on one sensor.
+    pub fn randomised(seed: u64) -> Self {
+        let mut noise = Noise::new(seed, Stream::Config, 0);
+        let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
+        // Published imprints stay pushed in up to the wrist's edge of the picture and fall off in a sharp step at the tool's
+        // tip side: a longer dome than the nominal one, pressed deeper, whose middle lies nearer the wrist and whose rim
+        // nearer the tool. Its range is narrow, because a GelSlim image does not tell which bubble belongs to it: a wide
+        // range would only blur what is learnt.
+        let rim_center_z_m = noise.uniform(-0.026, -0.021);
+        let rim_semi_axes_m = [noise.uniform(0.051, 0.056), noise.uniform(0.084, 0.09)];
+        let lean_rad = noise.uniform(-0.015, 0.065);
+        let decay_m = noise.uniform(0.000_5, 0.001_6);
+        let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
+        let bubble = BubbleConfig {
+            press_m: around(0.0144, 0.05),
+            dome_rise_m: around(0.0155, 0.07),
+            rim_semi_axes_m,
+            rim_center_z_m,
+            air_kept: around(0.63, 0.1),
+            noise_m: around(b.noise_m, 0.4),
+            drift_m: around(b.drift_m, 0.6),
+            texture_m: around(b.texture_m, 0.4),
+            speckle_m: around(b.speckle_m, 0.4),
+            speckle_density: around(b.speckle_density, 0.5),
+            blur: around(0.12, 0.5) as f32,
+            flying_share: around(b.flying_share, 0.8),
+            dropped_share: around(b.dropped_share, 1.0),
+            calibration_m: b.calibration_m,
+            calibration_rad: b.calibration_rad,
+            texture_seed: seed ^ 0x5EED_B0BB,
+        };
+        let gelslim = GelSlimConfig {
+            indentation_m: around(g.indentation_m, 0.3),
+            indentation_spread: around(g.indentation_spread, 0.5),
+            tilt_rad: around(g.tilt_rad, 0.6),
+            lean_rad,
+            decay_m,
+            smoothing_m: around(g.smoothing_m, 0.6),
+            led_angle_rad: g.led_angle_rad.map(|a| a + around(1.0, 0.22) - 1.0),
+            led_gain: g.led_gain.map(|a| around(a, 0.35)),
+            led_falloff: around(g.led_falloff, 0.7),
+            base: g.base.map(|a| around(a, 0.15)),
+            saturation: around(g.saturation, 0.3),
+            shadow: around(g.shadow, 0.8),
+            color_drift: around(g.color_drift, 0.8),
+            marker_pitch_m: around(g.marker_pitch_m, 0.12),
+            marker_radius_m: around(g.marker_radius_m, 0.2),
+            marker_phase: [around(0.5, 1.0), around(0.5, 1.0)],
+            marker_angle_rad: around(1.0, 0.06) - 1.0,
+            marker_fan: around(g.marker_fan, 0.8),
+            marker_darkness: around(g.marker_darkness, 0.18),
+            marker_push_m: around(g.marker_push_m, 0.5),
+            spread_m: around(g.spread_m, 0.3),
+            shear_m: around(g.shear_m, 0.8),
+            twist_rad: around(g.twist_rad, 0.9),
+            noise: around(g.noise, 0.5),
+            sensor_seed: seed ^ 0x5EED_6E15,
+        };
+        Self { bubble, gelslim }
+    }
+}

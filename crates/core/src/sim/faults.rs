@@ -1,0 +1,124 @@
+//! Touches with one known fault each, to learn from: what a wrong model, a foreign body or a dead finger looks like.
+
+use glam::{DVec2, DVec3};
+
+use super::{Grasp, SimConfig, simulate};
+use crate::catalog::{Bar, ToolSpec, tools};
+use crate::mesh::TriMesh;
+use crate::rig::lab;
+use crate::sample::Sample;
+
+/// What is wrong with a touch.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::Display)]
+#[strum(serialize_all = "snake_case")]
+pub enum Fault {
+    /// The CAD model is that of another tool.
+    WrongCad,
+    /// A foreign body beside the tool presses into both bubbles: the contact mask gets a blob.
+    BlobInMask,
+    /// The left bubble felt nothing.
+    BlankFinger,
+    /// Nothing is broken, but a straight rod cannot tell where along itself it is held.
+    StraightRod,
+    /// The CAD model is in millimeters.
+    // Pairs are named after their fault, and labels after their pair: the name stays.
+    #[strum(serialize = "stl_in_millimetres")]
+    StlInMillimeters,
+}
+
+/// Seed of the noise; the faults differ by what is wrong, not by luck.
+const SEED: u64 = 0x00fa_0170;
+
+impl Fault {
+    /// The fault in a sentence, for the list of what was written.
+    pub fn what(self) -> &'static str {
+        match self {
+            Self::WrongCad => "the CAD model is another tool's",
+            Self::BlobInMask => "a foreign body beside the tool is felt too",
+            Self::BlankFinger => "the left bubble felt nothing",
+            Self::StraightRod => "a straight rod: its place along itself cannot be felt",
+            Self::StlInMillimeters => "the CAD model is in millimeters",
+        }
+    }
+
+    /// The tool in the hand, without what is wrong.
+    fn tool(self) -> ToolSpec {
+        let number = match self {
+            Self::WrongCad => 1,
+            Self::BlobInMask => 7,
+            Self::BlankFinger => 4,
+            Self::StraightRod => 5,
+            Self::StlInMillimeters => 0,
+        };
+        let mut tool = tools()[number].clone();
+        if self == Self::StraightRod {
+            // So long that neither end is felt.
+            tool.bars[0].core.iter_mut().for_each(|end| *end *= 2.5);
+        }
+        tool
+    }
+
+    /// How it is held.
+    fn grasp(self) -> Grasp {
+        Grasp { theta_rad: 11f64.to_radians(), x_m: 0.002, y_m: -0.001_5 }
+    }
+
+    /// The touch.
+    pub fn sample(self) -> Sample {
+        let mut felt = self.tool();
+        if self == Self::BlobInMask {
+            // As thick as the tool, between two of its arms.
+            felt.bars
+                .push(Bar { core: vec![DVec2::new(0.011, -0.016), DVec2::new(0.018, -0.020)], half_width_m: 0.004 });
+        }
+        let mut sample = simulate(&felt, self.grasp(), SEED, &SimConfig::default());
+        if self == Self::BlankFinger {
+            let bubble = sample.pads.get_mut(lab::LEFT).and_then(|touch| touch.depth_mut());
+            if let Some(bubble) = bubble {
+                bubble.imprint.as_mut_slice().fill(0.0);
+                if let Some(truth) = &mut bubble.truth {
+                    truth.imprint.as_mut_slice().fill(0.0);
+                    truth.contact.as_mut_slice().fill(false);
+                }
+            }
+        }
+        sample
+    }
+
+    /// The CAD model as a careless person supplies it: meters, object frame, unless that is what is wrong.
+    pub fn mesh(self) -> TriMesh {
+        let mut mesh = match self {
+            Self::WrongCad => tools()[0].mesh(),
+            _ => self.tool().mesh(),
+        };
+        if self == Self::StlInMillimeters {
+            mesh.vertices.iter_mut().for_each(|v: &mut DVec3| *v *= 1e3);
+        }
+        mesh
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rig::PadId;
+    use strum::IntoEnumIterator;
+
+    #[test]
+    fn each_touch_has_its_fault_and_only_that() {
+        for fault in Fault::iter() {
+            let sample = fault.sample();
+            let pushed = |finger: PadId| {
+                let bubble = sample.pad(finger).unwrap().depth().unwrap();
+                bubble.imprint.as_slice().iter().filter(|d| **d > 5e-3).count()
+            };
+            assert!(pushed(lab::RIGHT) > 500, "{fault}");
+            assert_eq!(pushed(lab::LEFT) == 0, fault == Fault::BlankFinger, "{fault}");
+            let mesh = fault.mesh();
+            let reach = mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
+            assert_eq!(reach > 1.0, fault == Fault::StlInMillimeters, "{fault}");
+            assert_eq!(mesh == fault.tool().mesh(), !matches!(fault, Fault::WrongCad | Fault::StlInMillimeters));
+        }
+        assert_eq!(Fault::WrongCad.to_string(), "wrong_cad");
+    }
+}

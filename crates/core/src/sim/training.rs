@@ -1,0 +1,134 @@
+//! Touches to train on: the catalog's tools and drawn ones, felt by nominal and by drawn sensors.
+
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::{BubbleConfig, Condition, SimConfig, random_grasp};
+use crate::catalog::{self, ToolSpec};
+use crate::sample::Sample;
+
+/// Share of drawn tools in [`Mix::Train`].
+const DRAWN_TOOLS: f64 = 0.4;
+/// Share of touches by nominal sensors in [`Mix::Train`].
+const NOMINAL: f64 = 0.4;
+
+/// What touches are drawn from.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    serde::Serialize,
+    strum::EnumIter,
+    strum::EnumString,
+    strum::IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum Mix {
+    /// The seen tools and drawn ones, most of them stretched and felt by drawn sensors; never an unseen tool.
+    #[default]
+    Train,
+    /// The same, felt by drawn sensors alone, with bubbles of any size pressed 2 to 15 mm deep: for contact masks only. A
+    /// GelSlim image does not tell how deep the bubble is pressed, so a generator would learn to draw the mean of all.
+    Depths,
+    /// The seen tools, felt by nominal sensors: for validation.
+    Seen,
+    /// The unseen tools, felt by nominal sensors: for validation.
+    Unseen,
+}
+
+/// A touch to train on.
+#[derive(Clone, Debug)]
+pub struct Drawn {
+    /// Both fingers, both sensors, with the truth.
+    pub sample: Sample,
+    /// The tool's place in the catalog; `None` for a drawn one.
+    pub tool: Option<usize>,
+    /// Whether the sensors are the nominal ones and the tool as the catalog has it.
+    pub nominal: bool,
+}
+
+/// Touch `index` of an endless list that `seed` draws; the same on every machine.
+pub fn training_touch(seed: u64, index: u64, mix: Mix, condition: Condition) -> Drawn {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(index));
+    let catalog = catalog::tools();
+    let train = matches!(mix, Mix::Train | Mix::Depths);
+    let tool = if train && rng.random_bool(DRAWN_TOOLS) {
+        None
+    } else {
+        let tools: Vec<usize> = (0..catalog.len()).filter(|&i| catalog[i].seen == (mix != Mix::Unseen)).collect();
+        Some(tools[rng.random_range(0..tools.len())])
+    };
+    let nominal = !train || rng.random_bool(if mix == Mix::Depths { 0.0 } else { NOMINAL });
+    let spec = tool.map_or_else(|| catalog::random_tool(rng.random()), |i| catalog[i].clone());
+    let spec = if nominal { spec } else { stretched(spec, &mut rng) };
+    let mut config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
+    if mix == Mix::Depths {
+        config.bubble = of_any_depth(config.bubble, &mut rng);
+    }
+    let (grasp, noise) = (random_grasp(rng.random()), rng.random());
+    let sample = condition.simulate(&condition.tool(&spec, index), grasp, noise, &config);
+    Drawn { sample, tool, nominal }
+}
+
+/// The tool with narrower bars, longer ones to the sides and towards the wrist and shorter ones at the tip, as the real tools
+/// have: most of their bars that lie across run out of the picture.
+fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
+    let side = rng.random_range(1.0..2.4);
+    let wrist = rng.random_range(0.95..1.3);
+    let tip = rng.random_range(0.15..0.9);
+    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
+        p.x *= side;
+        p.y *= if p.y > 0.0 { tip } else { wrist };
+    }
+    // Real bars are narrower than the catalog's, with sharper rims.
+    let width = rng.random_range(0.5..1.0);
+    tool.bars.iter_mut().for_each(|bar| bar.half_width_m *= width);
+    let bevel = rng.random_range(0.4..1.0);
+    tool.bevel_width_m *= bevel * width;
+    tool.bevel_depth_m *= bevel;
+    tool
+}
+
+/// The bubble in another size, pressed on as lightly or as hard as any gripper does; slower distortions weigh more where the
+/// imprint is shallow.
+fn of_any_depth(bubble: BubbleConfig, rng: &mut ChaCha8Rng) -> BubbleConfig {
+    let press_m = 0.002 * 7.5_f64.powf(rng.random_range(0.0..1.0));
+    let size = rng.random_range(0.55..1.0);
+    BubbleConfig {
+        press_m,
+        dome_rise_m: bubble.dome_rise_m * rng.random_range(0.5..1.1),
+        rim_semi_axes_m: bubble.rim_semi_axes_m.map(|a| a * size),
+        rim_center_z_m: bubble.rim_center_z_m * rng.random_range(-0.3..1.0),
+        air_kept: bubble.air_kept * rng.random_range(0.0..1.0),
+        noise_m: bubble.noise_m * rng.random_range(0.2..1.0),
+        texture_m: bubble.texture_m * rng.random_range(0.0..1.0),
+        speckle_density: bubble.speckle_density * rng.random_range(0.0..1.0),
+        dropped_share: if rng.random_bool(0.5) { bubble.dropped_share } else { rng.random_range(0.0..0.006) },
+        ..bubble
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_touch_depends_on_its_place_alone_and_unseen_tools_stay_unseen() {
+        let catalog = catalog::tools();
+        let drawn: Vec<Drawn> = (0..12).map(|i| training_touch(3, i, Mix::Train, Condition::Plain)).collect();
+        assert!(drawn.iter().filter_map(|d| d.tool).all(|tool| catalog[tool].seen));
+        assert!(drawn.iter().any(|d| d.tool.is_none()) && drawn.iter().any(|d| d.nominal != drawn[0].nominal));
+        let again = training_touch(3, 7, Mix::Train, Condition::Plain);
+        assert_eq!(again.sample.grasp_from_object, drawn[7].sample.grasp_from_object);
+        assert!(
+            drawn[7].sample.grasp_from_object
+                != training_touch(4, 7, Mix::Train, Condition::Plain).sample.grasp_from_object
+        );
+        let unseen = training_touch(3, 0, Mix::Unseen, Condition::Plain);
+        assert!(unseen.nominal && !catalog[unseen.tool.unwrap()].seen);
+    }
+}

@@ -1,0 +1,49 @@
+//! Whether a fit may become a bundle: [`objections`].
+
+use super::adapted::Adapted;
+use super::gather::Touch;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::fit::sound::{self, FoundPad, Objection};
+use touch2touch_core::fit::{Case, Fitted};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::{PadId, Rig};
+
+/// What a fit is judged by.
+pub(super) struct Evidence<'a> {
+    pub(super) rig: &'a Rig,
+    pub(super) touches: &'a [Touch],
+    pub(super) fitted: &'a Fitted,
+    /// What fits to the others make of each touch.
+    pub(super) unseen: &'a [Option<DepthMap>],
+    /// What an examination of the data found wrong with them.
+    pub(super) doubts: &'a [Problem],
+}
+
+/// What speaks against a fit, in words: its own figures, its scores, and what is known to be wrong with the data.
+pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<String> {
+    let Evidence { rig, touches, fitted, unseen, doubts } = *evidence;
+    let cases: Vec<Case<'_>> = touches.iter().map(Touch::case).collect();
+    let names: Vec<_> = rig.pads().map(|pad| rig.pad_key(pad)).collect();
+    let found = |pad: PadId| {
+        let correction = &*fitted.pads.get(pad)?.correction;
+        let there = touches.iter().find(|touch| touch.pad == pad).and_then(|touch| touch.to_window_px);
+        let window = there.zip(half_window(rig, pad, correction.mean.size())).map(|(there, reach)| [there, reach]);
+        Some(FoundPad { name: &names[pad.index()], correction, window })
+    };
+    let pads: Vec<Option<FoundPad<'_>>> = rig.pads().map(found).collect();
+    let mut all = sound::figures(&cases, &pads);
+    let angle = |scored: Option<&super::Scored>| scored.and_then(|scored| scored.angle);
+    let after = scores.after.as_ref().or(scores.closed_form.as_ref());
+    if let Some((before, after)) = angle(Some(&scores.before)).zip(angle(after)) {
+        all.extend(sound::angle(&before, &after));
+    }
+    all.extend(sound::strangers(&cases, unseen));
+    let wrong = doubts.iter().map(|p| format!("{} ({})", p.what, p.hint));
+    all.iter().map(Objection::to_string).chain(wrong).collect()
+}
+
+/// Half of the width and height of a pad's color window, in pixels of a picture of this size.
+fn half_window(rig: &Rig, pad: PadId, size: [usize; 2]) -> Option<[f64; 2]> {
+    let (window, full) = (rig.color_window(pad)?, rig.depth()?.size());
+    Some([0, 1].map(|i| window.size_px[i] / full[i].max(1) as f64 * size[i] as f64 / 2.0))
+}

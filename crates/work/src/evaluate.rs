@@ -1,0 +1,288 @@
+//! The paper's results table of a data set: generators, the measured imprints as the upper bound, and predictions that
+//! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
+//! studio's Evaluate pane both call [`evaluate`].
+
+mod apart;
+mod doubt;
+mod export;
+mod kept;
+mod load;
+mod methods;
+mod tool;
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use serde::Serialize;
+
+use crate::doubts;
+use crate::error::TaskError;
+use crate::infer::bundle::Origin;
+use crate::infer::engine::{EngineChoice, threads};
+use crate::io::dataset::Dataset;
+use crate::job::JobCx;
+use crate::mask::MaskChoice;
+use crate::models;
+use kept::Kept;
+use methods::Models;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::Sampler;
+use touch2touch_core::evaluation::{self, Group, Row, Scores};
+use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::sample::Scale;
+
+pub use export::{Report, export, rows};
+
+/// What it is called in errors.
+const WHAT: &str = "Evaluate";
+
+/// What to evaluate, and how.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Setup {
+    /// Generator bundles: a row each.
+    pub bundles: Vec<Origin>,
+    /// The mask model; without it there are no angles by [`MaskSource::Unet`](super::mask::MaskSource).
+    pub mask_bundle: Option<Origin>,
+    /// The tool classifier; without it neither accuracy nor Fréchet distance.
+    pub classifier: Option<Origin>,
+    /// Where the contact masks come from that nobody drew, for every method alike.
+    pub mask: MaskChoice,
+    /// Whether a mask drawn by hand is taken where there is one, for every method alike.
+    pub hand: bool,
+    /// The registration.
+    pub engine: RegistrationChoice,
+    /// How decoder outputs become meters.
+    pub shift: ShiftMode,
+    /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
+    pub steps: Option<u32>,
+    /// Seed instead of each bundle's own; every image starts from the same one.
+    pub seed: Option<u64>,
+    /// Sampler instead of each bundle's own.
+    pub sampler: Option<Sampler>,
+    /// The engine that runs the models.
+    #[serde(skip)]
+    pub runtime: EngineChoice,
+    /// At most so many grasps of each tool, spread evenly.
+    pub grasps_per_tool: Option<usize>,
+    /// Whether images of both fingers are compared, or only the right one's. Poses always come from both.
+    pub both_fingers: bool,
+    /// Images that go through a generator at once.
+    pub batch: usize,
+    /// Drawings for the intervals.
+    pub resamples: usize,
+}
+
+impl Default for Setup {
+    fn default() -> Self {
+        Self {
+            bundles: Vec::new(),
+            mask_bundle: None,
+            classifier: None,
+            mask: MaskChoice::default(),
+            hand: true,
+            engine: RegistrationChoice::default(),
+            shift: ShiftMode::default(),
+            steps: None,
+            seed: None,
+            sampler: None,
+            runtime: EngineChoice::default(),
+            grasps_per_tool: None,
+            both_fingers: true,
+            batch: 8,
+            resamples: 400,
+        }
+    }
+}
+
+/// Something that could not be scored.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Skipped {
+    /// The pair or the tool.
+    pub what: String,
+    /// By which method; empty for all.
+    pub method: String,
+    /// Why.
+    pub why: String,
+}
+
+/// The table with what is behind it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Evaluation {
+    /// The data set's title.
+    pub dataset: String,
+    /// The rows, the upper bound first.
+    pub rows: Vec<Row>,
+    /// The column groups.
+    pub groups: Vec<Group>,
+    /// What PSNR and SSIM mean.
+    pub conventions: &'static str,
+    /// What the columns mean, and what is missing and why.
+    pub notes: Vec<String>,
+    /// What is odd about the files, by kind.
+    pub findings: Vec<Finding>,
+    /// What was left out.
+    pub skipped: Vec<Skipped>,
+    /// Whether everything asked for was scored: false if stopped early.
+    pub complete: bool,
+    /// How.
+    pub setup: Setup,
+    /// The engine of the models and its threads.
+    pub runtime: String,
+    /// Time it took, seconds.
+    pub seconds: f64,
+    /// Every method's figures of every grasp.
+    #[serde(skip)]
+    pub scores: Vec<Scores>,
+}
+
+/// Scores every grasp of `dataset` by every method of `setup`. Figures that are kept beside `models` are not computed
+/// again, nor are predictions. Stops early when told to, with what was scored so far.
+///
+/// # Errors
+/// If a bundle cannot be used, nothing could be scored, or it was told to stop before anything was. Pairs and
+/// predictions that fail are left out and listed.
+pub fn evaluate(
+    dataset: &Dataset,
+    setup: &Setup,
+    models: &models::Models,
+    cx: &JobCx,
+) -> Result<Evaluation, TaskError> {
+    let start = Instant::now();
+    cx.progress(0, 0, "loading the models");
+    let sheets = models.sheets().clone();
+    let mut models = Models::open(setup, dataset, models)?;
+    let work = load::plan(dataset, setup);
+    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
+    if total == 0 {
+        return Err(TaskError::new(WHAT, "the data set has no pairs"));
+    }
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, false);
+    let missing = |tool: &ToolWork| ToolWork {
+        tool: tool.tool.clone(),
+        ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
+    };
+    let todo: Vec<ToolWork> = work.iter().map(missing).collect();
+    let fresh: usize = todo.iter().map(|tool| tool.ids.len()).sum();
+    if fresh > 0 {
+        models.load(setup)?;
+    }
+    let mut skipped = Vec::new();
+    let mut scores = models.empty_scores();
+    let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
+    findings.extend(doubts::notes(dataset));
+    let (mut done, mut scale) = (total - fresh, Scale::Measured);
+    let mut whole = work.iter();
+    load::ahead(dataset, setup, &todo, cx, |batch| {
+        let name = batch.work.tool.as_deref().unwrap_or("pictures");
+        let mut tool = tool::Tool::new(dataset, batch.work, &book, &mut skipped);
+        for cases in batch.cases {
+            if cx.cancel.is_cancelled() {
+                break;
+            }
+            let cases = match cases {
+                Ok(cases) => cases,
+                Err(mut bad) => {
+                    skipped.append(&mut bad);
+                    continue;
+                }
+            };
+            let loaded = cases.good.len() + cases.bad.len();
+            skipped.extend(cases.bad);
+            tool.score(&cases.good, setup, &mut models, &mut skipped, cx, &mut |method| {
+                cx.progress(done as u64, total as u64, format!("{name}, {method}"));
+            });
+            done += loaded;
+            cx.progress(done as u64, total as u64, name);
+        }
+        let ids = whole.next().map_or(&[][..], |tool| &tool.ids);
+        let mut again = |at: usize, ids: &[PairId]| tool::again(dataset, setup, &mut models.methods[at], ids, cx);
+        let entries = tool.finish(ids, &mut again, &mut scores, &mut skipped);
+        // Of each grasp once, whatever the number of methods.
+        let mut noted = BTreeSet::new();
+        for (at, entry) in entries {
+            if noted.insert(entry.score.pair.clone()) {
+                findings.extend(entry.notes);
+            }
+            scale = entry.score.scale;
+            for (why, count) in entry.otherwise {
+                *models.made_otherwise.entry((scores[at].method.clone(), why)).or_insert(0) += count;
+            }
+        }
+    });
+    let groups = evaluation::groups_of(scores.iter().flat_map(|s| &s.grasps));
+    if groups.is_empty() {
+        cx.check(WHAT)?;
+        let why = skipped.first().map_or("nothing could be scored".to_owned(), |s: &Skipped| {
+            format!("nothing could be scored; the first failure: {}: {}", s.what, s.why)
+        });
+        return Err(TaskError::new(WHAT, why));
+    }
+    cx.progress(total as u64, total as u64, "intervals");
+    scores.retain(|s| !s.grasps.is_empty());
+    let rows = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
+    let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
+    notes.append(&mut models.missing(setup, scale));
+    notes.append(&mut models.masks_made_otherwise());
+    Ok(Evaluation {
+        dataset: dataset.title.clone(),
+        rows,
+        groups,
+        conventions: evaluation::conventions(scale),
+        notes,
+        findings: findings.into_list(),
+        skipped,
+        complete: done == total && !cx.cancel.is_cancelled(),
+        setup: setup.clone(),
+        runtime: format!("{}, {} thread(s), {} images at a time", models.engine(), threads(), setup.batch.max(1)),
+        seconds: start.elapsed().as_secs_f64(),
+        scores,
+    })
+}
+
+/// The figures that are kept of the grasps of `dataset` by the methods of `setup`, without computing any but how far kept
+/// predictions with different seeds are apart. Their lab SSIM is in the range of the tool's predictions at the time.
+///
+/// # Errors
+/// If a bundle cannot be opened.
+pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Vec<Scores>, TaskError> {
+    let (all, sheets) = (models, models.sheets().clone());
+    let models = Models::open(setup, dataset, models)?;
+    let work = load::plan(dataset, setup);
+    let book = Kept::open(dataset, setup, &models, &sheets, &work, true);
+    let mut scores = models.empty_scores();
+    for (at, scores) in scores.iter_mut().enumerate() {
+        let mut entries: Vec<_> = work.iter().flat_map(|tool| book.of(at, &tool.ids)).collect();
+        if scores.upper_bound {
+            apart::put(&mut entries, dataset, setup, &models, all);
+        }
+        scores.grasps = entries.into_iter().map(|(_, entry)| entry.score).collect();
+    }
+    Ok(scores)
+}
+
+/// The pairs of one tool.
+#[derive(Clone, Debug, PartialEq)]
+struct ToolWork {
+    tool: Option<String>,
+    ids: Vec<PairId>,
+}
+
+/// At most `limit` of the pairs, spread evenly.
+fn spread(ids: &[PairId], limit: Option<usize>) -> Vec<PairId> {
+    match limit {
+        Some(n) if n < ids.len() => (0..n).map(|i| ids[i * ids.len() / n]).collect(),
+        _ => ids.to_vec(),
+    }
+}
+
+/// The pairs by tool, in the order of the index.
+fn by_tool(dataset: &Dataset) -> BTreeMap<Option<String>, Vec<PairId>> {
+    let mut tools: BTreeMap<Option<String>, Vec<PairId>> = BTreeMap::new();
+    for (id, entry) in (0u32..).zip(&dataset.index.pairs) {
+        tools.entry(entry.tool.clone()).or_default().push(PairId(id));
+    }
+    tools
+}

@@ -1,0 +1,136 @@
+//! Reading pairs while the ones before are scored.
+
+use std::sync::mpsc::sync_channel;
+
+use rayon::prelude::*;
+
+use super::{Setup, Skipped, ToolWork, by_tool, spread};
+use crate::error::TaskError;
+use crate::io::dataset::{Dataset, SourceKind};
+use crate::job::JobCx;
+use crate::labels::{Labels, PairLabels};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::Group;
+use touch2touch_core::grid::Grid;
+use touch2touch_core::sample::{Sample, Scale};
+
+/// A loaded pair.
+pub(super) struct Case {
+    pub(super) id: PairId,
+    pub(super) name: String,
+    pub(super) group: Group,
+    /// Whether its GelSlim picture is clipped, of pictures.
+    pub(super) clipped: Option<bool>,
+    pub(super) sample: Sample,
+    /// What people drew, where that is to be taken.
+    pub(super) labels: Option<PairLabels>,
+    /// The bubble picture as it is in its file, and the lab's prediction of it, where the source has pictures.
+    pub(super) tile: Option<Grid<f32>>,
+    pub(super) lab: Option<Grid<f32>>,
+}
+
+/// Some pairs of a tool that are scored together.
+pub(super) struct Cases {
+    pub(super) good: Vec<Case>,
+    pub(super) bad: Vec<Skipped>,
+}
+
+/// The pairs of a tool, as they arrive.
+pub(super) struct Batch<'a> {
+    pub(super) work: &'a ToolWork,
+    pub(super) cases: Box<dyn Iterator<Item = Result<Cases, Vec<Skipped>>> + 'a>,
+}
+
+/// What people drew, where that is to be taken.
+pub(super) struct Labeled(Option<Labels>);
+
+impl Labeled {
+    pub(super) fn of(dataset: &Dataset, setup: &Setup) -> Self {
+        Self(setup.hand.then(|| Labels::of(dataset)))
+    }
+
+    /// Nobody's.
+    pub(super) fn none() -> Self {
+        Self(None)
+    }
+
+    pub(super) fn load(&self, name: &str) -> Result<Option<PairLabels>, TaskError> {
+        self.0.as_ref().map(|labels| labels.load(name)).transpose()
+    }
+}
+
+/// What is to be scored, tool by tool.
+pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
+    by_tool(dataset)
+        .into_iter()
+        .map(|(tool, ids)| ToolWork { tool, ids: spread(&ids, setup.grasps_per_tool) })
+        .collect()
+}
+
+/// Calls `score` for each tool with its pairs; the next ones are read meanwhile, on all cores.
+pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &JobCx, mut score: impl FnMut(Batch<'_>)) {
+    // Both fingers of a grasp go through the generator together.
+    let grasps = setup.batch.div_ceil(2).max(1);
+    let labels = &Labeled::of(dataset, setup);
+    std::thread::scope(|scope| {
+        let (sender, receiver) = sync_channel(1);
+        scope.spawn(move || {
+            for ids in work.iter().flat_map(|tool| tool.ids.chunks(grasps)) {
+                if cx.cancel.is_cancelled() {
+                    return;
+                }
+                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
+                let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
+                for one in loaded {
+                    match one {
+                        Ok(case) => cases.good.push(case),
+                        Err(bad) => cases.bad.push(bad),
+                    }
+                }
+                // Nobody listens any more: the evaluation was stopped.
+                if sender.send(cases).is_err() {
+                    return;
+                }
+            }
+        });
+        for tool in work {
+            let chunks = tool.ids.len().div_ceil(grasps);
+            let lost = || {
+                vec![Skipped {
+                    what: tool.tool.clone().unwrap_or_default(),
+                    method: String::new(),
+                    why: "its pairs could not be read: the reading ended early".into(),
+                }]
+            };
+            let cases = (0..chunks).map(|_| receiver.recv().map_err(|_| lost()));
+            score(Batch { work: tool, cases: Box::new(cases) });
+            if cx.cancel.is_cancelled() {
+                break;
+            }
+        }
+    });
+}
+
+/// Reads one pair.
+pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<Case, Skipped> {
+    let Some(entry) = dataset.index.get(id) else {
+        return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
+    };
+    let skip = |why: String| Skipped { what: entry.name.clone(), method: String::new(), why };
+    let fail = |err: crate::io::dataset::LoadError| skip(format!("{err} ({})", err.hint()));
+    let sample = dataset.load(id).map_err(fail)?;
+    if sample.pads.iter().flatten().all(|t| t.color().is_none() || t.depth().is_none()) {
+        return Err(skip("no finger has both a GelSlim image and a measured imprint".into()));
+    }
+    let labels = labels.load(&entry.name).map_err(|err| skip(err.to_string()))?;
+    let pictures = sample.scale == Scale::Assumed;
+    let (tile, lab, clipped) = if pictures {
+        let clipped = dataset.gelslim_is_clipped(id).map_err(fail)?;
+        let laid = sample.laid;
+        (dataset.bubble_tile(id, laid).map_err(fail)?, dataset.vqvae_tile(id, laid).map_err(fail)?, clipped)
+    } else {
+        (None, None, None)
+    };
+    let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
+    Ok(Case { id, name: entry.name.clone(), group, clipped, sample, labels, tile, lab })
+}

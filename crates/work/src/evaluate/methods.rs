@@ -1,0 +1,348 @@
+//! The models of an evaluation, and what each method makes of a few touches.
+
+use std::collections::BTreeMap;
+
+use super::load::Case;
+use super::{Setup, WHAT};
+use crate::bundles::{self, BundleInfo, BundleKind};
+use crate::error::TaskError;
+use crate::imprint;
+use crate::infer::bundle::{Bundle, Origin};
+use crate::infer::classifier::ToolClassifier;
+use crate::infer::engine::{EngineChoice, resolve};
+use crate::io::dataset::{Dataset, SourceKind};
+use crate::job::JobCx;
+use crate::labels::ImprintOf;
+use crate::mask::{MaskRecipe, MaskSource};
+use crate::models;
+use crate::predict::Generating;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::evaluation::Scores;
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::{PadId, PerPad, SensorKind};
+use touch2touch_core::sample::Sample;
+use touch2touch_core::sample::Scale;
+use touch2touch_core::turn::Turn;
+
+/// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
+const LOOKED_AT: u32 = 16;
+
+/// What stands for one row of the table.
+pub(super) enum Method {
+    /// The measured imprints themselves: the upper bound of everything behind them.
+    Measured,
+    /// A bundle.
+    Generator(Box<GeneratorMethod>),
+    /// Predictions that lie by the pictures.
+    Stored,
+}
+
+pub(super) struct GeneratorMethod {
+    name: String,
+    bundle: BundleInfo,
+    /// Of its own: one generator is in memory at a time, and the methods take turns.
+    models: models::Models,
+    engine: EngineChoice,
+    config: GenerateConfig,
+}
+
+/// What a method makes of one touch.
+pub(super) struct Made {
+    /// Imprints in meters, raw orientation, by finger.
+    pub(super) imprints: PerPad<DepthMap>,
+    /// Differences of a color sensor, 0..255 scale, by finger.
+    pub(super) colors: PerPad<RgbGrid>,
+    /// Predictions in meters as the picture of their sensor lies and as large as its file, where there are files.
+    pub(super) pictures: PerPad<DepthMap>,
+    /// A picture in the orientation and size of its file, where that is all there is.
+    pub(super) tile: Option<Grid<f32>>,
+    /// Time per image, seconds.
+    pub(super) seconds: Option<f64>,
+}
+
+/// Everything that runs.
+pub(super) struct Models {
+    pub(super) methods: Vec<Method>,
+    /// Where the mask model is run.
+    pub(super) masks: models::Models,
+    pub(super) mask_bundle: Option<BundleInfo>,
+    /// The classifier's bundle; the model once it was needed.
+    classifier_bundle: Option<Bundle>,
+    pub(super) classifier: Option<ToolClassifier>,
+    runtime: EngineChoice,
+    engine: String,
+    /// How many masks were not made of the source that was asked, by row and reason.
+    pub(super) made_otherwise: BTreeMap<(String, String), usize>,
+}
+
+fn open(origin: &Origin) -> Result<Bundle, TaskError> {
+    Bundle::open(origin).map_err(|err| TaskError::from_error(format!("{WHAT}: {origin}"), &err))
+}
+
+/// A bundle of a kind.
+fn found(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
+    bundles::open(&format!("{WHAT}: {origin}"), origin)?.of_kind(kind, WHAT)
+}
+
+impl Models {
+    /// Finds everything that the setup names; [`Self::load`] loads it.
+    pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
+        let mut methods = Vec::new();
+        let pictures = dataset.kind == SourceKind::Pictures;
+        if !pictures {
+            methods.push(Method::Measured);
+        }
+        let fail = |err: &dyn std::error::Error| TaskError::from_error(WHAT, err);
+        let engine = resolve(setup.runtime).map_err(|err| fail(&err))?.label().to_owned();
+        let mut names: Vec<String> = Vec::new();
+        for origin in &setup.bundles {
+            let bundle = found(origin, BundleKind::Generator)?;
+            let info = bundle.generator.as_ref();
+            let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} declares no generator")))?;
+            info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?;
+            let (defaults, name) = (info.defaults, bundle.name.clone());
+            let config = GenerateConfig {
+                steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
+                seed: setup.seed.unwrap_or(defaults.seed),
+                sampler: setup.sampler.unwrap_or(defaults.sampler),
+                ..defaults
+            };
+            // Two runs of one trainer have the same name: their folders tell them apart.
+            let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
+            names.push(name.clone());
+            let (models, engine) = (models.beside(), setup.runtime);
+            methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config })));
+        }
+        let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
+        if pictures && (0..LOOKED_AT).any(stored) {
+            methods.push(Method::Stored);
+        }
+        let mask_bundle = match &setup.mask_bundle {
+            Some(origin) if !pictures => Some(found(origin, BundleKind::Mask)?),
+            _ => None,
+        };
+        let classifier_bundle = setup.classifier.as_ref().filter(|_| !pictures).map(open).transpose()?;
+        Ok(Self {
+            methods,
+            masks: models.beside(),
+            mask_bundle,
+            classifier_bundle,
+            classifier: None,
+            runtime: setup.runtime,
+            engine,
+            made_otherwise: BTreeMap::new(),
+        })
+    }
+
+    /// Loads all models, so that one that cannot be used is known before the first touch.
+    pub(super) fn load(&mut self, setup: &Setup) -> Result<(), TaskError> {
+        for method in &self.methods {
+            if let Method::Generator(method) = method {
+                method.models.load(&method.bundle, method.engine)?;
+            }
+        }
+        if let (Some(bundle), MaskSource::Auto | MaskSource::Unet) = (&self.mask_bundle, setup.mask.source) {
+            self.masks.load(bundle, setup.runtime)?;
+        }
+        if let Some(bundle) = &self.classifier_bundle {
+            let opened = ToolClassifier::open(bundle, self.runtime);
+            self.classifier = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
+        }
+        Ok(())
+    }
+
+    /// The methods without grasps.
+    pub(super) fn empty_scores(&self) -> Vec<Scores> {
+        let empty = |method: &Method| Scores {
+            method: method.name().to_owned(),
+            upper_bound: matches!(method, Method::Measured),
+            grasps: Vec::new(),
+            measured_features: Vec::new(),
+        };
+        self.methods.iter().map(empty).collect()
+    }
+
+    /// The generators among the methods.
+    pub(super) fn generators(&self) -> Vec<BundleInfo> {
+        let bundle = |method: &Method| match method {
+            Method::Generator(method) => Some(method.bundle.clone()),
+            Method::Measured | Method::Stored => None,
+        };
+        self.methods.iter().filter_map(bundle).collect()
+    }
+
+    /// The identity of the classifier's bundle.
+    pub(super) fn classifier_hash(&self) -> Option<&str> {
+        self.classifier_bundle.as_ref().map(Bundle::hash)
+    }
+
+    /// The engine's name.
+    pub(super) fn engine(&self) -> &str {
+        &self.engine
+    }
+
+    /// Masks that were not made of the source that was asked, in words.
+    pub(super) fn masks_made_otherwise(&self) -> Vec<String> {
+        let line = |((method, why), count): (&(String, String), &usize)| format!("{method}: {count} masks {why}");
+        self.made_otherwise.iter().map(line).collect()
+    }
+
+    /// What is missing from the table, and why.
+    pub(super) fn missing(&self, setup: &Setup, scale: Scale) -> Vec<String> {
+        let mut notes = vec![if setup.both_fingers {
+            "images of both fingers; one angle per grasp, from the contact of both".to_owned()
+        } else {
+            "images of the right finger only; one angle per grasp, from the contact of both".to_owned()
+        }];
+        for method in &self.methods {
+            if let Method::Generator(method) = method
+                && method.bundle.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Color)
+            {
+                notes.push(format!(
+                    "{}: predicts a color picture; PSNR and SSIM are of the difference image on the 0..255 scale, peak \
+                     and range 255; no angle, tool or Fréchet distance, which need depth",
+                    method.name
+                ));
+            }
+        }
+        if scale == Scale::Assumed {
+            notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
+            return notes;
+        }
+        let recipe = setup.mask.recipe(self.mask_bundle.as_ref().map(|bundle| &bundle.id));
+        notes.push(match recipe {
+            None => "no mask model: no angle".into(),
+            Some(MaskRecipe::Unet(_, least)) => {
+                let from = least.map_or(String::new(), |p| format!(" from probability {} on", p.get()));
+                format!("contact masks of the mask model{from}, for measured and predicted imprints alike")
+            }
+            Some(MaskRecipe::Cad(_)) => {
+                "contact masks of the CAD model at the true pose: the truth leaks into every angle".into()
+            }
+            Some(MaskRecipe::Truth) => {
+                "contact masks of the simulator's truth: the truth leaks into every angle".into()
+            }
+            Some(MaskRecipe::Threshold(m)) => format!("contact masks: imprint deeper than {:.1} mm", m.get() * 1e3),
+            Some(MaskRecipe::TopPercent(percent)) => {
+                format!("contact masks: the deepest {:.1} % of each imprint", percent.get())
+            }
+        });
+        if self.classifier_bundle.is_none() {
+            notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
+        }
+        notes
+    }
+}
+
+impl Method {
+    /// The name of the row.
+    pub(super) fn name(&self) -> &str {
+        match self {
+            Self::Measured => "Measured (upper bound)",
+            Self::Generator(method) => &method.name,
+            Self::Stored => "Stored predictions (lab's VQ-VAE)",
+        }
+    }
+
+    /// What its imprints are, for masks that were drawn on them.
+    pub(super) fn of(&self, setup: &Setup) -> Option<ImprintOf> {
+        match self {
+            Self::Measured => Some(ImprintOf::Measured),
+            Self::Stored => None,
+            Self::Generator(method) => Some(ImprintOf::predicted(&method.bundle.id, &method.config, setup.shift)),
+        }
+    }
+
+    /// Everything that decides what it makes of a touch, as text.
+    pub(super) fn recipe(&self, setup: &Setup) -> String {
+        match self {
+            Self::Measured => "measured".into(),
+            Self::Stored => "stored".into(),
+            Self::Generator(method) => {
+                // The input is the touch's: the key of the line has it.
+                let kind = resolve(method.engine).map_or_else(|err| err.to_string(), |kind| format!("{kind:?}"));
+                let (bundle, config, fit) = (&method.bundle.id, method.config, &method.bundle.generator);
+                let fit = fit.as_ref().and_then(|info| info.fit.as_ref());
+                format!("{bundle} {kind} {config:?} {:?} {fit:?}", setup.shift)
+            }
+        }
+    }
+
+    /// What it makes of each touch, or why not; `None` once it was told to stop.
+    pub(super) fn make(&mut self, cases: &[&Case], setup: &Setup, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+        Some(match self {
+            Self::Measured => cases.iter().map(|case| Ok(measured(case))).collect(),
+            Self::Stored => cases.iter().map(|case| stored(case)).collect(),
+            Self::Generator(method) => return method.make(cases, setup.shift, cx),
+        })
+    }
+}
+
+fn measured(case: &Case) -> Made {
+    let imprints = imprint::measured(&case.sample);
+    Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None, seconds: None }
+}
+
+fn stored(case: &Case) -> Result<Made, String> {
+    let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
+    Ok(Made {
+        imprints: PerPad::default(),
+        colors: PerPad::default(),
+        pictures: PerPad::default(),
+        tile: Some(tile),
+        seconds: None,
+    })
+}
+
+impl GeneratorMethod {
+    fn make(&mut self, cases: &[&Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+        let generating = Generating { bundle: &self.bundle, engine: self.engine, config: &self.config };
+        let samples: Vec<&Sample> = cases.iter().map(|case| &case.sample).collect();
+        let predictions = match generating.pairs(&self.models, &samples, &cx.quiet()) {
+            Ok(predictions) => predictions?,
+            Err(err) => return Some(cases.iter().map(|_| Err(err.why.clone())).collect()),
+        };
+        let mut made: Vec<Result<Made, String>> = cases
+            .iter()
+            .map(|_| {
+                Ok(Made {
+                    imprints: PerPad::default(),
+                    colors: PerPad::default(),
+                    pictures: PerPad::default(),
+                    tile: None,
+                    seconds: None,
+                })
+            })
+            .collect();
+        let each = predictions.into_iter().enumerate().flat_map(|(at, pads)| {
+            let pads = pads.into_iter().enumerate();
+            pads.filter_map(move |(pad, made)| Some((at, PadId::new(pad), made?)))
+        });
+        for (at, finger, prediction) in each {
+            let sample = &cases[at].sample;
+            let picture = prediction.and_then(|prediction| {
+                let seconds = prediction.seconds;
+                let measured = sample.pad(finger).and_then(|t| t.color()).map_or([0, 0], |c| c.difference.size());
+                if let Some(color) = imprint::color(&prediction, measured)? {
+                    return Ok((seconds, None, Some(color), None));
+                }
+                let tile = cases[at].tile.as_ref().map(Grid::size);
+                let picture = tile.map(|size| imprint::picture_of(&prediction, shift, sample, finger, size));
+                let depth = imprint::imprint_of(&prediction, shift, sample, finger)?;
+                Ok((seconds, Some(depth), None, picture.transpose()?))
+            });
+            match (picture, &mut made[at]) {
+                (Ok((seconds, depth, color, picture)), Ok(made)) => {
+                    // The images of one call took as long each; kept ones took what they took when they were made.
+                    made.seconds = Some(made.seconds.map_or(seconds, |first| 0.5 * (first + seconds)));
+                    (made.imprints[finger], made.colors[finger], made.pictures[finger]) = (depth, color, picture);
+                }
+                (Err(err), slot) => *slot = Err(err.why),
+                (Ok(_), Err(_)) => {}
+            }
+        }
+        Some(made)
+    }
+}

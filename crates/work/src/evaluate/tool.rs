@@ -1,0 +1,438 @@
+//! Scoring the grasps of one tool: image figures wait until all its predictions are there, because the lab's SSIM takes
+//! its range from them.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use rayon::prelude::*;
+
+use super::doubt::Seen;
+use super::kept::{Entry, Kept};
+use super::load::{Case, Labeled, load};
+use super::methods::{Made, Method, Models};
+use super::{Setup, Skipped, ToolWork, apart};
+use crate::cloud::contact_points;
+use crate::compare::as_tile;
+use crate::error::TaskError;
+use crate::infer::classifier::Verdict;
+use crate::io::caught::caught;
+use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
+use crate::job::JobCx;
+use crate::mask::MaskInputs;
+use crate::models::Masking;
+use crate::pose;
+use crate::tool::load_tool;
+use touch2touch_core::align::Ask;
+use touch2touch_core::catalog::pattern_of;
+use touch2touch_core::contact::{ContactMask, MaskBasis};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
+use touch2touch_core::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch_core::label::Doubt;
+use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::{Sample, Scale};
+
+/// A prediction that waits for its image figures.
+struct Image {
+    finger: usize,
+    prediction: Grid<f32>,
+    /// `None` for the measured imprint itself, which is not compared with itself.
+    truth: Option<Grid<f32>>,
+    noise_free: Option<Grid<f32>>,
+    unstretched: Option<Unstretched>,
+    verdict: Option<Verdict>,
+}
+
+/// A grasp that waits for its image figures.
+struct Pending {
+    id: PairId,
+    entry: Entry,
+    images: Vec<Image>,
+    /// Whether something about it failed, so that it is tried again the next time.
+    failed: bool,
+}
+
+/// A grasp with what a method made of it, its masks, why some are not of the source that was asked, and how sure the mask
+/// model is of them.
+type Masked<'a> = (&'a Case, Made, PerPad<Mask>, Vec<(String, usize)>, Doubt);
+
+/// The grasps of one tool, by method.
+pub(super) struct Tool<'a> {
+    /// What is known of them.
+    book: &'a Kept,
+    /// Its pattern's name.
+    pattern: Option<String>,
+    /// Whether its CAD model could not be used: what is scored without it is not kept.
+    broken: bool,
+    model: Option<ToolModel>,
+    class: Option<usize>,
+    pending: BTreeMap<usize, Vec<Pending>>,
+}
+
+impl<'a> Tool<'a> {
+    /// Reads the CAD model, if there is anything to score.
+    pub(super) fn new(dataset: &Dataset, work: &ToolWork, book: &'a Kept, skipped: &mut Vec<Skipped>) -> Self {
+        let tool = &work.tool;
+        let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
+            let skip = |err: TaskError| {
+                let why = err.hint.map_or(err.why.clone(), |hint| format!("{} ({hint})", err.why));
+                skipped.push(Skipped { what: name.into(), method: String::new(), why });
+            };
+            load_tool(dataset, name).map(|(model, _)| model).map_err(skip).ok()
+        });
+        let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
+        let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
+        Self { book, pattern, broken, model, class: None, pending: BTreeMap::new() }
+    }
+
+    /// Takes some of its grasps through every method that they are not known by. `say` is told which.
+    pub(super) fn score(
+        &mut self,
+        cases: &[Case],
+        setup: &Setup,
+        models: &mut Models,
+        skipped: &mut Vec<Skipped>,
+        cx: &JobCx,
+        say: &mut dyn FnMut(&str),
+    ) {
+        let Models { methods, masks: by_models, mask_bundle, classifier, .. } = models;
+        let by = Masking { choice: setup.mask, model: mask_bundle.as_ref(), engine: setup.runtime };
+        let with_masks = by.recipe().is_ok();
+        self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
+        for (at, method) in methods.iter_mut().enumerate() {
+            say(method.name());
+            let upper = matches!(method, Method::Measured);
+            let of = method.of(setup);
+            let cases: Vec<&Case> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
+            let Some(made) = method.make(&cases, setup, cx) else { return };
+            let mut failed: BTreeSet<PairId> = BTreeSet::new();
+            let mut skip = |case: &Case, why: String| {
+                failed.insert(case.id);
+                skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
+            };
+            let mut kept: Vec<Masked<'_>> = Vec::new();
+            for (case, made) in cases.into_iter().zip(made) {
+                let made = match made {
+                    Ok(made) => made,
+                    Err(why) => {
+                        skip(case, why);
+                        continue;
+                    }
+                };
+                let mut otherwise: Vec<(String, usize)> = Vec::new();
+                let mut seen = Seen::new(by, by_models);
+                let masks = case.sample.rig.pads().map(|f| {
+                    if self.model.is_none() || case.sample.grasp_from_object.is_none() {
+                        return None;
+                    }
+                    let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
+                    let tool = self.model.as_ref();
+                    let (labels, of) = (case.labels.as_ref(), of.as_ref());
+                    let inputs = MaskInputs { sample: &case.sample, tool, labels, of };
+                    let found = guarded(|| seen.contact_mask(imprint, f, inputs).map_err(|err| err.why));
+                    let finger = || case.sample.rig.pad_key(f);
+                    let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
+                    let ContactMask { mask, basis, .. } = found.ok()?;
+                    let why = match basis {
+                        MaskBasis::Source => return Some(mask),
+                        MaskBasis::Hand => "were drawn by hand",
+                        MaskBasis::Flat => "are empty: the imprints are flat",
+                        MaskBasis::Depth(_) => {
+                            "are by depth: the mask model found no contact in imprints that have some"
+                        }
+                    };
+                    match otherwise.iter_mut().find(|(known, _)| known == why) {
+                        Some((_, count)) => *count += 1,
+                        None => otherwise.push((why.to_owned(), 1)),
+                    }
+                    Some(mask)
+                });
+                let masks = masks.collect();
+                let doubt = match upper && case.sample.scale == Scale::Measured {
+                    true => guarded(|| seen.doubt(&made.imprints, case.labels.as_ref()).map_err(|err| err.why)),
+                    false => Ok(Doubt::default()),
+                };
+                let doubt = doubt.map_err(|why| skip(case, format!("mask model: {why}"))).unwrap_or_default();
+                kept.push((case, made, masks, otherwise, doubt));
+            }
+            // Poses on all cores; the models run one by one.
+            let angles: Vec<Result<Option<f64>, String>> = kept
+                .par_iter()
+                .map(|(case, made, masks, ..)| {
+                    // A color picture has no depth, so there is nothing that could fail.
+                    let posed = with_masks && made.colors.is_empty();
+                    guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
+                })
+                .collect();
+            for ((case, made, _, otherwise, doubt), angle) in kept.into_iter().zip(angles) {
+                let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
+                let (angle_error_rad, mut images) = match scored {
+                    Ok(scored) => scored,
+                    Err(why) => {
+                        skip(case, why);
+                        continue;
+                    }
+                };
+                if let Some(classifier) =
+                    classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
+                {
+                    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
+                    match guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string())) {
+                        Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
+                        Err(why) => skip(case, format!("tool classifier: {why}")),
+                    }
+                }
+                let score = GraspScore {
+                    pair: case.name.clone(),
+                    tool: self.pattern.clone(),
+                    group: case.group,
+                    // Differences of a color sensor never lost their scale.
+                    scale: if made.colors.is_empty() { case.sample.scale } else { Scale::Measured },
+                    images: Vec::new(),
+                    angle_error_rad,
+                    seconds: made.seconds,
+                    doubt,
+                    seed_spread_m: None,
+                };
+                let inputs = if upper { apart::inputs(&case.sample) } else { Vec::new() };
+                let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise, inputs);
+                let pending = Pending { id: case.id, entry, images, failed: false };
+                self.pending.entry(at).or_default().push(pending);
+            }
+            for pending in self.pending.get_mut(&at).into_iter().flatten() {
+                pending.failed |= self.broken || failed.contains(&pending.id);
+            }
+        }
+    }
+
+    /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
+    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &PerPad<Mask>) -> Option<f64> {
+        let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
+        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
+            return None;
+        }
+        let found = contact_points(sample, &made.imprints.as_ref(), &masks.as_ref())
+            .and_then(|points| pose::pose(&points, model, &*setup.engine.method(), Ask::default(), Some(truth)));
+        Some(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN))
+    }
+
+    /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
+    /// order. What is new is kept in the book.
+    pub(super) fn finish(
+        mut self,
+        ids: &[PairId],
+        again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
+        scores: &mut [Scores],
+        skipped: &mut Vec<Skipped>,
+    ) -> Vec<(usize, Entry)> {
+        let mut measured_features = Vec::new();
+        let mut all = Vec::new();
+        for (at, scores) in scores.iter_mut().enumerate() {
+            let pending = self.pending.remove(&at).unwrap_or_default();
+            let known = self.book.of(at, ids);
+            let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
+            let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
+            let (mut kept, stale): (Vec<_>, Vec<_>) =
+                known.into_iter().partition(|(_, entry)| entry.is_of_range(range));
+            // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
+            let mut fresh = redone(stale, range, at, again);
+            let class = self.class;
+            let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, class, range)).collect();
+            for one in done {
+                match one {
+                    Ok((one, true)) => kept.push(one),
+                    Ok((one, false)) => fresh.push(one),
+                    Err((what, why)) => skipped.push(Skipped { what, method: scores.method.clone(), why }),
+                }
+            }
+            self.book.put(at, &fresh);
+            kept.append(&mut fresh);
+            let place: BTreeMap<PairId, usize> = ids.iter().copied().zip(0..).collect();
+            kept.sort_by_key(|(id, _)| place.get(id));
+            // The measured imprints come first: what the others' features are compared with.
+            if at == 0 {
+                measured_features = kept
+                    .iter()
+                    .flat_map(|(_, e)| e.score.images.iter().map(move |i| (e.score.group, i.features.clone())))
+                    .filter(|(_, f)| !f.is_empty())
+                    .collect();
+            } else if !kept.is_empty() {
+                scores.measured_features.extend(measured_features.iter().cloned());
+            }
+            scores.grasps.extend(kept.iter().map(|(_, entry)| entry.score.clone()));
+            all.extend(kept.into_iter().map(|(_, entry)| (at, entry)));
+        }
+        all
+    }
+}
+
+/// The images of a grasp, made once more.
+pub(super) struct Again {
+    id: PairId,
+    images: Vec<Image>,
+}
+
+/// The images of some grasps by a method; those that fail now are left out.
+fn images_again(cases: &[&Case], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
+    let upper = matches!(method, Method::Measured);
+    let made = method.make(cases, setup, cx).unwrap_or_default();
+    let one = |(case, made): (&&Case, Result<Made, String>)| {
+        let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
+        Some(Again { id: case.id, images })
+    };
+    cases.iter().zip(made).filter_map(one).collect()
+}
+
+/// The images of some grasps by a method, made once more.
+pub(super) fn again(dataset: &Dataset, setup: &Setup, method: &mut Method, ids: &[PairId], cx: &JobCx) -> Vec<Again> {
+    // Images need no labels.
+    let unlabeled = Labeled::none();
+    let mut all = Vec::new();
+    for ids in ids.chunks(setup.batch.div_ceil(2).max(1)) {
+        if cx.cancel.is_cancelled() {
+            break;
+        }
+        let cases: Vec<Case> = ids.par_iter().filter_map(|&id| load(dataset, &unlabeled, id).ok()).collect();
+        all.extend(images_again(&cases.iter().collect::<Vec<_>>(), method, setup, cx));
+    }
+    all
+}
+
+/// Known figures with their SSIM in another range. A grasp whose images cannot be made any more is left out.
+fn redone(
+    stale: Vec<(PairId, Entry)>,
+    range: f64,
+    at: usize,
+    again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
+) -> Vec<(PairId, Entry)> {
+    if stale.is_empty() {
+        return Vec::new();
+    }
+    let ids: Vec<PairId> = stale.iter().map(|(id, _)| *id).collect();
+    let mut known: BTreeMap<PairId, Entry> = stale.into_iter().collect();
+    let matched: Vec<(PairId, Entry, Vec<Image>)> = again(at, &ids)
+        .into_iter()
+        .filter_map(|Again { id, images }| Some((id, known.remove(&id)?, images)))
+        .filter(|(_, entry, images)| entry.score.images.len() == images.len())
+        .collect();
+    let anew = |(id, mut entry, images): (PairId, Entry, Vec<Image>)| {
+        let found =
+            guarded(|| Ok(images.into_iter().map(|i| finished(i, None, ranges(range, false), false)).collect()));
+        let found: Vec<ImageScore> = found.ok()?;
+        for (known, new) in entry.score.images.iter_mut().zip(found) {
+            (known.ssim, known.ssim_noise_free) = (new.ssim, new.ssim_noise_free);
+        }
+        entry.range = range;
+        Some((id, entry))
+    };
+    matched.into_par_iter().filter_map(anew).collect()
+}
+
+/// The ranges of the SSIM: the lab's, and the fixed one.
+fn ranges(range: f64, assumed: bool) -> [SsimRange; 2] {
+    if assumed { [SsimRange::Explicit(1.0); 2] } else { [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)] }
+}
+
+/// A grasp with its image figures, and whether it is only for this table; else its pair and what failed.
+fn ended(pending: Pending, class: Option<usize>, range: f64) -> Result<((PairId, Entry), bool), (String, String)> {
+    let Pending { id, mut entry, images, failed } = pending;
+    let assumed = entry.score.scale == Scale::Assumed;
+    entry.spans = images.iter().map(|image| span(&image.prediction)).collect();
+    entry.range = range;
+    let scored = || Ok(images.into_iter().map(|i| finished(i, class, ranges(range, assumed), assumed)).collect());
+    match guarded(scored) {
+        Ok(images) => {
+            entry.score.images = images;
+            Ok(((id, entry), failed))
+        }
+        Err(why) => Err((entry.score.pair, why)),
+    }
+}
+
+/// The compared images of a grasp: in meters, or stretched to 0..1 where the scale was lost.
+fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
+    let image = |finger: PadId| {
+        if let Some(color) = made.colors.get(finger) {
+            // On the scale on which the peak of the depth stands for that of the color: one pooled figure serves both.
+            let levels = |picture: &RgbGrid| planes(picture, PEAK_M / LEVELS);
+            let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
+            let prediction = levels(color);
+            let finger = finger.index();
+            return Some(Image { finger, prediction, truth, noise_free: None, unstretched: None, verdict: None });
+        }
+        let bubble = case.sample.pad(finger)?.depth()?;
+        if case.sample.scale == Scale::Assumed {
+            // On the picture's own pixels and in its orientation, so that stored predictions are not resampled.
+            let tile = case.tile.as_ref()?;
+            let prediction = match (&made.tile, &made.imprints[finger]) {
+                (Some(stored), _) => stored.clone(),
+                (None, Some(imprint)) => {
+                    made.pictures[finger].clone().unwrap_or_else(|| as_tile(imprint, &case.sample.rig, tile.size()))
+                }
+                (None, None) => return None,
+            };
+            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+            let raw = (in_assumed_meters(&prediction, made), assumed_meters(tile));
+            let unstretched = metrics::unstretched(&raw.0, &raw.1, hi - lo).ok();
+            let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
+            return Some(Image {
+                finger: finger.index(),
+                prediction,
+                truth: Some(truth),
+                noise_free: None,
+                unstretched,
+                verdict: None,
+            });
+        }
+        let prediction = made.imprints[finger].clone()?;
+        let truth = (!upper).then(|| bubble.imprint.clone());
+        let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
+        Some(Image { finger: finger.index(), prediction, truth, noise_free, unstretched: None, verdict: None })
+    };
+    let present = |f: &PadId| case.sample.pad(*f).is_some();
+    fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
+}
+
+/// The work on one pair: a panic in it is that pair's failure and not the end of the run.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    caught(work).unwrap_or_else(|message| {
+        Err(format!("an internal error, which is a bug: {message}; please report it with this pair"))
+    })
+}
+
+/// What a method made of a picture, in the assumed meters: stored predictions are gray levels.
+fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
+    if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
+}
+
+/// Least and largest value of an image; `None` without one that is finite.
+fn span(image: &Grid<f32>) -> Option<[f32; 2]> {
+    let finite = image.as_slice().iter().copied().filter(|v| v.is_finite());
+    let [low, high] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
+    (low <= high).then_some([low, high])
+}
+
+/// Largest minus smallest value of some images.
+fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
+    let [low, high] = spans.fold([f32::INFINITY, f32::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    f64::from(high) - f64::from(low)
+}
+
+fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
+    let Image { finger, prediction, truth, noise_free, unstretched, verdict } = image;
+    let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
+    let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
+    let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
+    ImageScore {
+        finger,
+        error: truth.and_then(|truth| squared_error(&prediction, &truth)).unwrap_or_default(),
+        noise_free: noise_free.and_then(|clean| squared_error(&prediction, &clean)),
+        ssim: of(0),
+        ssim_noise_free: clean.map(|found| found[0].mean),
+        ssim_peak: of(1).filter(|_| !assumed),
+        unstretched,
+        tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
+        features: verdict.map_or_else(Vec::new, |v| v.features),
+    }
+}

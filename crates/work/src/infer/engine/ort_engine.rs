@@ -1,0 +1,117 @@
+//! ONNX Runtime behind [`Session`], through a library that is loaded when it is first wanted.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use ort::environment::Environment;
+use ort::session::{Session as OrtSession, SessionInputValue};
+use ort::value::TensorRef;
+
+use super::{Input, Library, Session, threads};
+use crate::infer::library::{Searched, candidates};
+use touch2touch_core::diffusion::Tensor;
+
+/// The library stays loaded once it is: ONNX Runtime cannot be unloaded safely.
+enum State {
+    NotSearched,
+    Loaded { environment: Environment, library: Library },
+    Absent(Vec<Searched>),
+}
+
+static STATE: Mutex<State> = Mutex::new(State::NotSearched);
+
+fn state() -> MutexGuard<'static, State> {
+    let mut state = STATE.lock().unwrap_or_else(PoisonError::into_inner);
+    if matches!(*state, State::NotSearched) {
+        *state = search();
+    }
+    state
+}
+
+/// Tries the candidates in order; the first that loads is taken.
+fn search() -> State {
+    let mut searched = Vec::new();
+    for (place, library) in candidates() {
+        let Some(path) = library else {
+            searched.push(Searched { place, outcome: "no library there".into() });
+            continue;
+        };
+        match open(&path) {
+            Ok(environment) => {
+                let build = ort::info().to_owned();
+                return State::Loaded { environment, library: Library { path, found_in: place, build } };
+            }
+            Err(reason) => {
+                log::warn!("the ONNX Runtime library could not be used: {reason}: {}", path.display());
+                searched.push(Searched { place, outcome: reason });
+            }
+        }
+    }
+    State::Absent(searched)
+}
+
+fn open(path: &std::path::Path) -> Result<Environment, String> {
+    // The binding panics where a library is there but is not what it claims to be.
+    let opened = std::panic::catch_unwind(|| {
+        let builder = ort::init_from(path).map_err(|err| err.to_string())?;
+        builder.with_name("touch2touch").with_telemetry(false).build().map_err(|err| err.to_string())
+    });
+    opened.unwrap_or_else(|_| Err("it is not a usable ONNX Runtime".into()))
+}
+
+pub(super) fn library() -> Result<Library, Vec<Searched>> {
+    match &*state() {
+        State::Loaded { library, .. } => Ok(library.clone()),
+        State::Absent(searched) => Err(searched.clone()),
+        State::NotSearched => Err(Vec::new()),
+    }
+}
+
+pub(super) fn search_again() {
+    let mut state = STATE.lock().unwrap_or_else(PoisonError::into_inner);
+    if matches!(*state, State::Absent(_)) {
+        *state = State::NotSearched;
+    }
+}
+
+pub(super) struct OnnxRuntimeSession {
+    session: OrtSession,
+}
+
+pub(super) fn load(bytes: &[u8]) -> Result<OnnxRuntimeSession, String> {
+    let environment = match &*state() {
+        State::Loaded { environment, .. } => environment.clone(),
+        _ => return Err("its library is not loaded".into()),
+    };
+    let build = || -> ort::Result<OrtSession> {
+        // Spinning threads would burn the cores that the window needs.
+        OrtSession::builder(&environment)?
+            .with_intra_threads(threads())?
+            .with_intra_op_spinning(false)?
+            // Its errors come back as results; standard error is for our own words.
+            .with_log_level(ort::logging::LogLevel::Fatal)?
+            .commit_from_memory(bytes)
+    };
+    Ok(OnnxRuntimeSession { session: build().map_err(|err| err.to_string())? })
+}
+
+impl Session for OnnxRuntimeSession {
+    fn run(&mut self, inputs: &[(&str, Input<'_>)], output: &str) -> Result<Tensor, String> {
+        let mut values: Vec<(std::borrow::Cow<'_, str>, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
+        for &(name, input) in inputs {
+            let value = match input {
+                Input::F32(t) => {
+                    TensorRef::from_array_view((t.shape(), t.data())).map_err(|err| err.to_string())?.into()
+                }
+                Input::I64(numbers) => {
+                    TensorRef::from_array_view(([numbers.len()], numbers)).map_err(|err| err.to_string())?.into()
+                }
+            };
+            values.push((name.into(), value));
+        }
+        let outputs = self.session.run(values).map_err(|err| err.to_string())?;
+        let value = outputs.get(output).ok_or_else(|| format!("no output `{output}` came back"))?;
+        let (shape, data) = value.try_extract_tensor::<f32>().map_err(|err| err.to_string())?;
+        let shape = shape.iter().map(|&d| usize::try_from(d).unwrap_or(0)).collect();
+        Tensor::new(shape, data.to_vec()).ok_or_else(|| format!("`{output}` is malformed"))
+    }
+}

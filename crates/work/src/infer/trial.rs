@@ -1,0 +1,219 @@
+//! Whether an engine takes a bundle, found out in a process of its own.
+//!
+//! A graph of a few hundred bytes can ask for any amount of memory or never end, and a failed allocation ends a process
+//! without a word. So a bundle is loaded and run once, on zeros of the shapes its manifest declares, by the same
+//! program in a second process, before an engine of the first process sees it: [`check`], which `bundle check` calls for
+//! every engine that is present, and [`admit`], which [`super::generator`], [`super::mask`] and [`super::classifier`] call
+//! before they load a graph, in the studio as on the command line. A bundle that passed is not tried again (the verdict
+//! is kept in the cache folder, by the bundle's hash, the engine's build and the program's version), and those that ship
+//! with the program are not tried at all.
+//!
+//! What is bounded: loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
+//! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
+//! the memory, but it is the second process that ends). What is not: what a graph asks for on other values than
+//! zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
+//! second process and tries nothing.
+
+mod watch;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, OnceLock, PoisonError};
+use std::time::Duration;
+
+use super::bundle::contract::promised;
+use super::bundle::{Bundle, Origin, TimestepType};
+use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, Refusal, build, resolve};
+use crate::io::digest::sha256;
+use crate::io::folders;
+use touch2touch_core::diffusion::{ModelError, Tensor};
+use watch::{End, Limits, Seen};
+
+/// Most time a trial may take.
+pub const TIME: Duration = Duration::from_secs(60);
+/// Memory every trial may use: the program, the engine's library and its threads, and what graphs pass on to each other.
+const MEMORY: u64 = 4 << 30;
+/// What it may use besides, for each byte of the graphs: weights are unpacked, laid out anew, and held more than once.
+const MEMORY_PER_BYTE: u64 = 8;
+/// The name of the second process's verb, after the program's: `bundle try DIR --engine rten`.
+pub const VERB: [&str; 2] = ["bundle", "try"];
+/// What the second process says line by line: what it is about to do, what went wrong, that all is well.
+const AT: &str = "at ";
+const REFUSED: &str = "refused ";
+const TAKEN: &str = "taken";
+
+/// The program that can be started for a trial.
+static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
+
+/// Says that this program has the verb [`VERB`], so that bundles are tried from now on.
+pub fn by_this_program() {
+    match std::env::current_exe() {
+        Ok(program) => drop(PROGRAM.set(program)),
+        Err(err) => log::warn!("model bundles are not tried before their first use: {err}"),
+    }
+}
+
+/// The most memory a trial of the bundle may use, bytes.
+pub fn memory_limit(bundle: &Bundle) -> u64 {
+    MEMORY + MEMORY_PER_BYTE * bundle.bytes()
+}
+
+/// The engine of the user's choice, once it is known to take the bundle.
+///
+/// # Errors
+/// Those of [`resolve`], and [`EngineError::Refused`].
+pub(super) fn admit(bundle: &Bundle, choice: EngineChoice) -> Result<EngineKind, EngineError> {
+    /// What was found out since the program started; only what passed is kept longer.
+    static KNOWN: Mutex<BTreeMap<String, Result<(), Refusal>>> = Mutex::new(BTreeMap::new());
+    let engine = resolve(choice)?;
+    let Some(program) = PROGRAM.get() else { return Ok(engine) };
+    // The manifests hold the checksums of the graphs.
+    if Origin::ships(bundle.hash()) {
+        return Ok(engine);
+    }
+    let key = key(bundle, engine);
+    let known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+    let verdict = match known {
+        Some(verdict) => verdict,
+        None if kept(&key).is_some_and(|file| file.is_file()) => Ok(()),
+        None => match start(program, bundle, engine) {
+            Ok(seen) => judge(bundle, engine, &seen),
+            // The program was moved, say: no reason to give the bundle up.
+            Err(err) => {
+                log::warn!("the model bundle {} could not be tried: {err}", bundle.origin());
+                return Ok(engine);
+            }
+        },
+    };
+    if verdict.is_ok() {
+        keep(&key, bundle, engine);
+    }
+    KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key, verdict.clone());
+    verdict?;
+    Ok(engine)
+}
+
+/// Tries the bundle on an engine that [`resolve`] gave, whatever is known of it.
+///
+/// # Errors
+/// [`Refusal`], also if no trial could be made.
+pub fn check(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
+    let program = PROGRAM.get().ok_or_else(|| refusal(bundle, engine, "there is no program to try it with"))?;
+    match start(program, bundle, engine) {
+        Ok(seen) => judge(bundle, engine, &seen)?,
+        Err(err) => return Err(refusal(bundle, engine, format!("it could not be tried: {err}"))),
+    }
+    keep(&key(bundle, engine), bundle, engine);
+    Ok(())
+}
+
+/// What the second process does: loads every graph and runs it once on zeros. `line` is told what happens.
+///
+/// # Errors
+/// [`EngineError::NoOnnxRuntime`] and the like; that an engine refuses is said in a line and answered `false`.
+pub fn run(bundle: &Bundle, choice: EngineChoice, line: &mut dyn FnMut(&str)) -> Result<bool, EngineError> {
+    let engine = resolve(choice)?;
+    let outcome = on_zeros(bundle, engine, &mut |at| line(&format!("{AT}{at}")));
+    match &outcome {
+        Ok(()) => line(TAKEN),
+        Err(reason) => line(&format!("{REFUSED}{}", reason.replace('\n', "; "))),
+    }
+    Ok(outcome.is_ok())
+}
+
+fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Result<(), String> {
+    let mut graphs = Vec::new();
+    // All at once in memory, as in use.
+    for (role, file) in bundle.files() {
+        at(&format!("loading the graph `{}`", role.key()));
+        graphs.push((role, Graph::load(engine, role, file).map_err(|err| err.to_string())?));
+    }
+    let whole_steps = bundle.generator().is_none_or(|spec| spec.timestep == TimestepType::Int64);
+    for (role, graph) in &mut graphs {
+        at(&format!("running the graph `{}` on zeros", role.key()));
+        let Some((inputs, outputs)) = promised(*role, bundle.spec()) else { continue };
+        let batch_of_one = |shape: &[usize]| -> Vec<usize> { [&[1], shape].concat() };
+        let zeros: Vec<(&str, Tensor)> =
+            inputs.iter().map(|p| (&*p.name, Tensor::filled(batch_of_one(&p.shape), 0.0))).collect();
+        let inputs: Vec<(&str, Input<'_>)> = zeros
+            .iter()
+            .map(|(name, tensor)| match *name == "timestep" && whole_steps {
+                true => (*name, Input::I64(&[0])),
+                false => (*name, Input::F32(tensor)),
+            })
+            .collect();
+        for output in outputs {
+            match graph.run(&inputs, &output.name, &batch_of_one(&output.shape)) {
+                // Zeros are no touch: what comes out of them need not be numbers.
+                Ok(_) | Err(ModelError::NonFinite { .. }) => {}
+                Err(err) => return Err(err.to_string()),
+            }
+        }
+    }
+    Ok(())
+}
+
+fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<Seen> {
+    let name = match engine {
+        EngineKind::Rten => "rten",
+        EngineKind::Ort => "ort",
+    };
+    let place = match bundle.origin() {
+        Origin::Folder(folder) => std::path::absolute(folder)?,
+        built_in => built_in.path(),
+    };
+    let [group, verb] = VERB.map(AsRef::as_ref);
+    let args = [group, verb, "--engine".as_ref(), name.as_ref(), "--".as_ref(), place.as_os_str()];
+    watch::watch(program, &args, Limits { memory: memory_limit(bundle), time: TIME })
+}
+
+fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Refusal {
+    Refusal { bundle: bundle.name().to_owned(), folder: bundle.origin().path(), engine, reason: reason.into() }
+}
+
+/// What the second process said and how it ended, in words.
+fn judge(bundle: &Bundle, engine: EngineKind, seen: &Seen) -> Result<(), Refusal> {
+    let lines = || seen.output.lines();
+    let at = lines().filter_map(|l| l.strip_prefix(AT)).next_back().unwrap_or("starting");
+    let limit = format!("{:.1} GB", memory_limit(bundle) as f64 / 1e9);
+    let reason = match &seen.end {
+        End::Ended(status) if status.success() && lines().any(|l| l == TAKEN) => return Ok(()),
+        End::TooLong => format!("{at} was not done after {} s", TIME.as_secs()),
+        End::TooMuch => format!("{at} takes more than {limit} of memory"),
+        End::Ended(status) => {
+            let said = lines().find_map(|l| l.strip_prefix(REFUSED)).map(str::to_owned);
+            said.unwrap_or_else(|| {
+                // The last words of a process that ended by itself, of which the first line is the one that counts.
+                let words = seen.errors.lines().find(|l| l.contains("memory allocation of"));
+                match words.or_else(|| seen.errors.lines().find(|l| !l.trim().is_empty())) {
+                    Some(words) if words.contains("memory allocation of") => {
+                        format!("{at} takes more than {limit} of memory ({words})")
+                    }
+                    Some(words) => format!("{at} ended the process ({status}): {words}"),
+                    None => format!("{at} ended the process ({status})"),
+                }
+            })
+        }
+    };
+    Err(refusal(bundle, engine, reason))
+}
+
+/// What a verdict depends on.
+fn key(bundle: &Bundle, engine: EngineKind) -> String {
+    let parts = [env!("CARGO_PKG_VERSION"), &build(engine), bundle.hash(), &memory_limit(bundle).to_string()];
+    sha256(parts.join("\n").as_bytes())
+}
+
+/// The file that says that a bundle passed, whether it exists or not.
+fn kept(key: &str) -> Option<PathBuf> {
+    Some(folders::program_cache()?.join("trials").join(key))
+}
+
+fn keep(key: &str, bundle: &Bundle, engine: EngineKind) {
+    let Some(file) = kept(key).filter(|file| !file.exists()) else { return };
+    let text = format!("{} takes {} ({})\n", engine.label(), bundle.name(), bundle.hash());
+    let written = file.parent().map_or(Ok(()), std::fs::create_dir_all).and_then(|()| std::fs::write(&file, text));
+    if let Err(err) = written {
+        log::debug!("the verdict on {} could not be kept: {err}", bundle.name());
+    }
+}

@@ -1,0 +1,140 @@
+//! Fresh cases from the built-in simulator: as many as wanted, each from its own seed.
+//!
+//! Recipe. Tool: for nominal and hard cases the lab's eleven tools that are no rod, in turn; for degenerate ones a
+//! rod and a peg. Pose: uniform in the prior (±22.5°, ±5 mm). Sensors: the simulator's nominal ones with the true
+//! camera off by a deviation of 0.25° and 0.2 mm per axis; hard cases press two thirds as deep and have 1.5 times the
+//! noise. One pixel in a hundred is dropped: it reads 0 on the right finger and NaN on the left. Masks: see [`Spoil`];
+//! three of four degenerate cases have nothing at all in the mask of one finger.
+
+use glam::DVec2;
+use rand::{Rng as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
+
+use super::{Case, Stratum};
+use touch2touch_core::catalog::{self, Bar, ToolSpec};
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::{PadId, lab};
+use touch2touch_core::sim::{self, Spoil, spoil_mask};
+
+/// Deviation of the camera's true angle and place from the nominal ones, per axis.
+const CALIBRATION_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
+const CALIBRATION_M: f64 = 0.2e-3;
+/// Share of pixels without depth.
+const DROPPED: f64 = 0.01;
+
+/// The tools that [`simulated`] uses; the position is [`Case::tool`]. The last two are straight.
+pub fn simulated_tools() -> Vec<ToolSpec> {
+    let is_rod = |t: &&ToolSpec| t.name.ends_with("_rod");
+    let rod = catalog::tools().iter().find(is_rod).cloned();
+    let mut tools: Vec<ToolSpec> = catalog::tools().iter().filter(|t| !is_rod(t)).cloned().collect();
+    let peg = rod.clone().map(|rod| ToolSpec {
+        name: "peg".into(),
+        bars: vec![Bar { core: vec![DVec2::ZERO, DVec2::new(0.0, 0.05)], half_width_m: 0.003 }],
+        ..rod
+    });
+    tools.extend(rod.into_iter().chain(peg));
+    tools
+}
+
+/// The CAD models of [`simulated_tools`].
+pub fn simulated_meshes() -> Vec<TriMesh> {
+    simulated_tools().iter().map(ToolSpec::mesh).collect()
+}
+
+/// The kind of case `position` of `count`: 70 % nominal, then 20 % hard, then 10 % degenerate.
+pub fn stratum(position: usize, count: usize) -> Stratum {
+    match (10 * position).checked_div(count).unwrap_or(0) {
+        0..7 => Stratum::Nominal,
+        7..9 => Stratum::Hard,
+        _ => Stratum::Degenerate,
+    }
+}
+
+/// Case number `position` of a suite of `count` with the given seed. About 60 ms of one core in release.
+pub fn simulated(position: usize, count: usize, seed: u64, tools: &[ToolSpec]) -> Case {
+    // One seed per case, so that a case does not depend on how its neighbors came about.
+    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
+    let stratum = stratum(position, count);
+    let straight = tools.len() - 2;
+    let tool = match stratum {
+        Stratum::Degenerate => straight + position % 2,
+        Stratum::Nominal | Stratum::Hard => position % straight,
+    };
+    let mut config = sim::SimConfig::default();
+    config.bubble.calibration_rad = CALIBRATION_RAD;
+    config.bubble.calibration_m = CALIBRATION_M;
+    config.bubble.dropped_share = 0.0;
+    if stratum == Stratum::Hard {
+        config.bubble.press_m *= 2.0 / 3.0;
+        config.bubble.noise_m *= 1.5;
+    }
+    let sample = sim::simulate(&tools[tool], sim::random_grasp(rng.random()), rng.random(), &config);
+    let spoil = if stratum == Stratum::Hard { Spoil::hard() } else { Spoil::nominal() };
+    let mask_seed: u64 = rng.random();
+    // Of the degenerate cases, three of four have one blank finger, either one equally often.
+    let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
+    let touch = |finger: PadId| {
+        let touch = sample.pad(finger).and_then(|t| t.depth());
+        touch.expect("the simulator presses both fingers")
+    };
+    let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
+    let clean = lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
+    let mut masks = lab::PADS.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
+    if let Some(finger) = blank {
+        let finger: usize = finger;
+        masks[finger].as_mut_slice().fill(false);
+    }
+    let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
+    for (f, imprint) in imprints.iter_mut().enumerate() {
+        let reference = camera(lab::PADS[f]).depth_reference;
+        for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
+            if rng.random_bool(DROPPED) {
+                *value = if f == 0 { *reference } else { f32::NAN };
+            }
+        }
+    }
+    Case {
+        imprints,
+        cameras: lab::PADS.map(camera),
+        masks,
+        masks_clean: clean,
+        grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),
+        tool,
+        stratum,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strata_have_their_shares_and_straight_tools_are_degenerate() {
+        let count = |s| (0..200).filter(|&i| stratum(i, 200) == s).count();
+        assert_eq!((count(Stratum::Nominal), count(Stratum::Hard), count(Stratum::Degenerate)), (140, 40, 20));
+        assert_eq!(stratum(0, 0), Stratum::Nominal);
+        let tools = simulated_tools();
+        assert_eq!(tools.len(), 13);
+        assert!(tools[11].name.ends_with("_rod") && tools[12].name == "peg");
+    }
+
+    #[test]
+    fn a_case_repeats_and_has_what_the_recipe_says() {
+        let tools = simulated_tools();
+        let case = simulated(3, 10, 5, &tools);
+        assert_eq!(case.masks, simulated(3, 10, 5, &tools).masks);
+        assert_ne!(case.masks, simulated(3, 10, 6, &tools).masks);
+        assert_ne!(case.masks, case.masks_clean);
+        let dropped = |f: usize| {
+            let pixels = case.imprints[f].as_slice().iter().zip(case.cameras[f].depth_reference.as_slice());
+            (pixels.clone().filter(|(i, r)| i == r).count(), pixels.filter(|(i, _)| i.is_nan()).count())
+        };
+        assert!((150..350).contains(&dropped(0).0) && dropped(0).1 == 0, "{:?}", dropped(0));
+        assert!((150..350).contains(&dropped(1).1) && dropped(1).0 == 0, "{:?}", dropped(1));
+        let dir = tempfile::tempdir().unwrap();
+        super::super::write(&dir.path().join("case_003.npz"), &case).unwrap();
+        let back = super::super::read(&dir.path().join("case_003.npz")).unwrap();
+        assert_eq!((back.tool, back.stratum), (3, Stratum::Nominal));
+        assert_eq!(back.masks, case.masks);
+    }
+}

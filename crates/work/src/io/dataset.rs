@@ -1,0 +1,442 @@
+//! [`Dataset`]: one index over three kinds of source. Opening reads names only; samples load one by one.
+//!
+//! * the lab's folders of `.pt` files (the submodule `lab`),
+//! * a folder of pictures `NAME_gelslim.png`, with or without `NAME_bubble.png`, or of camera images `NAME_touch.png`
+//!   with `NAME_reference.png` (the submodule `pictures`),
+//! * the built-in data sets (the demo and the test sets), rendered by the simulator.
+//!
+//! A [`Dataset`] never changes after opening and can be shared with worker threads.
+
+mod built_in;
+mod error;
+mod grow;
+mod lab;
+mod pictures;
+mod plausible;
+mod read_as;
+mod tool_scale;
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use touch2touch_core::dataset::{Index, PairEntry, PairId, Problem};
+use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::read_as::ReadAs;
+use touch2touch_core::rig::{PerPad, Rig};
+use touch2touch_core::sample::{DepthCamera, Sample};
+use touch2touch_core::turn::Turn;
+
+use super::home::Home;
+use super::stl::MeshError;
+
+pub use built_in::BuiltIn;
+pub use error::{LoadError, OpenError};
+pub use grow::{Growth, RIG_FILE, cameras_of};
+pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters, rig_of};
+pub use read_as::{READ_AS_FILE, write_read_as};
+pub use tool_scale::{
+    ToolFile, ToolScale, ToolUnit, UNIT_FILE, read_in_meters, read_tool, said_beside, tool_size, write_beside,
+};
+
+/// Which kind of source a data set is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SourceKind {
+    /// The lab's folders of `.pt` files.
+    Lab,
+    /// A folder of pictures: no pose, no camera, assumed scale.
+    Pictures,
+    /// The built-in simulator: the demo or a test set.
+    Demo,
+}
+
+/// A sample with what is invalid in its files.
+#[derive(Clone, Debug, Default)]
+pub struct Loaded {
+    /// The sample; its notes say what is odd: values that are not numbers, missing keys that it can do without, halves
+    /// that disagree, numbers that cannot be those of a touch.
+    pub sample: Sample,
+    /// Pixels of each finger's imprint that are no measurement; they are NaN in the sample.
+    pub invalid: PerPad<InvalidPixels>,
+}
+
+/// A larger share of an imprint's pixels without measurement than this is worth a note of its own, because every depth
+/// camera drops some.
+const MANY_INVALID: f64 = 0.02;
+/// A larger share of an image that is no measurement than this leaves nothing to answer from.
+const MOST_INVALID: f64 = 0.5;
+
+/// Why pixels of an imprint are no measurement.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct InvalidPixels {
+    /// NaN in the file.
+    pub nan: usize,
+    /// Infinite in the file.
+    pub infinite: usize,
+    /// At depth 0, which is how a depth camera says "nothing measured".
+    pub dropped: usize,
+}
+
+impl InvalidPixels {
+    /// All of them.
+    pub fn total(self) -> usize {
+        self.nan + self.infinite + self.dropped
+    }
+
+    /// Whether they are worth a note of their own: more than a depth camera drops anyway.
+    pub fn are_many(self, pixels: usize) -> bool {
+        self.infinite > 0 || self.total() as f64 > MANY_INVALID * pixels as f64
+    }
+}
+
+/// An opened source of paired touches.
+#[derive(Clone, Debug)]
+pub struct Dataset {
+    /// What to call it.
+    pub title: String,
+    /// Its root folder; `None` for what is built in. The same for every sub-folder it was opened from.
+    pub root: Option<PathBuf>,
+    /// That folder as it was opened.
+    pub home: Option<Home>,
+    /// The kind of source.
+    pub kind: SourceKind,
+    /// Names of all pairs in natural order.
+    pub index: Index,
+    /// What is wrong with it, as far as names and folders tell.
+    pub problems: Vec<Problem>,
+    /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else meters.
+    pub tool_scale: Option<ToolScale>,
+    /// The sensors that its touches were felt with.
+    pub rig: Arc<Rig>,
+    /// How it is read otherwise than it is stored.
+    read_as: Vec<ReadAs>,
+    source: Source,
+    /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
+    cameras: OnceLock<PerPad<Arc<DepthCamera>>>,
+    /// The units of CAD models that were named for this run only, by tool.
+    held_units: Arc<Mutex<BTreeMap<String, ToolUnit>>>,
+}
+
+#[derive(Clone, Debug)]
+enum Source {
+    Lab(lab::Lab),
+    Pictures(pictures::Pictures),
+    BuiltIn(BuiltIn),
+}
+
+/// What a scan finds, before it becomes a [`Dataset`].
+struct Scan {
+    root: PathBuf,
+    pairs: Vec<PairEntry>,
+    problems: Vec<Problem>,
+    source: Source,
+    kind: SourceKind,
+    rig: Arc<Rig>,
+}
+
+impl Dataset {
+    /// Opens the lab's folders or a folder of pictures, whichever `path` holds. Reads names only.
+    ///
+    /// Where nothing has that path, the name of a built-in data set ([`BuiltIn`]) opens that one.
+    ///
+    /// `path` may be the data set's root, the folder above its `data` folder, any folder inside it, or a file in it.
+    ///
+    /// # Errors
+    /// [`OpenError`] if nothing can be opened at all; everything smaller is listed in [`Dataset::problems`].
+    pub fn open(path: &Path) -> Result<Self, OpenError> {
+        let io = |source| OpenError::Io { path: path.to_owned(), source };
+        if let Some(built_in) = path.to_str().and_then(BuiltIn::named).filter(|_| !path.exists()) {
+            return Ok(Self::built_in(built_in));
+        }
+        // Absolute, so that masks are found again from every working directory.
+        let absolute = path.canonicalize().map_err(io)?;
+        let folder = if absolute.is_dir() { absolute } else { absolute.parent().unwrap_or(&absolute).to_owned() };
+        drop(std::fs::read_dir(&folder).map_err(io)?);
+        let found = match lab::scan(&folder) {
+            Some(scan) => Some(scan),
+            None => pictures::scan(&folder)?.or_else(|| lab::scan_flat(&folder)),
+        };
+        let mut scan = found.ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
+        if *rig_of(&scan.root)? != *scan.rig {
+            let what = format!("{RIG_JSON} declares other sensors, but .pt files are always read as the lab's");
+            scan.problems.push(problem(scan.root.join(RIG_JSON), what, "remove it, or save the touches as pictures"));
+        }
+        let read_as = read_as::of(&scan.root)?;
+        Ok(Self::of(scan).reading(read_as))
+    }
+
+    fn of(scan: Scan) -> Self {
+        let mut problems = scan.problems;
+        problems.extend(super::simulated::unfinished(&scan.root));
+        let title = scan.root.file_name().map_or_else(|| "dataset".into(), |n| n.to_string_lossy().into_owned());
+        Self {
+            title,
+            home: Home::at(&scan.root),
+            root: Some(scan.root),
+            kind: scan.kind,
+            index: Index { pairs: scan.pairs },
+            problems,
+            tool_scale: None,
+            rig: scan.rig,
+            read_as: Vec::new(),
+            source: scan.source,
+            cameras: OnceLock::new(),
+            held_units: Arc::default(),
+        }
+    }
+
+    /// The built-in demo: simulated grasps of the simulator's tools, rendered one by one when they are asked for.
+    pub fn demo() -> Self {
+        Self::built_in(BuiltIn::Demo)
+    }
+
+    /// A built-in data set. Nothing is rendered yet.
+    pub fn built_in(set: BuiltIn) -> Self {
+        Self {
+            title: set.title(),
+            root: None,
+            home: None,
+            kind: SourceKind::Demo,
+            index: Index { pairs: set.pairs() },
+            problems: Vec::new(),
+            tool_scale: None,
+            rig: Rig::lab(),
+            read_as: Vec::new(),
+            source: Source::BuiltIn(set),
+            cameras: OnceLock::new(),
+            held_units: Arc::default(),
+        }
+    }
+
+    /// Which built-in data set it is, if it is one.
+    pub fn built_in_set(&self) -> Option<BuiltIn> {
+        match self.source {
+            Source::BuiltIn(set) => Some(set),
+            Source::Lab(_) | Source::Pictures(_) => None,
+        }
+    }
+
+    /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
+    ///
+    /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.
+    /// What is odd about the files or implausible in them is in the sample's notes.
+    ///
+    /// # Errors
+    /// [`LoadError`] naming the file, and for tensors the key.
+    pub fn load(&self, id: PairId) -> Result<Sample, LoadError> {
+        self.load_with_counts(id).map(|loaded| loaded.sample)
+    }
+
+    /// [`Dataset::load`], together with how many pixels are invalid.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn load_with_counts(&self, id: PairId) -> Result<Loaded, LoadError> {
+        if self.index.get(id).is_none() {
+            return Err(LoadError::NoSuchPair { id });
+        }
+        self.caught(id, || {
+            let mut loaded = match &self.source {
+                Source::Lab(lab) => lab.load(id)?,
+                Source::Pictures(pictures) => pictures.load(id)?,
+                Source::BuiltIn(set) => {
+                    let mut sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
+                    self.read_otherwise(&mut sample);
+                    return Ok(Loaded { sample, invalid: Default::default() });
+                }
+            };
+            self.read_otherwise(&mut loaded.sample);
+            // The bubble's file is the last one.
+            let file = self.pair_files(id).pop().unwrap_or_default();
+            plausible::notes(&mut loaded, &file);
+            self.lend_cameras(&mut loaded.sample);
+            Ok(loaded)
+        })
+    }
+
+    /// Reads something of a pair. A panic is that pair's error: no file may end a run over others.
+    fn caught<T>(&self, id: PairId, read: impl FnOnce() -> Result<T, LoadError>) -> Result<T, LoadError> {
+        super::caught::caught(read)
+            .unwrap_or_else(|message| Err(LoadError::Bug { files: self.pair_files(id), message }))
+    }
+
+    /// The tool's CAD model in meters and the object frame; `None` where the data set has none.
+    ///
+    /// # Errors
+    /// [`MeshError`] if there is a file that cannot be used, or whose size cannot be meters.
+    pub fn tool_mesh(&self, tool: &str) -> Result<Option<TriMesh>, MeshError> {
+        Ok(self.tool_with_notes(tool)?.map(|file| file.mesh))
+    }
+
+    /// [`Dataset::tool_mesh`], together with what is odd about the file.
+    ///
+    /// # Errors
+    /// As [`Dataset::tool_mesh`].
+    pub fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
+        if let Source::BuiltIn(set) = self.source {
+            return Ok(set.mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }));
+        }
+        self.tool_mesh_file(tool).map(|path| read_tool(path, self.scale_of(tool))).transpose()
+    }
+
+    /// What was said of the unit of a tool's CAD file other than beside it: for this run, else on the command line.
+    pub fn scale_of(&self, tool: &str) -> Option<ToolScale> {
+        let held = self.held_units.lock().unwrap_or_else(PoisonError::into_inner);
+        held.get(tool).map(|unit| unit.scale()).or(self.tool_scale)
+    }
+
+    /// Reads a tool's CAD file in this unit as long as the data set is open: for folders that cannot be written.
+    pub fn hold_unit(&self, tool: &str, unit: ToolUnit) {
+        self.held_units.lock().unwrap_or_else(PoisonError::into_inner).insert(tool.to_owned(), unit);
+    }
+
+    /// The file of the tool's CAD model, if the source has files.
+    pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
+        match &self.source {
+            Source::Lab(lab) => lab.mesh_file(tool),
+            Source::Pictures(_) | Source::BuiltIn(_) => None,
+        }
+    }
+
+    /// The files of a pair (GelSlim, then bubble), as far as they exist.
+    pub fn pair_files(&self, id: PairId) -> Vec<PathBuf> {
+        match &self.source {
+            Source::Lab(lab) => lab.files(id),
+            Source::Pictures(pictures) => pictures.files(id),
+            Source::BuiltIn(_) => Vec::new(),
+        }
+    }
+
+    /// All files that the figures of a pair depend on, besides its tool's: those of [`Dataset::pair_files`], and a stored
+    /// prediction that lies by them. None of a built-in pair.
+    pub fn scored_files(&self, id: PairId) -> Vec<PathBuf> {
+        let mut files = self.pair_files(id);
+        if let Source::Pictures(pictures) = &self.source {
+            files.extend(pictures.stored(id));
+        }
+        files
+    }
+
+    /// The bubble picture on its own pixels (0..255, rotated by 180 degrees), laid upright from how the pair's pictures lay
+    /// ([`touch2touch_core::sample::Sample::laid`]); `None` for other sources.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn bubble_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => self.caught(id, || {
+                let tile = pictures.tile(id, pictures::BUBBLE, laid)?;
+                Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
+            }),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+        }
+    }
+
+    /// The lab's own VQ-VAE prediction for the pair, from the file `NAME_vqvae.png`, as [`Dataset::bubble_tile`]; `None`
+    /// where there is none.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::VQVAE, laid)),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+        }
+    }
+
+    /// Whether the GelSlim picture of a pair was cut off at black or white; `None` for other sources.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
+        match &self.source {
+            Source::Pictures(pictures) => self.caught(id, || pictures.is_clipped(id)),
+            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+        }
+    }
+
+    /// [`Dataset::vqvae_tile`] brought to meters, raw orientation and 175 x 140 px, as the measured imprint is.
+    ///
+    /// # Errors
+    /// As [`Dataset::load`].
+    pub fn vqvae_imprint(&self, id: PairId, laid: Turn) -> Result<Option<DepthMap>, LoadError> {
+        Ok(self.vqvae_tile(id, laid)?.map(|tile| pictures::imprint_from_tile(&tile, &self.rig)))
+    }
+}
+
+/// The last run of digits in `text`; the lab's order of files. Numbers too large to hold come last.
+fn last_integer(text: &str) -> u64 {
+    let Some(end) = text.rfind(|c: char| c.is_ascii_digit()) else { return 0 };
+    let start = text[..=end]
+        .rfind(|c: char| !c.is_ascii_digit())
+        .map_or(0, |i| i + text[i..].chars().next().map_or(1, char::len_utf8));
+    text[start..=end].parse().unwrap_or(u64::MAX)
+}
+
+/// Refuses an image of which more than half (`bad` of `all`) is no measurement; `what` names it.
+fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> String) -> Result<(), LoadError> {
+    let share = bad as f64 / all.max(1) as f64;
+    if share > MOST_INVALID {
+        return Err(LoadError::MostlyInvalid { file: file.to_owned(), what: what(), share });
+    }
+    Ok(())
+}
+
+/// How a problem begins that leaves a file out.
+const SAME_NAME: &str = "same name";
+
+/// Of two files that would be one pair: `file` is left out.
+fn same_name(file: PathBuf, name: &str, first: &Path) -> Problem {
+    problem(
+        file,
+        format!("{SAME_NAME} ({name}) as {}", first.display()),
+        "rename or remove one of the two; the first is used",
+    )
+}
+
+fn problem(file: impl Into<PathBuf>, what: impl Into<String>, hint: impl Into<String>) -> Problem {
+    Problem { file: file.into(), what: what.into(), hint: hint.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_integer_orders_files() {
+        for (text, want) in [
+            ("data_12", 12),
+            ("pattern_05_3_lines_angle_2_data_5", 5),
+            ("x", 0),
+            ("7é", 7),
+            ("é7", 7),
+            ("99999999999999999999999", u64::MAX),
+        ] {
+            assert_eq!(last_integer(text), want, "{text}");
+        }
+    }
+
+    #[test]
+    fn a_panic_on_a_pair_is_that_pairs_error() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("a_gelslim.png");
+        std::fs::write(&file, b"").unwrap();
+        let dataset = Dataset::open(dir.path()).unwrap();
+        let error =
+            dataset.caught(PairId(0), || -> Result<(), LoadError> { panic!("the depth is {}", 3) }).unwrap_err();
+        let problem = error.to_problem();
+        assert!(
+            problem.what.contains("a bug: the depth is 3") && problem.what.contains("a_gelslim.png"),
+            "{problem:?}"
+        );
+        assert_eq!(problem.file, dir.path().canonicalize().unwrap().join("a_gelslim.png"));
+        assert!(dataset.load(PairId(0)).is_err_and(|err| !matches!(err, LoadError::Bug { .. })));
+    }
+
+    #[test]
+    fn a_dataset_can_be_shared_with_threads() {
+        fn check<T: Send + Sync>() {}
+        check::<Dataset>();
+    }
+}

@@ -1,0 +1,350 @@
+//! A folder of pictures (PNG or JPEG): `NAME_gelslim.png`, optionally with `NAME_bubble.png` and `NAME_vqvae.png`; or
+//! the camera's own images, `NAME_touch.png` with `NAME_reference.png` or one `reference.png` for all.
+//!
+//! A file [`RIG_JSON`] in the folder declares the sensors ([`Rig`]); the names of the first color and the first depth
+//! sensor then stand for `gelslim` and `bubble` in file names. Without it they are the lab's.
+//!
+//! Camera images are used as they are. The others lost their scale: each was stretched to 0..255 on its own. What is
+//! assumed instead:
+//!
+//! * **Imprint**: 0 and 255 stand for [`ASSUMED_IMPRINT_RANGE_M`]. The picture is rotated by 180 degrees (the
+//!   lab's convention for display beside a GelSlim image) and is turned back; it is resampled to 175 x 140 px.
+//! * **GelSlim**: the picture shows a standardised difference image, so "no difference" is its most frequent
+//!   gray, and one gray level is worth [`CLEAN_GAIN`]. Pictures whose most frequent value is the darkest or
+//!   brightest one lost half of their range; they get the gain that brings their spread to [`DIFFERENCE_STD`].
+//! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colors tell
+//!   ([`touch2touch_core::upright`]), and both are laid upright again.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::io::files;
+use crate::io::images;
+use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::resample;
+use touch2touch_core::rig::{Rig, Sensor, SensorId, SensorKind, lab};
+use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
+use touch2touch_core::turn::Turn;
+use touch2touch_core::upright::{self, TurnReading};
+
+use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, last_integer, problem, same_name};
+
+/// What the darkest and brightest value of a bubble picture are taken for, meters.
+pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
+
+/// What to say beside every length of a picture folder.
+pub const ASSUMED_SCALE_NOTE: &str = "assumed scale: the pictures were stretched to 0..255, taken as -6.3 to 18.0 mm";
+
+/// Difference (0..255 scale) per gray level of an unclipped picture: red, green, blue.
+///
+/// Each channel was divided by its standard deviation (0.0989, 0.0746, 0.0731 of 0..1) before all three were
+/// stretched together, so the gains have this ratio; their common factor 0.039 makes the spread of pictures of
+/// this kind equal to [`DIFFERENCE_STD`] (each channel alone asks for 0.038 to 0.040, so the ratio holds).
+const CLEAN_GAIN: [f32; 3] = [0.039 * 0.0989 * 255.0, 0.039 * 0.0746 * 255.0, 0.039 * 0.0731 * 255.0];
+
+/// Standard deviation of the lab's difference images, 0..255 scale (its training set's 0.0687, 0.0428, 0.0576).
+const DIFFERENCE_STD: [f32; 3] = [0.0687 * 255.0, 0.0428 * 255.0, 0.0576 * 255.0];
+
+/// Position of the GelSlim's suffix in [`suffixes`].
+const GELSLIM: usize = 0;
+/// Position of the bubble's suffix in [`suffixes`].
+pub(super) const BUBBLE: usize = 1;
+/// Position of the prediction's suffix in [`suffixes`].
+pub(super) const VQVAE: usize = 2;
+/// Position of the camera image's suffix in [`suffixes`].
+const TOUCH: usize = 3;
+/// Position of the untouched camera image's suffix in [`suffixes`].
+const REFERENCE: usize = 4;
+
+const KINDS: usize = 5;
+/// The file in a folder of pictures that says which sensors took them.
+pub const RIG_JSON: &str = "rig.json";
+const EXTENSIONS: [&str; 3] = [".png", ".jpg", ".jpeg"];
+/// The untouched image of all touches that have none of their own.
+const COMMON_REFERENCE: &str = "reference";
+
+type Files = [Option<PathBuf>; KINDS];
+
+/// The files of a picture folder, in the order of the index.
+#[derive(Clone, Debug)]
+pub(super) struct Pictures {
+    pub(super) pairs: Vec<Files>,
+    pub(super) folder: PathBuf,
+    rig: Arc<Rig>,
+}
+
+/// What the names of the pictures end in, in lower case.
+fn suffixes(rig: &Rig) -> [String; KINDS] {
+    let of = |sensor: Option<&Sensor>, without: &Sensor| format!("_{}", sensor.unwrap_or(without).key.to_lowercase());
+    let (color, depth) = (of(rig.color(), &lab::GELSLIM), of(rig.depth(), &lab::BUBBLE));
+    [color, depth, "_vqvae".into(), "_touch".into(), "_reference".into()]
+}
+
+/// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
+///
+/// # Errors
+/// [`OpenError::Rig`] if the file is there and cannot be read or declares no rig.
+pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
+    let path = folder.join(RIG_JSON);
+    // A link that leads nowhere is there.
+    if path.symlink_metadata().is_err_and(|err| err.kind() == std::io::ErrorKind::NotFound) {
+        return Ok(Rig::lab());
+    }
+    let rig = match files::read(&path, files::SMALL) {
+        Ok(text) => Rig::parse(&text).map_err(|why| format!("{RIG_JSON} does not declare a rig: {why}")),
+        Err(err) => Err(format!("{RIG_JSON} cannot be read: {err}")),
+    };
+    rig.map(Arc::new).map_err(|why| OpenError::Rig { path, why })
+}
+
+/// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
+pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
+    let rig = rig_of(folder)?;
+    Ok(scan_as(folder, rig))
+}
+
+/// Pictures directly in `folder`, felt by the sensors of `rig`.
+fn scan_as(folder: &Path, rig: Arc<Rig>) -> Option<Scan> {
+    let mut problems = Vec::new();
+    let suffixes = suffixes(&rig);
+    let mut found: BTreeMap<String, Files> = BTreeMap::new();
+    let mut common = None;
+    for entry in std::fs::read_dir(folder).ok()? {
+        let path = match entry {
+            Ok(entry) => entry.path(),
+            Err(err) => {
+                problems.push(problem(folder, format!("cannot list the folder: {err}"), "check its permissions"));
+                continue;
+            }
+        };
+        let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
+        let lower = name.to_ascii_lowercase();
+        let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
+        if name.starts_with('.') {
+            continue;
+        }
+        if stem == COMMON_REFERENCE {
+            common = Some(path);
+            continue;
+        }
+        let Some(kind) = suffixes.iter().position(|suffix| stem.ends_with(suffix.as_str())) else { continue };
+        // Suffix and extension are ASCII, so the cut is at a character.
+        let pair = name[..stem.len() - suffixes[kind].len()].to_owned();
+        let slot = &mut found.entry(pair).or_default()[kind];
+        match slot {
+            Some(first) => problems.push(same_name(path, stem, first)),
+            None => *slot = Some(path),
+        }
+    }
+    if found.values().all(|files| [GELSLIM, BUBBLE, TOUCH].iter().all(|kind| files[*kind].is_none())) {
+        return None;
+    }
+    let mut pairs: Vec<(PairEntry, Files)> = Vec::new();
+    for (name, mut files) in found {
+        let touched = files[TOUCH].is_some();
+        if touched && files[REFERENCE].is_none() {
+            files[REFERENCE].clone_from(&common);
+        }
+        let lone = |kind: usize| files[kind].clone().unwrap_or_default();
+        if files[GELSLIM].is_some() || (touched && files[REFERENCE].is_some()) {
+            let number = last_integer(&name);
+            pairs.push((PairEntry { name, tool: None, split: Split::None, number }, files));
+        } else if touched {
+            let what = format!("the untouched image is missing: {name}_reference.png, or one reference.png for all");
+            problems.push(problem(lone(TOUCH), what, "add the image of the gel without contact"));
+        } else if files[REFERENCE].is_none() || files[BUBBLE].is_some() || files[VQVAE].is_some() {
+            let file = if files[BUBBLE].is_some() { lone(BUBBLE) } else { lone(VQVAE) };
+            problems.push(problem(
+                file,
+                format!("its other half {name}{}.png is missing", suffixes[GELSLIM]),
+                "add the missing picture, or remove this one",
+            ));
+        }
+    }
+    pairs.sort_by(|(a, _), (b, _)| (a.number, &a.name).cmp(&(b.number, &b.name)));
+    let (pairs, files) = pairs.into_iter().unzip();
+    Some(Scan {
+        root: folder.to_owned(),
+        pairs,
+        problems,
+        source: Source::Pictures(Pictures { pairs: files, folder: folder.to_owned(), rig: rig.clone() }),
+        kind: SourceKind::Pictures,
+        rig,
+    })
+}
+
+impl Pictures {
+    fn file(&self, id: PairId, kind: usize) -> Result<Option<&Path>, LoadError> {
+        let files = self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
+        Ok(files[kind].as_deref())
+    }
+
+    pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
+        let files = self.pairs.get(id.0 as usize);
+        let kinds = [GELSLIM, TOUCH, REFERENCE, BUBBLE];
+        files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
+    }
+
+    /// The file of a stored prediction.
+    pub(super) fn stored(&self, id: PairId) -> Option<PathBuf> {
+        self.pairs.get(id.0 as usize)?[VQVAE].clone()
+    }
+
+    /// A gray picture that lay this way in its file, upright.
+    pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+        let Some(path) = self.file(id, kind)? else { return Ok(None) };
+        let tile = images::read_gray(path)?;
+        // Pairs are turned as squares; in another shape a quarter turn would not fit back.
+        Ok(Some(if tile.width() == tile.height() || laid.quarters.is_multiple_of(2) { laid.undo(&tile) } else { tile }))
+    }
+
+    /// The upright difference image, and how it lay where the colors tell.
+    fn difference(&self, id: PairId) -> Result<Option<(RgbGrid, Option<TurnReading>)>, LoadError> {
+        let Some(path) = self.file(id, GELSLIM)? else { return Ok(None) };
+        let difference = difference_from_tile(&images::read_rgb(path)?);
+        // The light of a GelSlim tells how its picture lay; nothing is known of other sensors' light.
+        let tells = self.rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key);
+        let reading = tells.then(|| upright::best(&difference)).flatten();
+        let upright = reading.map_or_else(|| difference.clone(), |found| found.turn.undo(&difference));
+        Ok(Some((upright, reading)))
+    }
+
+    /// Whether a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
+    pub(super) fn is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
+        let Some(path) = self.file(id, 0)? else { return Ok(None) };
+        let tile = images::read_rgb(path)?;
+        Ok(Some((0..3).any(|channel| matches!(mode(&tile, channel), 0 | 255))))
+    }
+
+    /// The pair as the first pad's touch: which one it was is not known.
+    pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
+        let mut notes = Vec::new();
+        let mut touch = PadTouch::default();
+        let mut scale = Scale::Assumed;
+        let mut reading = None;
+        // A picture of a kind that the rig does not have is kept behind its sensors.
+        let place = |kind| self.rig.first(kind).unwrap_or(SensorId(self.rig.sensors.len() as u8));
+        let (color_id, depth_id) = (place(SensorKind::Color), place(SensorKind::Depth));
+        if let (Some(touched), Some(reference)) = (self.file(id, TOUCH)?, self.file(id, REFERENCE)?) {
+            let (raw, untouched) = (images::read_rgb(touched)?, images::read_rgb(reference)?);
+            let sizes = [raw.size(), untouched.size()];
+            let color = ColorTouch::from_images(raw, untouched);
+            touch.set(color_id, color.ok_or_else(|| LoadError::Sizes { file: touched.to_owned(), sizes })?);
+            // The model's meters are its own; only a bubble picture has none.
+            scale = Scale::Measured;
+        } else if let Some((difference, read)) = self.difference(id)? {
+            reading = read;
+            let path = self.file(id, GELSLIM)?.unwrap_or(Path::new(""));
+            notes.extend(read.filter(|read| read.is_guess()).map(|read| unsure(path, read)));
+            if difference.as_slice().iter().all(|p| *p == [0.0; 3]) {
+                notes.push(problem(path, "the picture is a single color", "check that the right picture was saved"));
+            }
+            touch.set(color_id, ColorTouch { images: None, difference });
+        }
+        let laid = reading.map_or_else(Turn::default, |read| read.turn);
+        if let Some(tile) = self.tile(id, BUBBLE, laid)? {
+            let [w, h] = tile.size();
+            let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
+            if w < 16 || h < 16 {
+                notes.push(problem(
+                    path,
+                    format!("the picture has only {w} x {h} pixels"),
+                    "save it at 128 x 128 or more",
+                ));
+            }
+            if tile.as_slice().windows(2).all(|v| v[0] == v[1]) {
+                notes.push(problem(path, "the picture is a single gray", "check that the right picture was saved"));
+            }
+            let imprint = imprint_from_tile(&tile, &self.rig);
+            touch.set(depth_id, DepthTouch { imprint, camera: None, truth: None });
+            scale = Scale::Assumed;
+        }
+        let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
+        let sample = Sample { rig: self.rig.clone(), pads, grasp_from_object: None, scale, laid, reading, notes };
+        Ok(Loaded { sample, invalid: Default::default() })
+    }
+}
+
+/// That the colors say how a picture lies, but not clearly.
+fn unsure(path: &Path, read: TurnReading) -> Problem {
+    let what = format!(
+        "its colors hardly tell how it lies: taken as {}, {:.0} % free of curl, {:.0} % more than the next way",
+        read.turn,
+        100.0 * read.consistency,
+        100.0 * read.margin
+    );
+    problem(path, what, "look at it: where it lies wrong, save both pictures of the pair upright")
+}
+
+/// A bubble picture (0..255) on its own pixels, in the assumed meters.
+pub fn assumed_meters(tile: &Grid<f32>) -> DepthMap {
+    let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+    tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32)
+}
+
+/// Assumed meters, turned back to how the depth sensor's picture lies, at its size.
+pub(super) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
+    let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
+    let turned = if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile.clone() };
+    // The lab made these pictures with torchvision's resize, so they are undone with the same one.
+    resample::bilinear(&assumed_meters(&turned), sensor.width, sensor.height)
+}
+
+/// The most frequent level of a channel.
+fn mode(tile: &RgbGrid, channel: usize) -> usize {
+    let mut counts = [0u32; 256];
+    for pixel in tile.as_slice() {
+        counts[pixel[channel].round().clamp(0.0, 255.0) as usize] += 1;
+    }
+    counts.iter().enumerate().max_by_key(|&(level, &n)| (n, std::cmp::Reverse(level))).map_or(0, |m| m.0)
+}
+
+fn difference_from_tile(tile: &RgbGrid) -> RgbGrid {
+    let mut zero = [0f32; 3];
+    let mut gain = CLEAN_GAIN;
+    for channel in 0..3 {
+        let mode = mode(tile, channel);
+        zero[channel] = mode as f32;
+        if mode == 0 || mode == 255 {
+            let spread = standard_deviation(tile.as_slice().iter().map(|p| f64::from(p[channel]))) as f32;
+            gain[channel] = if spread > 1.0 { DIFFERENCE_STD[channel] / spread } else { 0.0 };
+        }
+    }
+    tile.map(|pixel| std::array::from_fn(|c| (pixel[c] - zero[c]) * gain[c]))
+}
+
+fn standard_deviation(values: impl Iterator<Item = f64>) -> f64 {
+    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+    for v in values {
+        n += 1.0;
+        sum += v;
+        squares += v * v;
+    }
+    if n == 0.0 { 0.0 } else { (squares / n - (sum / n) * (sum / n)).max(0.0).sqrt() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tile_is_turned_back_and_scaled() {
+        let tile = Grid::from_fn(128, 128, |x, y| if x < 10 && y < 10 { 255.0 } else { 0.0 });
+        let imprint = imprint_from_tile(&tile, &Rig::lab());
+        assert_eq!(imprint.size(), [175, 140]);
+        assert!((imprint[(174, 139)] - 0.018).abs() < 1e-6);
+        assert!((imprint[(0, 0)] + 0.0063).abs() < 1e-6);
+    }
+
+    #[test]
+    fn gray_is_no_difference() {
+        let mut tile = Grid::filled(20, 20, [120.0; 3]);
+        tile[(3, 4)] = [220.0, 120.0, 20.0];
+        let difference = difference_from_tile(&tile);
+        assert_eq!(difference[(0, 0)], [0.0; 3]);
+        assert!((difference[(3, 4)][0] - 98.4).abs() < 0.1 && (difference[(3, 4)][2] + 72.7).abs() < 0.1);
+        assert_eq!(difference_from_tile(&Grid::filled(4, 4, [0.0; 3]))[(1, 1)], [0.0; 3]);
+    }
+}

@@ -1,0 +1,299 @@
+//! The unit of CAD files: STL does not say which it is.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use strum::{EnumIter, IntoEnumIterator as _};
+
+use super::problem;
+use crate::io::stl::{self, MeshError};
+use crate::io::{atomic, files};
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::units::{is_tool_length, scale_to_meters};
+
+/// The file beside the CAD models that says which unit they are in.
+pub const UNIT_FILE: &str = "unit.txt";
+/// Most bytes of that file: a word or a number.
+const MAX_UNIT_BYTES: u64 = 4096;
+
+/// A unit that CAD programs write models in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
+pub enum ToolUnit {
+    /// Most CAD programs' own.
+    Millimeters,
+    /// Blender's and others'.
+    Centimeters,
+    /// The lab's.
+    Meters,
+    /// Rarely anyone's.
+    Micrometers,
+    /// Where parts are drawn in them.
+    Inches,
+}
+
+impl ToolUnit {
+    /// The word in [`UNIT_FILE`] and on the command line.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Millimeters => "mm",
+            Self::Centimeters => "cm",
+            Self::Meters => "m",
+            Self::Micrometers => "um",
+            Self::Inches => "in",
+        }
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Millimeters => "millimeters",
+            Self::Centimeters => "centimeters",
+            Self::Meters => "meters",
+            Self::Micrometers => "micrometers",
+            Self::Inches => "inches",
+        }
+    }
+
+    /// One of it, meters.
+    pub fn meters(self) -> f64 {
+        match self {
+            Self::Millimeters => 1e-3,
+            Self::Centimeters => 1e-2,
+            Self::Meters => 1.0,
+            Self::Micrometers => 1e-6,
+            Self::Inches => 0.0254,
+        }
+    }
+
+    /// The units in which something of this size is as large as a hand-held tool.
+    pub fn fitting(size: f64) -> impl Iterator<Item = Self> {
+        Self::iter().filter(move |unit| is_tool_length(size * unit.meters()))
+    }
+
+    /// What reading a file in this unit is.
+    pub fn scale(self) -> ToolScale {
+        if self == Self::Meters { ToolScale::Meters } else { ToolScale::Factor(self.meters()) }
+    }
+}
+
+impl FromStr for ToolUnit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::iter()
+            .find(|unit| unit.key() == text)
+            .ok_or_else(|| format!("{:?} is no unit: use m, cm, mm, um or in", files::clip(text)))
+    }
+}
+
+/// What the numbers of a CAD file mean.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum ToolScale {
+    /// Meters; a model that is too large or too small for that is an error.
+    #[default]
+    Meters,
+    /// The unit that makes the model as large as a hand-held tool.
+    Auto,
+    /// To be multiplied by this to get meters.
+    Factor(f64),
+}
+
+impl FromStr for ToolScale {
+    type Err = String;
+
+    /// `m`, `cm`, `mm`, `um`, `in`, `auto`, or the factor to meters.
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let text = text.trim();
+        if let Ok(unit) = text.parse::<ToolUnit>() {
+            return Ok(unit.scale());
+        }
+        Ok(match text {
+            "auto" => Self::Auto,
+            other => match other.parse::<f64>() {
+                Ok(factor) if factor.is_finite() && factor > 0.0 => Self::Factor(factor),
+                _ => {
+                    return Err(format!(
+                        "{:?} is no unit: use m, cm, mm, um, in, auto or a factor to meters",
+                        files::clip(other)
+                    ));
+                }
+            },
+        })
+    }
+}
+
+impl ToolScale {
+    /// What [`UNIT_FILE`] beside `model` says; `None` without one.
+    fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
+        let unknown = |reason| MeshError::UnitFile { file: model.with_file_name(UNIT_FILE), reason };
+        said_beside(model)?.map(|text| text.parse().map_err(unknown)).transpose()
+    }
+}
+
+/// The words of [`UNIT_FILE`] beside `model`; `None` without one.
+///
+/// # Errors
+/// If it is there and cannot be read.
+pub fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
+    let file: PathBuf = model.with_file_name(UNIT_FILE);
+    match files::read_to_string(&file, MAX_UNIT_BYTES) {
+        Ok(text) => Ok(Some(text.trim().to_owned())),
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        Err(source) => Err(MeshError::Io { file, source }),
+    }
+}
+
+/// Longest side of a CAD model, in its file's own unit.
+///
+/// # Errors
+/// If it cannot be read.
+pub fn tool_size(path: &Path) -> Result<f64, MeshError> {
+    let bounds = stl::read(path)?.mesh.bounds();
+    Ok(bounds.map_or(0.0, |[lo, hi]| (hi - lo).max_element()))
+}
+
+/// Names the unit of all CAD models beside `model`, for good. What the file said before is lost.
+///
+/// # Errors
+/// Whatever the disk says.
+pub fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
+    atomic::write_bytes(&model.with_file_name(UNIT_FILE), format!("{word}\n").as_bytes())
+}
+
+/// A CAD model that can be worked with.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ToolFile {
+    /// The model in meters.
+    pub mesh: TriMesh,
+    /// What is odd about its file.
+    pub notes: Vec<Problem>,
+}
+
+/// Reads a CAD model and brings it to meters: by `scale`, else as [`UNIT_FILE`] beside it says, else as it is. The one
+/// verdict on CAD files, for the doctor and for whoever uses them.
+///
+/// # Errors
+/// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in meters, and
+/// [`MeshError::NotATool`] if no unit makes it a tool, or not the one that was named.
+pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
+    let (scale, said_by) = match scale {
+        Some(scale) => (scale, "the caller".to_owned()),
+        None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),
+    };
+    let stl::StlFile { mut mesh, degenerate, .. } = stl::read(path)?;
+    let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
+    let fitting = scale_to_meters(size);
+    let not_a_tool = |unit: String| MeshError::NotATool { file: path.to_owned(), size, unit };
+    let factor = match (scale, fitting) {
+        (ToolScale::Factor(factor), _) if is_tool_length(size * factor) => factor,
+        (ToolScale::Factor(factor), fitting) => {
+            let instead = fitting.map_or(String::new(), |fitting| format!("; {fitting} would fit"));
+            return Err(not_a_tool(format!("with the factor {factor} to meters that {said_by} gives{instead}")));
+        }
+        (ToolScale::Auto, Some(factor)) => factor,
+        (ToolScale::Meters, Some(1.0)) => 1.0,
+        (ToolScale::Meters, Some(offered)) => return Err(MeshError::Unit { file: path.to_owned(), size, offered }),
+        (ToolScale::Meters | ToolScale::Auto, None) => return Err(not_a_tool("in meters or any other unit".into())),
+    };
+    if factor != 1.0 {
+        for vertex in &mut mesh.vertices {
+            *vertex *= factor;
+        }
+    }
+    let notes = (degenerate > 0).then(|| {
+        problem(
+            path,
+            format!("{degenerate} triangles of the CAD model have no area"),
+            "they are left out; repair the mesh if edges look frayed",
+        )
+    });
+    Ok(ToolFile { mesh, notes: notes.into_iter().collect() })
+}
+
+/// The mesh of [`read_tool`].
+///
+/// # Errors
+/// As [`read_tool`].
+pub fn read_in_meters(path: &Path, scale: Option<ToolScale>) -> Result<TriMesh, MeshError> {
+    read_tool(path, scale).map(|file| file.mesh)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    /// A 40 x 20 x 10 box, in units of `unit` meters.
+    fn write(path: &Path, unit: f64) {
+        let size = DVec3::new(0.01, 0.02, 0.04) / unit;
+        let vertices = (0..8).map(|i| DVec3::new((i & 1).into(), (i >> 1 & 1).into(), (i >> 2 & 1).into()) * size);
+        let quads = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+        let triangles = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        stl::write(path, &TriMesh { vertices: vertices.collect(), triangles }).unwrap();
+    }
+
+    fn length(mesh: &TriMesh) -> f64 {
+        mesh.bounds().map(|[lo, hi]| (hi - lo).max_element()).unwrap()
+    }
+
+    #[test]
+    fn every_unit_is_offered_and_the_offer_can_be_accepted() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        for (unit, name) in [(1.0, "m"), (1e-2, "cm"), (1e-3, "mm"), (1e-6, "um"), (0.0254, "in")] {
+            write(&path, unit);
+            let scale: ToolScale = name.parse().unwrap();
+            assert!((length(&read_in_meters(&path, Some(scale)).unwrap()) - 0.04).abs() < 1e-8, "{name}");
+        }
+        for unit in [1e-3, 1e-6] {
+            write(&path, unit);
+            let error = read_in_meters(&path, None).unwrap_err();
+            assert!(matches!(error, MeshError::Unit { offered, .. } if (offered - unit).abs() < 1e-12), "{error}");
+            assert!(error.to_string().contains("t.stl") && error.hint().contains("--tool-scale auto"));
+            assert!((length(&read_in_meters(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
+        }
+        // Beside the models it holds for the studio as well; the caller's word counts more.
+        std::fs::write(dir.path().join(UNIT_FILE), "auto\n").unwrap();
+        assert!((length(&read_in_meters(&path, None).unwrap()) - 0.04).abs() < 1e-8);
+        assert!(read_in_meters(&path, Some(ToolScale::Meters)).is_err());
+        std::fs::write(dir.path().join(UNIT_FILE), "furlong").unwrap();
+        let error = read_in_meters(&path, None).unwrap_err();
+        assert!(error.to_string().contains("furlong") && error.file().ends_with(UNIT_FILE), "{error}");
+    }
+
+    #[test]
+    fn a_unit_that_makes_no_tool_is_refused_whoever_names_it() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        // Too large or too small in every unit.
+        for unit in [1e-30, 1e20] {
+            write(&path, unit);
+            for scale in [None, Some(ToolScale::Auto), Some(ToolScale::Meters), Some(ToolScale::Factor(1.0))] {
+                let error = read_tool(&path, scale).unwrap_err();
+                assert!(matches!(error, MeshError::NotATool { .. }) && error.to_string().contains("t.stl"), "{error}");
+                assert!(error.to_string().len() < 200 + path.as_os_str().len(), "{error}");
+            }
+        }
+        // A model in millimeters: the right unit in the file is right, a wrong one is not taken.
+        write(&path, 1e-3);
+        let unit_file = dir.path().join(UNIT_FILE);
+        for right in ["mm", "auto", "0.001"] {
+            std::fs::write(&unit_file, right).unwrap();
+            assert!((length(&read_tool(&path, None).unwrap().mesh) - 0.04).abs() < 1e-8, "{right}");
+        }
+        for wrong in ["um", "in", "1"] {
+            std::fs::write(&unit_file, wrong).unwrap();
+            let error = read_tool(&path, None).unwrap_err().to_string();
+            assert!(error.contains(UNIT_FILE) && error.contains("0.001 would fit"), "{wrong}: {error}");
+        }
+    }
+
+    #[test]
+    fn only_units_are_units() {
+        for bad in ["", "0", "-1", "nan", "inf", "mm mm"] {
+            assert!(bad.parse::<ToolScale>().is_err(), "{bad}");
+        }
+        assert_eq!(" 0.001\n".parse(), Ok(ToolScale::Factor(1e-3)));
+    }
+}

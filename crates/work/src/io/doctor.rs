@@ -1,0 +1,163 @@
+//! The doctor: loads every pair of a data set and lists what is wrong with it, in words that say what to do.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+use rayon::prelude::*;
+
+use super::dataset::{Dataset, Loaded, OpenError};
+use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_core::turn::Turn;
+
+/// What the doctor found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct DoctorReport {
+    /// Pairs in the index.
+    pub pairs: usize,
+    /// Pairs that were loaded or tried before the examination ended.
+    pub examined: usize,
+    /// Everything wrong, data set first, then CAD models, then pairs in the order of the index. What differs only in file,
+    /// finger or numbers is one entry.
+    pub problems: Vec<Finding>,
+}
+
+impl DoctorReport {
+    /// Of a data set whose pairs cannot be read at all.
+    pub fn refused(why: &OpenError) -> Self {
+        let mut findings = Findings::default();
+        findings.add(why.to_problem());
+        Self { pairs: 0, examined: 0, problems: findings.into_list() }
+    }
+}
+
+/// Pairs loaded between two reports of progress.
+const BATCH: usize = 16;
+
+/// Loads every pair, on all cores, and lists what is wrong. `progress` is told `(done, total)` on the calling
+/// thread and may end the examination.
+///
+/// What is looked for: files that cannot be read, keys and shapes, NaN and infinities, imprints and CAD models that
+/// are not in meters, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels
+/// that do not survive the way from depth to cloud and back.
+pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> DoctorReport {
+    let total = dataset.index.pairs.len();
+    let mut findings = Findings::default();
+    findings.extend(dataset.problems.iter().cloned());
+    for tool in dataset.index.tools() {
+        // A missing file is found when the data set is opened.
+        findings.extend(match dataset.tool_with_notes(&tool) {
+            Ok(file) => file.map_or_else(Vec::new, |file| file.notes),
+            Err(err) => vec![Problem { file: err.file().to_owned(), what: err.to_string(), hint: err.hint().into() }],
+        });
+    }
+    let mut few = FewInvalid::default();
+    let mut turned = Turned::default();
+    let mut examined = 0;
+    let mut go_on = progress(0, total).is_continue();
+    while go_on && examined < total {
+        let batch: Vec<PairId> = (examined..total.min(examined + BATCH)).map(|id| PairId(id as u32)).collect();
+        let found: Vec<_> = batch.par_iter().map(|&id| look_at(dataset, id)).collect();
+        for (id, look) in batch.iter().zip(found) {
+            findings.extend(look.problems);
+            turned.add(dataset, *id, look.laid);
+            if look.few_invalid > 0 {
+                few.add(dataset, *id, look.few_invalid, look.pixels);
+            }
+        }
+        examined += batch.len();
+        go_on = progress(examined, total).is_continue();
+    }
+    if examined > 0 {
+        findings.extend(few.problem(examined));
+        findings.extend(turned.problem(examined));
+    }
+    DoctorReport { pairs: total, examined, problems: findings.into_list() }
+}
+
+/// Small numbers of invalid pixels, summed over pairs.
+#[derive(Default)]
+struct FewInvalid {
+    pairs: usize,
+    worst: Option<(f64, PathBuf)>,
+}
+
+impl FewInvalid {
+    fn add(&mut self, dataset: &Dataset, id: PairId, count: usize, pixels: usize) {
+        self.pairs += 1;
+        let share = count as f64 / pixels as f64;
+        if self.worst.as_ref().is_none_or(|(worst, _)| share > *worst) {
+            self.worst = dataset.pair_files(id).pop().map(|file| (share, file));
+        }
+    }
+
+    fn problem(self, examined: usize) -> Option<Problem> {
+        let (share, file) = self.worst?;
+        Some(Problem {
+            file,
+            what: format!(
+                "{} of {examined} pairs have bubble pixels without measurement (NaN or depth 0), at most {:.3} % as in \
+                 this file",
+                self.pairs,
+                100.0 * share
+            ),
+            hint: "normal for a depth camera; these pixels are left out everywhere".into(),
+        })
+    }
+}
+
+/// Pairs whose pictures were not upright, summed over pairs.
+#[derive(Default)]
+struct Turned {
+    pairs: usize,
+    first: Option<(Turn, PathBuf)>,
+}
+
+impl Turned {
+    fn add(&mut self, dataset: &Dataset, id: PairId, laid: Turn) {
+        if laid != Turn::default() {
+            self.pairs += 1;
+            self.first.get_or_insert_with(|| (laid, dataset.pair_files(id).first().cloned().unwrap_or_default()));
+        }
+    }
+
+    fn problem(self, examined: usize) -> Option<Problem> {
+        let (laid, file) = self.first?;
+        Some(Problem {
+            file,
+            what: format!(
+                "{} of {examined} pairs do not lie upright, as this one ({laid}); the light's colors tell",
+                self.pairs
+            ),
+            hint: "usual for pictures made for training; both pictures of such a pair are read upright".into(),
+        })
+    }
+}
+
+/// What there is to say about one pair.
+#[derive(Default)]
+struct Look {
+    problems: Vec<Problem>,
+    /// Invalid pixels that are worth no problem of their own, of how many.
+    few_invalid: usize,
+    pixels: usize,
+    /// How its pictures lay.
+    laid: Turn,
+}
+
+fn look_at(dataset: &Dataset, id: PairId) -> Look {
+    let Loaded { sample, invalid } = match dataset.load_with_counts(id) {
+        Ok(loaded) => loaded,
+        Err(err) => return Look { problems: vec![err.to_problem()], ..Look::default() },
+    };
+    let (mut few_invalid, mut pixels) = (0, 0);
+    for (pad, touch) in sample.pads.entries() {
+        let Some(bubble) = touch.depth() else { continue };
+        let invalid = invalid[pad].unwrap_or_default();
+        pixels += bubble.imprint.len();
+        if !invalid.are_many(bubble.imprint.len()) {
+            few_invalid += invalid.total();
+        }
+    }
+    Look { problems: sample.notes, few_invalid, pixels, laid: sample.laid }
+}

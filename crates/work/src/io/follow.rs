@@ -1,0 +1,361 @@
+//! [`Follower`]: touches that appear in a folder, one by one, each as soon as its files are whole.
+//!
+//! The folder is polled, every [`PERIOD`]: unlike the system's notifications, that also sees what another machine writes
+//! to a network folder. A poll asks for the time of change of a handful of folders; names are read again when one of
+//! them changed, or now and then. A file counts as whole when it can be read to its end (a cut `.pt`, PNG or JPEG
+//! cannot) and did not change meanwhile; until then it is tried again, at most for the given patience after its last
+//! change.
+
+use std::collections::{BTreeMap, VecDeque};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime};
+
+use crate::io::dataset::{Dataset, LoadError, Loaded, OpenError, ToolScale};
+use crate::io::pt::PtError;
+use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::sample::DepthCamera;
+
+/// Time between two looks at the folder.
+pub const PERIOD: Duration = Duration::from_millis(10);
+/// How long a file that cannot be read may stay unchanged before it is reported.
+pub const PATIENCE: Duration = Duration::from_secs(2);
+/// Names are read again at least this often, whatever the folder says about its last change.
+const RESCAN: Duration = Duration::from_millis(500);
+/// Reading names may take at most this share of the time.
+const RESCAN_SHARE: u32 = 20;
+
+/// What tells one content of a file from another without reading it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stamp {
+    /// Bytes.
+    pub bytes: u64,
+    /// When it was last written to.
+    pub modified: SystemTime,
+    /// When it was last written to or renamed, whichever is later.
+    pub closed: SystemTime,
+}
+
+impl Stamp {
+    /// The stamp of a file; `None` if it is not there.
+    pub fn of(file: &Path) -> Option<Self> {
+        let meta = std::fs::metadata(file).ok()?;
+        let modified = meta.modified().ok()?;
+        Some(Self { bytes: meta.len(), modified, closed: changed(&meta).map_or(modified, |c| c.max(modified)) })
+    }
+
+    /// Nanoseconds since 1970 of the last write; 0 for what is older.
+    pub fn modified_ns(&self) -> u64 {
+        self.modified.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_nanos() as u64)
+    }
+}
+
+#[cfg(unix)]
+fn changed(meta: &std::fs::Metadata) -> Option<SystemTime> {
+    use std::os::unix::fs::MetadataExt as _;
+    let (s, ns) = (u64::try_from(meta.ctime()).ok()?, u32::try_from(meta.ctime_nsec()).ok()?);
+    SystemTime::UNIX_EPOCH.checked_add(Duration::new(s, ns))
+}
+
+#[cfg(not(unix))]
+fn changed(_meta: &std::fs::Metadata) -> Option<SystemTime> {
+    None
+}
+
+/// A touch whose turn it is.
+#[derive(Clone, Debug)]
+pub struct Ready {
+    /// The pair in [`Follower::dataset`].
+    pub id: PairId,
+    /// Its name.
+    pub name: String,
+    /// Its GelSlim file.
+    pub file: PathBuf,
+    /// What the file was when it was looked at.
+    pub stamp: Stamp,
+    /// Whether it appeared while the folder was followed.
+    pub fresh: bool,
+    /// Whether it was there before, and only its bubble came later: its prediction stays what it was.
+    pub completed: bool,
+}
+
+/// What became of a touch.
+#[derive(Debug)]
+pub enum Arrival {
+    /// It is whole.
+    Whole(Box<Loaded>),
+    /// It is being written: it comes again.
+    Unfinished,
+    /// It is gone.
+    Gone,
+    /// It cannot be read, and did not change for a while. It comes again when it changes.
+    Broken(Problem),
+}
+
+/// Where a touch is on its way.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stage {
+    /// In a queue.
+    Waiting,
+    /// Nothing to do until the file changes.
+    Rests,
+}
+
+#[derive(Clone, Debug)]
+struct Seen {
+    id: PairId,
+    file: PathBuf,
+    /// All files of the pair.
+    files: Vec<PathBuf>,
+    stamp: Stamp,
+    stage: Stage,
+    completed: bool,
+    /// When this stamp was first seen.
+    since: Instant,
+    /// Not before.
+    retry: Instant,
+}
+
+/// How a folder is followed.
+#[derive(Clone, Debug)]
+pub struct FollowConfig {
+    /// Whether touches that lie there already are taken up as well.
+    pub existing: bool,
+    /// How long a file that cannot be read may stay unchanged before it is reported.
+    pub patience: Duration,
+    /// Unit of the CAD models, as in [`Dataset::tool_scale`].
+    pub tool_scale: Option<ToolScale>,
+    /// Cameras for touches without a bubble, by finger; without them those that the data set finds itself.
+    pub cameras: Option<PerPad<DepthCamera>>,
+}
+
+impl Default for FollowConfig {
+    fn default() -> Self {
+        Self { existing: false, patience: PATIENCE, tool_scale: None, cameras: None }
+    }
+}
+
+/// A followed folder.
+#[derive(Debug)]
+pub struct Follower {
+    path: PathBuf,
+    dataset: Option<Arc<Dataset>>,
+    config: FollowConfig,
+    seen: BTreeMap<String, Seen>,
+    fresh: VecDeque<String>,
+    backlog: VecDeque<String>,
+    folders: Vec<(PathBuf, Option<SystemTime>)>,
+    next_scan: Instant,
+    started: SystemTime,
+    troubles: Vec<Problem>,
+}
+
+impl Follower {
+    /// Follows `path`, which may still be empty.
+    ///
+    /// # Errors
+    /// [`OpenError::Io`] if the folder is not there.
+    pub fn new(path: &Path, config: FollowConfig) -> Result<Self, OpenError> {
+        let io = |source| OpenError::Io { path: path.to_owned(), source };
+        let path = path.canonicalize().map_err(io)?;
+        drop(std::fs::read_dir(&path).map_err(io)?);
+        let mut follower = Self::of(path, config);
+        follower.scan(Instant::now(), true);
+        Ok(follower)
+    }
+
+    /// Follows the folder of an open data set, whose pairs keep their ids; `None` for one without a folder.
+    pub fn continuing(dataset: Arc<Dataset>) -> Option<Self> {
+        let mut follower = Self::of(dataset.root.clone()?, FollowConfig::default());
+        follower.dataset = Some(dataset);
+        follower.enter(Instant::now(), true);
+        Some(follower)
+    }
+
+    fn of(path: PathBuf, config: FollowConfig) -> Self {
+        Self {
+            path,
+            dataset: None,
+            config,
+            seen: BTreeMap::new(),
+            fresh: VecDeque::new(),
+            backlog: VecDeque::new(),
+            folders: Vec::new(),
+            next_scan: Instant::now(),
+            started: SystemTime::now(),
+            troubles: Vec::new(),
+        }
+    }
+
+    /// The data set as far as it is known; `None` while the folder holds none.
+    pub fn dataset(&self) -> Option<&Arc<Dataset>> {
+        self.dataset.as_ref()
+    }
+
+    /// What kept the last look at the folder from finding all touches: it cannot be read, it holds none any more, or
+    /// some are left out.
+    pub fn troubles(&self) -> &[Problem] {
+        &self.troubles
+    }
+
+    /// Touches that wait.
+    pub fn waiting(&self) -> usize {
+        self.fresh.len() + self.backlog.len()
+    }
+
+    /// The next touch that can be tried, new ones first; `None` if there is nothing to do until the next [`PERIOD`].
+    pub fn poll(&mut self, now: Instant) -> Option<Ready> {
+        let moved = self.folders.iter().any(|(folder, time)| modified(folder) != *time);
+        if moved || now >= self.next_scan {
+            self.scan(now, false);
+        }
+        for fresh in [true, false] {
+            let queue = if fresh { &mut self.fresh } else { &mut self.backlog };
+            let at = queue.iter().position(|name| self.seen.get(name).is_none_or(|seen| now >= seen.retry));
+            let Some(name) = at.and_then(|at| queue.remove(at)) else { continue };
+            let Some(seen) = self.seen.get_mut(&name) else { continue };
+            let Some(stamp) = Stamp::of(&seen.file) else {
+                self.seen.remove(&name);
+                continue;
+            };
+            if stamp != seen.stamp {
+                (seen.stamp, seen.since, seen.completed) = (stamp, now, false);
+            }
+            seen.stage = Stage::Rests;
+            let completed = seen.completed;
+            return Some(Ready { id: seen.id, file: seen.file.clone(), stamp, fresh, completed, name });
+        }
+        None
+    }
+
+    /// Reads a touch that [`Follower::poll`] gave.
+    pub fn load(&mut self, ready: &Ready, now: Instant) -> Arrival {
+        let Some(dataset) = self.dataset.clone() else { return Arrival::Gone };
+        let result = dataset.load_with_counts(ready.id);
+        let Some(seen) = self.seen.get_mut(&ready.name) else { return Arrival::Gone };
+        let Some(stamp) = Stamp::of(&ready.file) else {
+            self.seen.remove(&ready.name);
+            return Arrival::Gone;
+        };
+        if stamp != ready.stamp {
+            (seen.stamp, seen.since) = (stamp, now);
+        } else {
+            match result {
+                Ok(loaded) => return Arrival::Whole(Box::new(loaded)),
+                Err(err) if !may_heal(&err) || now.duration_since(seen.since) >= self.config.patience => {
+                    return Arrival::Broken(err.to_problem());
+                }
+                Err(_) => {}
+            }
+        }
+        // Soon at first, as most files are whole within milliseconds; a slow copy is not read again and again.
+        let age = now.duration_since(seen.since);
+        seen.retry = now + (age / 8).clamp(PERIOD, Duration::from_millis(200));
+        seen.stage = Stage::Waiting;
+        let queue = if ready.fresh { &mut self.fresh } else { &mut self.backlog };
+        queue.push_back(ready.name.clone());
+        Arrival::Unfinished
+    }
+
+    /// Reads the names again.
+    fn scan(&mut self, now: Instant, first: bool) {
+        // Before the names are read: what appears meanwhile changes the time once more.
+        let before: Vec<(PathBuf, Option<SystemTime>)> =
+            self.folders.iter().map(|(folder, _)| (folder.clone(), modified(folder))).collect();
+        let grown = match &self.dataset {
+            Some(dataset) => dataset.grown().map(|growth| growth.dataset),
+            None => Dataset::open(&self.path),
+        };
+        self.troubles.clear();
+        match grown {
+            Ok(mut dataset) => {
+                self.troubles = dataset.left_out();
+                if self.dataset.is_none() {
+                    dataset.tool_scale = self.config.tool_scale;
+                    if let Some(cameras) = self.config.cameras.clone() {
+                        dataset.set_rig_cameras(cameras);
+                    }
+                }
+                self.dataset = Some(Arc::new(dataset));
+                self.enter(now, first);
+            }
+            Err(OpenError::NothingFound { .. }) => {
+                self.folders = vec![(self.path.clone(), modified(&self.path))];
+                let known = self.dataset.as_ref().map_or(0, |dataset| dataset.index.pairs.len());
+                // An empty folder is one that fills; an emptied one has lost something.
+                if known > 0 {
+                    self.troubles.push(Problem {
+                        file: self.path.clone(),
+                        what: format!("no touch is found in the folder any more; {known} were known"),
+                        hint: "put them back, or go on: touches that appear here are still taken".into(),
+                    });
+                }
+            }
+            Err(err) => self.troubles.push(err.to_problem()),
+        }
+        for (folder, time) in before {
+            if let Some(known) = self.folders.iter_mut().find(|(f, _)| *f == folder) {
+                known.1 = time;
+            }
+        }
+        self.next_scan = Instant::now() + RESCAN.max(now.elapsed() * RESCAN_SHARE);
+    }
+
+    /// Compares the files of the data set with what was seen of them.
+    fn enter(&mut self, now: Instant, first: bool) {
+        let Some(dataset) = self.dataset.clone() else { return };
+        let time = |folder: PathBuf| (folder.clone(), modified(&folder));
+        self.folders = dataset.folders().into_iter().map(time).collect();
+        for (at, entry) in dataset.index.pairs.iter().enumerate() {
+            let id = PairId(at as u32);
+            let Some(file) = dataset.gelslim_file(id) else { continue };
+            let Some(stamp) = Stamp::of(&file) else {
+                self.seen.remove(&entry.name);
+                continue;
+            };
+            let files = dataset.pair_files(id);
+            let known = self.seen.get_mut(&entry.name);
+            // What was written after the start is new, even where it was there before the first look.
+            let fresh = !first || stamp.closed >= self.started;
+            let wanted = fresh || self.config.existing;
+            match known {
+                Some(seen) if seen.stamp == stamp && seen.files == files => continue,
+                Some(seen) => {
+                    let queued = seen.stage == Stage::Waiting;
+                    let completed = !queued && seen.stamp == stamp && seen.file == file;
+                    let stage = Stage::Waiting;
+                    *seen = Seen { id, file, files, stamp, stage, completed, since: now, retry: now };
+                    if queued {
+                        continue;
+                    }
+                }
+                None => {
+                    let stage = if wanted { Stage::Waiting } else { Stage::Rests };
+                    let seen = Seen { id, file, files, stamp, stage, completed: false, since: now, retry: now };
+                    self.seen.insert(entry.name.clone(), seen);
+                    if !wanted {
+                        continue;
+                    }
+                }
+            }
+            let queue = if fresh { &mut self.fresh } else { &mut self.backlog };
+            queue.push_back(entry.name.clone());
+        }
+    }
+}
+
+fn modified(folder: &Path) -> Option<SystemTime> {
+    std::fs::metadata(folder).ok()?.modified().ok()
+}
+
+/// Whether an error can be that of a file that is not written to its end yet.
+fn may_heal(err: &LoadError) -> bool {
+    !matches!(
+        err,
+        LoadError::Pt(PtError::MissingKey { .. } | PtError::NotATensor { .. } | PtError::WrongShape { .. })
+            | LoadError::Sizes { .. }
+            | LoadError::MostlyInvalid { .. }
+            | LoadError::NoSuchPair { .. }
+    )
+}

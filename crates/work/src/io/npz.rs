@@ -1,0 +1,267 @@
+//! numpy's `.npz`: a zip of arrays.
+
+mod npy;
+
+use std::collections::BTreeMap;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+use super::pt::{Tensor, Values};
+use super::{archive, atomic, files};
+use touch2touch_core::grid::{Grid, RgbGrid};
+
+/// Why an `.npz` file cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum NpzError {
+    /// The file cannot be opened.
+    #[error("cannot read or write the file ({}): {source}", file.display())]
+    Io {
+        /// The file.
+        file: PathBuf,
+        /// The system's reason.
+        source: std::io::Error,
+    },
+    /// Not a zip archive, or a damaged one.
+    #[error("not a readable .npz archive: {reason} ({})", file.display())]
+    Archive {
+        /// The file.
+        file: PathBuf,
+        /// What was found.
+        reason: String,
+    },
+    /// An array that cannot be read.
+    #[error("array \"{name}\" cannot be read: {reason} ({})", file.display())]
+    Array {
+        /// The file.
+        file: PathBuf,
+        /// The array's name.
+        name: String,
+        /// What was found.
+        reason: String,
+    },
+}
+
+/// Writes an image as numpy's `.npy`: `f32`, shape `(height, width)`, row-major.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
+    write_values(file, &[image.height(), image.width()], Values::F32(image.as_slice().to_vec()))
+}
+
+/// An image as the bytes of a `.npy` file: f32, shape `(height, width)`, row-major.
+pub fn npy_bytes(image: &Grid<f32>) -> Vec<u8> {
+    npy::bytes(&[image.height(), image.width()], &Values::F32(image.as_slice().to_vec()))
+}
+
+/// The image in the bytes of such a file.
+///
+/// # Errors
+/// In words, if they are not those of an image of 32-bit floats.
+pub fn image_of_npy(bytes: &[u8]) -> Result<Grid<f32>, String> {
+    let mut from = bytes;
+    let header = npy::header(&mut from, bytes.len())?;
+    let tensor = header.values(&mut from, bytes.len() as u64)?;
+    match (&*tensor.shape, tensor.values) {
+        ([height, width], Values::F32(values)) => {
+            Grid::from_vec(*width, *height, values).map_err(|err| err.to_string())
+        }
+        (shape, _) => Err(format!("it is no image of 32-bit floats (shape {shape:?})")),
+    }
+}
+
+/// Writes a gray picture as `.npy`: u8, shape `(height, width)`, row-major.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy_gray(file: &Path, picture: &Grid<u8>) -> Result<(), NpzError> {
+    write_values(file, &[picture.height(), picture.width()], Values::U8(picture.as_slice().to_vec()))
+}
+
+/// Reads a `.npy` file of numbers, row-major. Integers other than `u8` become `i64`.
+///
+/// # Errors
+/// [`NpzError`].
+pub fn read_npy(file: &Path) -> Result<Tensor, NpzError> {
+    let io = |source| NpzError::Io { file: file.to_owned(), source };
+    let name = file.file_stem().map(|name| files::clip(&name.to_string_lossy())).unwrap_or_default();
+    let failed = |reason| NpzError::Array { file: file.to_owned(), name: name.clone(), reason };
+    let opened = files::open(file).map_err(io)?;
+    let size = opened.metadata().map_err(io)?.len();
+    let mut from = std::io::BufReader::new(opened);
+    let header = npy::header(&mut from, MAX_VALUES).map_err(failed)?;
+    header.values(&mut from, size).map_err(failed)
+}
+
+/// Writes the planes of a color picture as `.npy`: f32, 3 x height x width.
+///
+/// # Errors
+/// [`NpzError::Io`] if the file cannot be written.
+pub fn write_npy_planes(file: &Path, picture: &RgbGrid) -> Result<(), NpzError> {
+    let values = (0..3).flat_map(|c| picture.as_slice().iter().map(move |pixel| pixel[c])).collect();
+    write_values(file, &[3, picture.height(), picture.width()], Values::F32(values))
+}
+
+fn write_values(file: &Path, shape: &[usize], values: Values) -> Result<(), NpzError> {
+    let bytes = npy::bytes(shape, &values);
+    atomic::write_bytes(file, &bytes).map_err(|source| NpzError::Io { file: file.to_owned(), source })
+}
+
+/// Writes arrays of numbers under their names, compressed, row-major.
+///
+/// # Errors
+/// [`NpzError::Array`] if an array's shape and values disagree, [`NpzError::Io`] if the file cannot be written.
+pub fn write(path: &Path, arrays: &[(&str, Tensor)]) -> Result<(), NpzError> {
+    for (name, tensor) in arrays {
+        let shape = &tensor.shape;
+        let len = match &tensor.values {
+            Values::F32(v) => v.len(),
+            Values::F64(v) => v.len(),
+            Values::U8(v) => v.len(),
+            Values::I64(v) => v.len(),
+        };
+        if shape.iter().product::<usize>() != len {
+            let reason = format!("{len} values do not fill the shape {shape:?}");
+            return Err(NpzError::Array { file: path.to_owned(), name: (*name).to_owned(), reason });
+        }
+    }
+    archive::write(path, |zip| {
+        for (name, tensor) in arrays {
+            zip.start_file(format!("{name}.npy"), zip::write::SimpleFileOptions::default())?;
+            zip.write_all(&npy::bytes(&tensor.shape, &tensor.values))?;
+        }
+        Ok(())
+    })
+    .map_err(|source| NpzError::Io { file: path.to_owned(), source })
+}
+
+/// Most values of all arrays of a file together: two cameras' images at 1920 x 1080, four of each.
+const MAX_VALUES: usize = 1 << 24;
+/// Most arrays of a file.
+const MAX_ARRAYS: usize = 1000;
+
+/// Reads all arrays of numbers, row-major, by name. Integers other than `u8` become `i64`.
+///
+/// # Errors
+/// [`NpzError`]; arrays of other things than numbers (texts, objects) are errors too.
+pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
+    let file = files::open(path).map_err(|source| NpzError::Io { file: path.to_owned(), source })?;
+    read_from(path, std::io::BufReader::new(file))
+}
+
+/// [`read`] of a file whose bytes are there; `path` is for messages.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, NpzError> {
+    read_from(path, std::io::Cursor::new(bytes))
+}
+
+fn read_from(path: &Path, file: impl std::io::Read + std::io::Seek) -> Result<BTreeMap<String, Tensor>, NpzError> {
+    let archive = |reason: String| NpzError::Archive { file: path.to_owned(), reason: files::clip(&reason) };
+    let mut zip = zip::ZipArchive::new(file).map_err(|err| archive(err.to_string()))?;
+    if zip.len() > MAX_ARRAYS {
+        return Err(archive(format!("it has {} entries; at most {MAX_ARRAYS} are read", zip.len())));
+    }
+    let mut arrays = BTreeMap::new();
+    let mut room = MAX_VALUES;
+    for index in 0..zip.len() {
+        let mut entry = zip.by_index(index).map_err(|err| archive(err.to_string()))?;
+        let Some(name) = String::from_utf8_lossy(entry.name_raw()).strip_suffix(".npy").map(str::to_owned) else {
+            continue;
+        };
+        let failed = |reason: String| NpzError::Array { file: path.to_owned(), name: files::clip(&name), reason };
+        let size = entry.size();
+        let header = npy::header(&mut entry, room).map_err(failed)?;
+        room -= header.count;
+        let tensor = header.values(&mut entry, size).map_err(failed)?;
+        arrays.insert(name, tensor);
+    }
+    Ok(arrays)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A version 1.0 header and the data.
+    fn npy(descr: &str, fortran: &str, shape: &str, data: &[u8]) -> Vec<u8> {
+        let mut header = format!("{{'descr': '{descr}', 'fortran_order': {fortran}, 'shape': {shape}, }}");
+        while !(header.len() + 11).is_multiple_of(64) {
+            header.push(' ');
+        }
+        header.push('\n');
+        let mut out = b"\x93NUMPY\x01\x00".to_vec();
+        out.extend((header.len() as u16).to_le_bytes());
+        out.extend(header.bytes());
+        out.extend(data);
+        out
+    }
+
+    fn write(path: &Path, entries: &[(&str, Vec<u8>)]) {
+        let mut zip = zip::ZipWriter::new(std::fs::File::create(path).unwrap());
+        for (name, bytes) in entries {
+            zip.start_file(*name, zip::write::SimpleFileOptions::default()).unwrap();
+            zip.write_all(bytes).unwrap();
+        }
+        zip.finish().unwrap();
+    }
+
+    #[test]
+    fn arrays_are_read_in_either_order() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        let f32s = |v: &[f32]| v.iter().flat_map(|x| x.to_le_bytes()).collect::<Vec<u8>>();
+        write(
+            &path,
+            &[
+                ("c.npy", npy("<f4", "False", "(2, 3)", &f32s(&[0., 1., 2., 3., 4., 5.]))),
+                ("fortran.npy", npy("<f4", "True", "(2, 3)", &f32s(&[0., 3., 1., 4., 2., 5.]))),
+                ("theta.npy", npy("<f8", "False", "()", &(-0.25f64).to_le_bytes())),
+                ("big.npy", npy(">i4", "False", "(1,)", &[0, 0, 1, 0])),
+                ("flag.npy", npy("|b1", "False", "(2,)", &[1, 0])),
+                ("readme.txt", b"hello".to_vec()),
+            ],
+        );
+        let arrays = read(&path).unwrap();
+        assert_eq!(arrays["c"], Tensor::f32(&[2, 3], vec![0., 1., 2., 3., 4., 5.]));
+        assert_eq!(arrays["fortran"], arrays["c"]);
+        assert_eq!(arrays["theta"], Tensor::f64(&[], vec![-0.25]));
+        assert_eq!(arrays["big"].values, Values::I64(vec![256]));
+        assert_eq!(arrays["flag"].values, Values::U8(vec![1, 0]));
+        assert_eq!(arrays.len(), 5);
+    }
+
+    #[test]
+    fn a_written_image_is_an_array() {
+        let dir = tempfile::tempdir().unwrap();
+        for width in [1, 7, 64] {
+            let image = Grid::from_fn(width, 3, |x, y| x as f32 - 0.1 * y as f32);
+            let path = dir.path().join("i.npy");
+            write_npy(&path, &image).unwrap();
+            let bytes = std::fs::read(&path).unwrap();
+            let mut from = bytes.as_slice();
+            let read = npy::header(&mut from, 1000).unwrap().values(&mut from, bytes.len() as u64).unwrap();
+            assert_eq!(read, Tensor::f32(&[3, width], image.into_vec()));
+        }
+    }
+
+    #[test]
+    fn damaged_archives_and_arrays_are_errors() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.npz");
+        for (entry, word) in [
+            (npy("<f4", "False", "(4000000000000,)", &[0; 8]), "do not fit"),
+            (npy("<f4", "False", "(3,)", &[0; 8]), "cannot be read"),
+            (npy("<U5", "False", "(1,)", &[0; 20]), "not supported"),
+            (b"junk".to_vec(), "cannot be read"),
+        ] {
+            write(&path, &[("x.npy", entry)]);
+            let text = read(&path).unwrap_err().to_string();
+            assert!(text.contains(word) && text.contains("\"x\""), "{text}");
+        }
+        std::fs::write(&path, b"not a zip").unwrap();
+        assert!(matches!(read(&path), Err(NpzError::Archive { .. })));
+        assert!(matches!(read(&dir.path().join("none.npz")), Err(NpzError::Io { .. })));
+    }
+}

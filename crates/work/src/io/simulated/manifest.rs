@@ -1,0 +1,163 @@
+//! What a simulated data set says about itself: that it was begun, what was asked for, and, last of all, that it is whole.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::{Layout, WriteError, make_parent, write_models, write_pair, write_split};
+use crate::io::{atomic, files};
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::sample::Sample;
+
+/// The manifest's name, in the root of the data set.
+pub const MANIFEST: &str = "simulated.json";
+const FORMAT: &str = "touch2touch-simulated";
+const VERSION: u32 = 1;
+/// No manifest is larger.
+const MOST_BYTES: u64 = 1 << 20;
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Manifest {
+    format: String,
+    version: u32,
+    /// The same for all parts: they share the CAD models.
+    tools: Vec<String>,
+    /// By layout.
+    parts: BTreeMap<String, Part>,
+}
+
+#[derive(Debug, Serialize, Deserialize)]
+struct Part {
+    /// Whether all of it was written.
+    finished: bool,
+    pairs: usize,
+    /// What was asked for.
+    recipe: Value,
+}
+
+/// A data set that is being written: [`Writing::begin`], the pairs, [`Writing::finish`].
+#[derive(Debug)]
+pub struct Writing {
+    root: PathBuf,
+    layout: Layout,
+    tools: Vec<(String, bool)>,
+    manifest: Manifest,
+}
+
+impl Writing {
+    /// Says in the folder what is being written there, and writes the CAD models. The folder must be missing, empty, or
+    /// hold what an earlier, perhaps unfinished run with the same recipe wrote; another layout of the same tools may
+    /// lie beside.
+    ///
+    /// # Errors
+    /// [`WriteError::NotOurs`] if the folder holds anything else, which is then unchanged.
+    pub fn begin(
+        root: &Path,
+        layout: Layout,
+        tools: &[(&str, bool, TriMesh)],
+        pairs: usize,
+        recipe: Value,
+    ) -> Result<Self, WriteError> {
+        let names: Vec<String> = tools.iter().map(|tool| tool.0.to_owned()).collect();
+        let key = layout.key();
+        let mut manifest = match read(root) {
+            None => {
+                if let Some(found) = first_entry(root)? {
+                    return Err(WriteError::NotOurs { folder: root.to_owned(), found });
+                }
+                Manifest { format: FORMAT.into(), version: VERSION, tools: names, parts: BTreeMap::new() }
+            }
+            Some(manifest) => {
+                let same = manifest.parts.get(key).is_none_or(|part| part.recipe == recipe && part.pairs == pairs);
+                if !same || manifest.tools != names {
+                    let found = "a simulated data set of other tools, grasps or seeds".to_owned();
+                    return Err(WriteError::NotOurs { folder: root.to_owned(), found });
+                }
+                manifest
+            }
+        };
+        manifest.parts.insert(key.to_owned(), Part { finished: false, pairs, recipe });
+        let tools_seen = tools.iter().map(|(name, seen, _)| ((*name).to_owned(), *seen)).collect();
+        let writing = Self { root: root.to_owned(), layout, tools: tools_seen, manifest };
+        writing.write()?;
+        write_models(root, tools)?;
+        Ok(writing)
+    }
+
+    /// Writes both halves of a pair, as [`write_pair`].
+    ///
+    /// # Errors
+    /// As there.
+    pub fn pair(&self, tool: &str, index: u64, sample: &Sample) -> Result<(), WriteError> {
+        write_pair(&self.root, self.layout, tool, index, sample).map(drop)
+    }
+
+    /// Says that all pairs are there.
+    ///
+    /// # Errors
+    /// [`WriteError`].
+    pub fn finish(mut self) -> Result<(), WriteError> {
+        write_split(&self.root, self.tools.iter().map(|(name, seen)| (name.as_str(), *seen)))?;
+        if let Some(part) = self.manifest.parts.get_mut(self.layout.key()) {
+            part.finished = true;
+        }
+        self.write()
+    }
+
+    fn write(&self) -> Result<(), WriteError> {
+        let file = self.root.join(MANIFEST);
+        make_parent(&file)?;
+        let failed = |source| WriteError::Manifest { file: file.clone(), source };
+        let text = serde_json::to_vec_pretty(&self.manifest).map_err(|err| failed(err.into()))?;
+        atomic::write_bytes(&file, &text).map_err(failed)
+    }
+}
+
+impl Layout {
+    fn key(self) -> &'static str {
+        match self {
+            Self::Train => "train",
+            Self::Test => "test",
+            Self::TrainOnly => "train_only",
+        }
+    }
+}
+
+/// The manifest in `root`; `None` if there is none that this program understands.
+fn read(root: &Path) -> Option<Manifest> {
+    let file = root.join(MANIFEST);
+    // A pipe or a device of that name must not hold anybody up.
+    let text = files::read(&file, MOST_BYTES).ok()?;
+    let manifest: Manifest = serde_json::from_slice(&text).ok()?;
+    (manifest.format == FORMAT && manifest.version == VERSION).then_some(manifest)
+}
+
+/// Something that lies in the folder, if it is there and not empty. Hidden files do not count.
+fn first_entry(root: &Path) -> Result<Option<String>, WriteError> {
+    let failed = |source| WriteError::Folder { folder: root.to_owned(), source };
+    let entries = match std::fs::read_dir(root) {
+        Ok(entries) => entries,
+        Err(err) if err.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        Err(source) => return Err(failed(source)),
+    };
+    let mut names = Vec::new();
+    for entry in entries {
+        names.push(entry.map_err(failed)?.file_name().to_string_lossy().into_owned());
+    }
+    Ok(names.into_iter().filter(|name| !name.starts_with('.')).min())
+}
+
+/// What is to be said about a data set whose simulation did not end.
+pub fn unfinished(root: &Path) -> Option<Problem> {
+    let parts = read(root)?.parts;
+    let open: Vec<String> =
+        parts.iter().filter(|(_, p)| !p.finished).map(|(k, p)| format!("{k} ({})", p.pairs)).collect();
+    (!open.is_empty()).then(|| Problem {
+        file: root.join(MANIFEST),
+        what: format!("the simulation that writes this data set was not finished; pairs meant: {}", open.join(", ")),
+        hint: "run the same `touch2touch simulate` again into this folder, or remove the folder".into(),
+    })
+}

@@ -1,0 +1,281 @@
+//! The journal of a pair's labels: who did what and when, with what it was before and after. Undo begins where it ended,
+//! also when the program was closed or killed in between.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+
+use serde::{Deserialize, Serialize};
+
+use super::{HandMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
+use crate::error::TaskError;
+use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::label::PackedMask;
+use touch2touch_core::rig::Rig;
+
+/// What kind of act changed the labels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Act {
+    /// Something new.
+    #[default]
+    Do,
+    /// What was done is taken back.
+    Undo,
+    /// What was taken back is done again.
+    Redo,
+}
+
+/// What was done, for the journal.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Deed {
+    /// Its kind.
+    pub act: Act,
+    /// Its name, e.g. `lasso`.
+    pub name: Cow<'static, str>,
+    /// The tool with its numbers, where there is one.
+    pub how: Option<serde_json::Value>,
+    /// Who did it; `None`: whom the system says.
+    pub person: Option<String>,
+}
+
+impl Deed {
+    /// Something new without numbers.
+    pub fn named(name: impl Into<Cow<'static, str>>) -> Self {
+        Self { name: name.into(), ..Self::default() }
+    }
+}
+
+/// What differs between labels before and after something was done; each pair is `[before, after]`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Change {
+    /// Masks.
+    pub masks: BTreeMap<MaskPlace, [Option<HandMask>; 2]>,
+    /// The review state.
+    pub review: Option<[Review; 2]>,
+    /// The pose accepted of the measured and of the predicted imprint.
+    pub accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    /// The note.
+    pub note: Option<[String; 2]>,
+}
+
+/// The same pixels from the same source; the revision is of one run of the program.
+pub(super) fn same(a: Option<&HandMask>, b: Option<&HandMask>) -> bool {
+    match (a, b) {
+        (None, None) => true,
+        (Some(a), Some(b)) => a.is_same(b),
+        _ => false,
+    }
+}
+
+impl Change {
+    /// From labels to others.
+    pub fn between(before: &PairLabels, after: &PairLabels) -> Self {
+        let mut change = Self::default();
+        for place in before.masks.keys().chain(after.masks.keys()) {
+            let pair = [before.masks.get(place), after.masks.get(place)];
+            if !same(pair[0], pair[1]) {
+                let plain = |hand: &HandMask| HandMask { revision: Revision::default(), ..hand.clone() };
+                change.masks.insert(place.clone(), pair.map(|hand| hand.map(plain)));
+            }
+        }
+        change.review = (before.review != after.review).then_some([before.review, after.review]);
+        for (i, accepted) in change.accepted.iter_mut().enumerate() {
+            let pair = [before.accepted[i], after.accepted[i]];
+            *accepted = (pair[0] != pair[1]).then_some(pair);
+        }
+        change.note = (before.note != after.note).then(|| [before.note.clone(), after.note.clone()]);
+        change
+    }
+
+    /// Whether nothing differs.
+    pub fn is_empty(&self) -> bool {
+        *self == Self::default()
+    }
+
+    /// The way back.
+    #[must_use]
+    pub fn inverse(mut self) -> Self {
+        self.masks.values_mut().for_each(|pair| pair.reverse());
+        self.review.iter_mut().for_each(|pair| pair.reverse());
+        self.accepted.iter_mut().flatten().for_each(|pair| pair.reverse());
+        self.note.iter_mut().for_each(|pair| pair.reverse());
+        self
+    }
+
+    /// Whether one made after the other would matter.
+    fn overlaps(&self, other: &Self) -> bool {
+        self.masks.keys().any(|place| other.masks.contains_key(place))
+            || self.review.is_some() && other.review.is_some()
+            || self.note.is_some() && other.note.is_some()
+            || (0..2).any(|i| self.accepted[i].is_some() && other.accepted[i].is_some())
+    }
+
+    /// Whether it ended in these labels.
+    fn leads_to(&self, labels: &PairLabels) -> bool {
+        self.masks.iter().all(|(place, [_, after])| same(after.as_ref(), labels.masks.get(place)))
+            && self.review.is_none_or(|[_, after]| after == labels.review)
+            && self.note.as_ref().is_none_or(|[_, after]| *after == labels.note)
+            && (0..2).all(|i| self.accepted[i].is_none_or(|[_, after]| after == labels.accepted[i]))
+    }
+}
+
+/// Something that was done before the labels were read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Past {
+    /// Its name.
+    pub name: Cow<'static, str>,
+    /// What it changed.
+    pub change: Change,
+}
+
+/// What the journal of a pair tells of what was done before.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Told {
+    /// What can be taken back, the oldest first.
+    pub done: Vec<Past>,
+    /// What was taken back and can be done again, the oldest first.
+    pub undone: Vec<Past>,
+    /// What of the journal cannot be read.
+    pub problem: Option<TaskError>,
+}
+
+/// A mask that changed.
+#[derive(Serialize, Deserialize)]
+struct MaskLine {
+    finger: String,
+    of: ImprintOf,
+    before: Option<PackedMask>,
+    after: Option<PackedMask>,
+}
+
+/// A line of the journal.
+#[derive(Serialize, Deserialize)]
+pub(super) struct Line {
+    unix_s: u64,
+    person: String,
+    act: Act,
+    name: String,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    how: Option<serde_json::Value>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    masks: Vec<MaskLine>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    review: Option<[Review; 2]>,
+    #[serde(default)]
+    accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    note: Option<[String; 2]>,
+}
+
+impl Line {
+    pub(super) fn new(deed: &Deed, change: &Change, rig: &Rig, person: String, unix_s: u64) -> Self {
+        let mask = |(place, [before, after]): (&MaskPlace, &[Option<HandMask>; 2])| MaskLine {
+            finger: rig.pad_key(place.pad).into_owned(),
+            of: place.of.clone(),
+            before: before.as_ref().map(HandMask::pack),
+            after: after.as_ref().map(HandMask::pack),
+        };
+        Self {
+            unix_s,
+            person,
+            act: deed.act,
+            name: deed.name.clone().into_owned(),
+            how: deed.how.clone(),
+            masks: change.masks.iter().map(mask).collect(),
+            review: change.review,
+            accepted: change.accepted,
+            note: change.note.clone(),
+        }
+    }
+
+    /// Who did it.
+    pub(super) fn person(&self) -> Option<String> {
+        Some(self.person.clone()).filter(|person| !person.is_empty())
+    }
+
+    /// What it says; `None` if a mask in it cannot be understood.
+    pub(super) fn read(self, rig: &Rig) -> Option<(Act, Past)> {
+        let mut masks = BTreeMap::new();
+        for line in self.masks {
+            let pad = rig.pads().find(|pad| rig.pad_key(*pad) == line.finger)?;
+            let mut pair = [None, None];
+            for (hand, pixels) in pair.iter_mut().zip([line.before, line.after]) {
+                *hand = pixels.map(|pixels| HandMask::unpack(&pixels, Revision::default())).transpose().ok()?;
+            }
+            masks.insert(MaskPlace { pad, of: line.of }, pair);
+        }
+        let change = Change { masks, review: self.review, accepted: self.accepted, note: self.note };
+        Some((self.act, Past { name: self.name.into(), change }))
+    }
+}
+
+/// What can be taken back and what can be done again, the oldest first, of the lines of a journal.
+///
+/// Only as far as it leads to the labels as they are: where another program changed them, what came before is history,
+/// and nothing that can be undone.
+pub(super) fn fold<'a>(
+    lines: impl Iterator<Item = &'a [u8]>,
+    labels: &PairLabels,
+    rig: &Rig,
+) -> (Vec<Past>, Vec<Past>) {
+    let (mut done, mut undone): (Vec<Past>, Vec<Past>) = (Vec::new(), Vec::new());
+    for line in lines {
+        let Some((act, past)) = serde_json::from_slice::<Line>(line).ok().and_then(|line| line.read(rig)) else {
+            continue;
+        };
+        let (from, to) = match act {
+            Act::Do => {
+                undone.retain(|other| !other.change.overlaps(&past.change));
+                done.push(past);
+                continue;
+            }
+            Act::Undo => (&mut done, &mut undone),
+            Act::Redo => (&mut undone, &mut done),
+        };
+        let meant = if act == Act::Undo { past.change.clone().inverse() } else { past.change.clone() };
+        match from.iter().rposition(|other| other.change == meant) {
+            Some(at) => to.push(from.remove(at)),
+            // Several acts in one line: the way on from here is not known.
+            None => from.retain(|other| !other.change.overlaps(&past.change)),
+        }
+    }
+    // From the last one back: each must begin where the one before it ended.
+    let mut now = labels.clone();
+    let kept = done.iter().rev().take_while(|past| {
+        let fits = past.change.leads_to(&now);
+        if fits {
+            apply(&mut now, &past.change.clone().inverse());
+        }
+        fits
+    });
+    let first = done.len() - kept.count();
+    done.drain(..first);
+    let mut now = labels.clone();
+    let kept = undone.iter().rev().take_while(|past| {
+        let fits = past.change.clone().inverse().leads_to(&now);
+        if fits {
+            apply(&mut now, &past.change);
+        }
+        fits
+    });
+    let first = undone.len() - kept.count();
+    undone.drain(..first);
+    (done, undone)
+}
+
+fn apply(labels: &mut PairLabels, change: &Change) {
+    for (place, [_, after]) in &change.masks {
+        labels.put(place, after.clone());
+    }
+    if let Some([_, after]) = change.review {
+        labels.review = after;
+    }
+    if let Some([_, after]) = &change.note {
+        labels.note.clone_from(after);
+    }
+    for (i, accepted) in change.accepted.iter().enumerate() {
+        if let Some([_, after]) = accepted {
+            labels.accepted[i] = *after;
+        }
+    }
+}

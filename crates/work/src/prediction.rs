@@ -1,0 +1,55 @@
+//! [`Prediction`]: what a generator made of a touch.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use touch2touch_core::diffusion::{GenerateConfig, Sampler};
+use touch2touch_core::fit::Fitted;
+use touch2touch_core::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
+
+/// Per range mapping the steps to meters, or why it cannot be done.
+pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
+
+/// A prediction: the decoder's picture, with the ways to meters.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// The decoder's picture.
+    pub raw: RawPrediction,
+    /// The ways to meters that its bundle offers.
+    pub chains: Chains,
+    /// The fit of the bundle to a rig, if it was fitted to one.
+    pub fit: Option<Arc<Fitted>>,
+    /// The steps to a color sensor's picture; `None` where it is depth that was predicted.
+    pub color: Option<ColorChain>,
+    /// The identity of the generator's bundle.
+    pub bundle: Arc<str>,
+    /// The engine that made it, for people.
+    pub engine: String,
+    /// Time that making it took, seconds; what was made together shares its time.
+    pub seconds: f64,
+    /// Whether it was made earlier and only read now.
+    pub kept: bool,
+}
+
+/// How a prediction was made, as it stands beside each picture, 3D view and file of it: `model · 2 steps · seed 42`, with the
+/// sampler, its noise and the guidance where they are not the usual ones.
+pub fn made_with(model: &str, config: &GenerateConfig) -> String {
+    format!("{model} · {}", settings_text(config))
+}
+
+/// The same without the model.
+pub fn settings_text(config: &GenerateConfig) -> String {
+    let GenerateConfig { steps, eta, seed, sampler, guidance, .. } = *config;
+    let plural = if steps == 1 { "" } else { "s" };
+    let mut text = format!("{steps} step{plural} · seed {seed}");
+    if sampler != Sampler::default() {
+        text += &format!(" · {}", <&str>::from(sampler));
+    }
+    if eta != 0.0 {
+        text += &format!(" · eta {eta}");
+    }
+    if guidance != 1.0 {
+        text += &format!(" · guidance {guidance}");
+    }
+    text
+}

@@ -1,0 +1,213 @@
+//! [`propose_all`]: proposals accepted for many pairs at once.
+
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::super::bundles::BundleInfo;
+use super::super::error::{Remark, TaskError};
+use super::super::imprint::{imprints_of, measured};
+use super::super::job::JobCx;
+use super::super::labels::{Deed, ImprintOf, ImprintSource, Labels, MaskPlace};
+use super::super::models::Models;
+use super::super::predict::Generating;
+use super::super::tool::load_tool;
+use super::{ProposeSetup, Touch, WHAT, accepted, propose};
+use crate::io::caught::caught;
+use crate::io::dataset::Dataset;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::Sample;
+use touch2touch_core::units::counted;
+
+/// Proposals for which pairs, and what becomes of them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BatchSetup {
+    /// What proposes.
+    pub propose: ProposeSetup,
+    /// The pairs. Those marked "done", "flagged" or "skip" are left as they are: somebody has judged them.
+    pub pairs: Vec<PairId>,
+    /// The generator and its choices, for predicted imprints.
+    pub generator: Option<(BundleInfo, GenerateConfig)>,
+    /// How its answer becomes meters.
+    pub shift: ShiftMode,
+    /// Whether what was painted by hand is replaced as well.
+    pub over_hand: bool,
+    /// Who asked; else whom the system says.
+    pub person: Option<String>,
+}
+
+/// What became of proposals for many pairs.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Batch {
+    /// What proposed.
+    pub source: &'static str,
+    /// Pairs that have new masks, by name.
+    pub changed: Vec<String>,
+    /// New masks.
+    pub masks: usize,
+    /// Masks that were so already.
+    pub same: usize,
+    /// Pairs that somebody judged, which were left as they are.
+    pub judged: usize,
+    /// What could not be proposed, and why; by pair and finger.
+    pub left_out: Vec<Remark>,
+    /// Whether all pairs asked for were looked at: false if stopped early.
+    pub complete: bool,
+    /// Time it took, seconds.
+    pub seconds: f64,
+}
+
+impl Batch {
+    /// What became of it, in words.
+    pub fn text(&self) -> String {
+        let mut text = format!("{} proposed in {}", counted(self.masks, "mask"), counted(self.changed.len(), "pair"));
+        for (count, what) in [(self.same, "were so already"), (self.left_out.len(), "could not be proposed")] {
+            if count > 0 {
+                text += &format!("; {count} {what}");
+            }
+        }
+        if self.judged > 0 {
+            text += &format!("; {} judged before stay as they are", counted(self.judged, "pair"));
+        }
+        if !self.complete {
+            text += "; stopped early";
+        }
+        text
+    }
+}
+
+/// Proposes masks for the pairs of `setup` and stores them: as if each had been accepted by hand, but that review states
+/// stay, so that every one of them is still to be looked at. What a person painted stays unless `over_hand`. Each pair's
+/// change is a line of its journal, which undo takes back. Stops early when told to.
+///
+/// # Errors
+/// If there are no pairs, labels cannot be stored, or it was told to stop before the first.
+pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &JobCx) -> Result<Batch, TaskError> {
+    let start = Instant::now();
+    if setup.pairs.is_empty() {
+        return Err(TaskError::new(WHAT, "there are no pairs to propose masks for"));
+    }
+    let labels = Labels::of(dataset);
+    labels.folder()?;
+    let (mut tools, total) = (BTreeMap::new(), setup.pairs.len());
+    let mut batch = Batch { source: setup.propose.source.key(), complete: true, ..Batch::default() };
+    for (done, &pair) in setup.pairs.iter().enumerate() {
+        if cx.cancel.is_cancelled() {
+            batch.complete = false;
+            break;
+        }
+        let Some(entry) = dataset.index.get(pair) else { continue };
+        cx.progress(done as u64, total as u64, &entry.name);
+        let tool = entry.tool.as_ref().map(|name| {
+            let tool = tools.entry(name.clone()).or_insert_with(|| load_tool(dataset, name).map(|(tool, _)| tool));
+            tool.as_ref()
+        });
+        let no_tool = TaskError::new(WHAT, "no tool is named, so there is no CAD model");
+        let tool = tool.unwrap_or(Err(&no_tool));
+        let job = Job { dataset, all: &labels, setup, models, cx };
+        let one = caught(|| job.one((pair, &entry.name), tool, &mut batch));
+        match one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
+            Ok(()) => {}
+            Err(err) if err.is_cancelled() => {
+                batch.complete = false;
+                break;
+            }
+            Err(err) => batch.left_out.push(Remark { name: entry.name.clone(), why: err.why }),
+        }
+    }
+    if !batch.complete && batch.masks == 0 {
+        cx.check(WHAT)?;
+    }
+    batch.seconds = start.elapsed().as_secs_f64();
+    Ok(batch)
+}
+
+/// What is the same for all pairs.
+#[derive(Clone, Copy)]
+struct Job<'a> {
+    dataset: &'a Dataset,
+    all: &'a Labels,
+    setup: &'a BatchSetup,
+    models: &'a Models,
+    cx: &'a JobCx,
+}
+
+impl Job<'_> {
+    fn one(
+        self,
+        (pair, name): (PairId, &str),
+        tool: Result<&ToolModel, &TaskError>,
+        batch: &mut Batch,
+    ) -> Result<(), TaskError> {
+        let Self { dataset, all, setup, models, cx } = self;
+        let mut stored = all.load(name)?;
+        if stored.review.is_judged() {
+            batch.judged += 1;
+            return Ok(());
+        }
+        let sample = dataset.load(pair).map_err(|err| TaskError::from_error(WHAT, &err))?;
+        let (imprints, of) = imprints(&sample, setup, models, cx)?;
+        let pads: Vec<PadId> = imprints.entries().map(|(pad, _)| pad).collect();
+        if pads.is_empty() {
+            return Err(TaskError::new(WHAT, "there is no such imprint"));
+        }
+        let touch = Touch { dataset, all, pair, sample: &sample, tool, imprints: &imprints, of: &of, labels: &stored };
+        let proposals = propose(touch, &pads, &setup.propose, models)?;
+        let (mut new, mut how) = (0, Vec::new());
+        for (pad, proposal) in proposals {
+            let proposal = match proposal {
+                Ok(proposal) => proposal,
+                Err(err) => {
+                    let why = format!("{} finger: {}", dataset.rig.pad_key(pad), err.why);
+                    batch.left_out.push(Remark { name: name.to_owned(), why });
+                    continue;
+                }
+            };
+            let place = MaskPlace { pad, of: of.clone() };
+            let drawn = imprints[pad].as_ref().and_then(|imprint| stored.drawn(&place, imprint));
+            let hand = accepted(drawn, &proposal, setup.over_hand);
+            if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
+                batch.same += 1;
+                continue;
+            }
+            stored.put(&place, Some(hand));
+            how.push(proposal.provenance);
+            new += 1;
+        }
+        if new > 0 {
+            let how = serde_json::to_value(how).ok();
+            all.save(
+                name,
+                &stored,
+                &Deed { person: setup.person.clone(), how, ..Deed::named("proposal for many pairs") },
+            )?;
+            batch.masks += new;
+            batch.changed.push(name.to_owned());
+        }
+        Ok(())
+    }
+}
+
+/// The imprints of a pair that masks are proposed for, and what they are.
+fn imprints(
+    sample: &Sample,
+    setup: &BatchSetup,
+    models: &Models,
+    cx: &JobCx,
+) -> Result<(PerPad<DepthMap>, ImprintOf), TaskError> {
+    if setup.propose.imprint == ImprintSource::Measured {
+        return Ok((measured(sample), ImprintOf::Measured));
+    }
+    let generator = setup.generator.as_ref();
+    let (bundle, config) = generator.ok_or_else(|| TaskError::new(WHAT, "there is no generator to predict with"))?;
+    let generating = Generating { bundle, engine: setup.propose.engine, config };
+    let made = generating.pair(models, sample, &cx.quiet())?;
+    let imprints = imprints_of(&made, setup.shift, sample)?;
+    Ok((imprints, ImprintOf::predicted(&bundle.id, config, setup.shift)))
+}

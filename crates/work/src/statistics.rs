@@ -1,0 +1,113 @@
+//! Shift statistics of a data set: one pass over its predictions and measurements.
+
+use std::sync::Arc;
+
+use super::bundles::BundleInfo;
+use super::error::TaskError;
+use super::job::JobCx;
+use super::models::Wanted;
+use super::prediction::Prediction;
+use crate::io::masks::now_unix_s;
+use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::postprocess::{ShiftFit, ShiftMode};
+use touch2touch_core::rig::{PadId, SensorId};
+use touch2touch_core::sample::{Sample, Scale};
+
+/// Pairs that the studio's pass takes at most, spread evenly: minutes, not hours. The command line takes all.
+pub const STUDIO_PAIRS: usize = 96;
+
+/// Name of the job in errors.
+const WHAT: &str = "Shift statistics";
+
+/// What is predicted, and how.
+#[derive(Clone, Debug)]
+pub struct StatisticsSetup {
+    /// The pairs. Any order of them gives the same figures.
+    pub pairs: Vec<PairId>,
+    /// Whose touches.
+    pub fingers: Vec<PadId>,
+    /// The sensor that the generator starts from.
+    pub input: SensorId,
+    /// The generator.
+    pub bundle: BundleInfo,
+    /// The choices of the generation.
+    pub config: GenerateConfig,
+    /// The data set's title, for the statistics' provenance.
+    pub dataset: String,
+}
+
+/// Predicts every touch that has both a GelSlim image and a measured imprint, and adds it up. Returns the statistics
+/// and the touches that could not be used.
+///
+/// # Errors
+/// If the job was told to stop, or no touch could be used.
+pub fn statistics(
+    setup: &StatisticsSetup,
+    load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
+    mut predict: impl FnMut(Wanted<'_>, &JobCx) -> Result<Prediction, TaskError>,
+    cx: &JobCx,
+) -> Result<(ShiftStatistics, Vec<TaskError>), TaskError> {
+    let (mut fit, mut failed) = (ShiftFit::default(), Vec::new());
+    let (mut scale, mut engine) = (Scale::Measured, String::new());
+    // The steps of each prediction are not worth showing.
+    let quiet = cx.quiet();
+    for (done, pair) in setup.pairs.iter().enumerate() {
+        cx.check(WHAT)?;
+        cx.progress(done as u64, setup.pairs.len() as u64, format!("pair {} of {}", done + 1, setup.pairs.len()));
+        let sample = match load(*pair) {
+            Ok(sample) => sample,
+            Err(err) => {
+                failed.push(err);
+                continue;
+            }
+        };
+        if sample.scale == Scale::Assumed {
+            scale = Scale::Assumed;
+        }
+        for finger in &setup.fingers {
+            let touch = sample.pad(*finger);
+            let (Some(picture), Some(bubble)) =
+                (touch.and_then(|t| t.picture(setup.input)), touch.and_then(|t| t.depth()))
+            else {
+                continue;
+            };
+            cx.check(WHAT)?;
+            let wanted = Wanted { difference: &picture, seed: setup.config.seed, size: [0, 0] };
+            let added = predict(wanted, &quiet).and_then(|made| {
+                let chain = super::imprint::chain(&made, ShiftMode::Raw)?;
+                engine.clone_from(&made.engine);
+                fit.add(&chain, &made.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
+            });
+            match added {
+                Ok(()) => {}
+                Err(err) if err.is_cancelled() => return Err(TaskError::cancelled(WHAT)),
+                Err(err) => failed.push(err),
+            }
+        }
+    }
+    let config = &setup.config;
+    let provenance = Provenance {
+        bundle: setup.bundle.name.clone(),
+        bundle_hash: setup.bundle.id.to_string(),
+        dataset: setup.dataset.clone(),
+        seed: config.seed,
+        steps: config.steps,
+        sampler: config.sampler.key().into(),
+        eta: config.eta,
+        engine,
+        scale: scale.key().into(),
+        made: utc_text(now_unix_s()),
+    };
+    match ShiftStatistics::new(provenance, &fit) {
+        Some(found) => Ok((found, failed)),
+        None => {
+            let why = match failed.first() {
+                Some(err) => format!("no touch could be used; the first failure: {err}"),
+                None => "no pair has both a GelSlim image and a measured imprint".into(),
+            };
+            Err(TaskError::new(WHAT, why).with_hint("Statistics need measured imprints beside GelSlim images."))
+        }
+    }
+}

@@ -1,0 +1,223 @@
+//! [`Subject`]: what can stand on either side of a comparison.
+
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
+
+/// Fewest and most seeds of a mean.
+pub const SEEDS: std::ops::RangeInclusive<usize> = 2..=16;
+
+/// What can stand on either side of a comparison: a rule that each pair resolves for itself.
+///
+/// As text: `measured`, `prediction`, `mean`, `stored`; a prediction and a mean are followed by what differs from the
+/// settings, as in `prediction:bundle=fitted,seed=7,steps=50,shift=raw` or `mean:seeds=4`.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub enum Subject {
+    /// What was measured.
+    Measured,
+    /// A prediction.
+    Predicted(Wish),
+    /// The mean of predictions with so many seeds.
+    Mean(Wish, usize),
+    /// The prediction of another program that lies beside the pair as a picture.
+    Stored,
+}
+
+/// Which prediction: what is `None` is as the settings (of the studio) or the options (of a verb) say.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct Wish {
+    /// The generator, by its bundle's name.
+    pub bundle: Option<String>,
+    /// Denoising steps.
+    pub steps: Option<u32>,
+    /// Seed of the noise.
+    pub seed: Option<u64>,
+    /// How it becomes meters.
+    pub shift: Option<Mapping>,
+}
+
+/// A way to meters that needs no statistics of a data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+pub enum Mapping {
+    /// The exact inverse, with the fit of a fitted bundle.
+    Exact,
+    /// The exact inverse without the fit.
+    Unfitted,
+    /// The paper's shift.
+    Paper,
+    /// As the released script saves it.
+    Raw,
+}
+
+impl Mapping {
+    /// The mode it stands for.
+    pub fn mode(self) -> ShiftMode {
+        match self {
+            Self::Exact => ShiftMode::ExactInverse,
+            Self::Unfitted => ShiftMode::Parts(CorrectionParts::NONE),
+            Self::Paper => ShiftMode::PaperShift,
+            Self::Raw => ShiftMode::Raw,
+        }
+    }
+
+    /// Its name in text.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Unfitted => "unfitted",
+            Self::Paper => "paper",
+            Self::Raw => "raw",
+        }
+    }
+}
+
+impl Subject {
+    /// The prediction that the settings make.
+    pub fn shown() -> Self {
+        Self::Predicted(Wish::default())
+    }
+
+    /// Whether something is predicted for it.
+    pub fn wish(&self) -> Option<&Wish> {
+        match self {
+            Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
+            Self::Measured | Self::Stored => None,
+        }
+    }
+
+    /// What a person reads.
+    pub fn label(&self) -> String {
+        let base = match self {
+            Self::Measured => return "Measured".into(),
+            Self::Stored => return "Stored picture".into(),
+            Self::Predicted(_) => "Prediction".to_owned(),
+            Self::Mean(_, seeds) => format!("Mean of {seeds} seeds"),
+        };
+        let wish = self.wish().cloned().unwrap_or_default();
+        let parts = [
+            Some(base),
+            wish.bundle,
+            wish.seed.map(|seed| format!("seed {seed}")),
+            wish.steps.map(|steps| format!("{steps} steps")),
+            wish.shift.map(|shift| shift.mode().label().to_lowercase()),
+        ];
+        parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
+    }
+}
+
+impl std::fmt::Display for Subject {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let (name, seeds) = match self {
+            Self::Measured => return f.write_str("measured"),
+            Self::Stored => return f.write_str("stored"),
+            Self::Predicted(_) => ("prediction", None),
+            Self::Mean(_, seeds) => ("mean", Some(format!("seeds={seeds}"))),
+        };
+        let wish = self.wish().cloned().unwrap_or_default();
+        let parts = [
+            seeds,
+            wish.bundle.map(|bundle| format!("bundle={bundle}")),
+            wish.seed.map(|seed| format!("seed={seed}")),
+            wish.steps.map(|steps| format!("steps={steps}")),
+            wish.shift.map(|shift| format!("shift={}", shift.key())),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().collect();
+        let colon = if parts.is_empty() { "" } else { ":" };
+        write!(f, "{name}{colon}{}", parts.join(","))
+    }
+}
+
+impl FromStr for Subject {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        use strum::IntoEnumIterator as _;
+        let (name, rest) = text.split_once(':').unwrap_or((text, ""));
+        let (mut wish, mut seeds) = (Wish::default(), None);
+        for part in rest.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+            let (key, value) = part.split_once('=').ok_or_else(|| format!("\"{part}\" is not KEY=VALUE"))?;
+            let wrong = || format!("{key} cannot be \"{value}\"");
+            match key.trim() {
+                "bundle" => wish.bundle = Some(value.to_owned()),
+                "seed" => wish.seed = Some(value.parse().map_err(|_| wrong())?),
+                "steps" => wish.steps = Some(value.parse().ok().filter(|n| (1..=1000).contains(n)).ok_or_else(wrong)?),
+                "shift" => wish.shift = Some(Mapping::iter().find(|m| m.key() == value).ok_or_else(wrong)?),
+                "seeds" => seeds = Some(value.parse().ok().filter(|n| SEEDS.contains(n)).ok_or_else(wrong)?),
+                _ => return Err(format!("{key} is none of bundle, seed, steps, shift, seeds")),
+            }
+        }
+        let nothing_else = wish == Wish::default() && seeds.is_none();
+        match name.trim() {
+            "measured" if nothing_else => Ok(Self::Measured),
+            "stored" if nothing_else => Ok(Self::Stored),
+            "prediction" if seeds.is_none() => Ok(Self::Predicted(wish)),
+            "mean" => Ok(Self::Mean(wish, seeds.unwrap_or(8))),
+            "measured" | "stored" | "prediction" => Err(format!("{name} has no such choice: {rest}")),
+            _ => Err(format!("\"{name}\" is none of measured, prediction, mean, stored")),
+        }
+    }
+}
+
+impl TryFrom<String> for Subject {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl From<Subject> for String {
+    fn from(subject: Subject) -> Self {
+        subject.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        let wish = Wish {
+            bundle: Some("fitted".into()),
+            steps: Some(50),
+            seed: Some(u64::MAX),
+            shift: Some(Mapping::Unfitted),
+        };
+        let subjects = [
+            Subject::Measured,
+            Subject::Stored,
+            Subject::shown(),
+            Subject::Predicted(wish.clone()),
+            Subject::Mean(wish, 4),
+        ];
+        for subject in subjects {
+            assert_eq!(subject.to_string().parse::<Subject>().unwrap(), subject);
+            let json = serde_json::to_string(&subject).unwrap();
+            assert_eq!(serde_json::from_str::<Subject>(&json).unwrap(), subject);
+            assert!(!subject.label().is_empty());
+        }
+        assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(Wish::default(), 8));
+    }
+
+    #[test]
+    fn what_makes_no_sense_is_refused_in_words() {
+        for (text, word) in [
+            ("", "none of measured"),
+            ("measured:seed=3", "no such choice"),
+            ("prediction:seeds=3", "no such choice"),
+            ("prediction:seed=-1", "cannot be"),
+            ("prediction:steps=0", "cannot be"),
+            ("prediction:shift=other", "cannot be"),
+            ("prediction:seed", "KEY=VALUE"),
+            ("prediction:colour=red", "none of bundle"),
+            ("mean:seeds=99", "cannot be"),
+        ] {
+            let why = text.parse::<Subject>().unwrap_err();
+            assert!(why.contains(word), "{text}: {why}");
+        }
+    }
+}
