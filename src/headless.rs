@@ -300,11 +300,3 @@ fn find_pair(
     };
     Ok(touch2touch_core::dataset::PairId(at as u32))
 }
-
-/// At most `limit` of `len` positions, spread evenly.
-fn spread(len: usize, limit: Option<usize>) -> Vec<usize> {
-    match limit {
-        Some(n) if n < len => (0..n).map(|i| i * len / n).collect(),
-        _ => (0..len).collect(),
-    }
-}

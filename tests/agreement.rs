@@ -13,9 +13,10 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
+use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand,
-    SettingsCommand, ViewCommand,
+    AdaptCommand, Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
+    PredictCommand, SettingsCommand, ViewCommand,
 };
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, Output};
@@ -29,9 +30,10 @@ use touch2touch::app::state::{Lookup, State};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
-use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
 use touch2touch_work::export::{ExportChoice, Which};
+use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::images;
 use touch2touch_work::labels::Labels;
@@ -526,6 +528,20 @@ fn a_dial_does_the_same_in_both() {
         assert!(found.complete && found.series.iter().all(|s| s.points.len() >= 3 && s.base.cases.len() == 2));
         assert_eq!(shown, said, "{dial:?}");
     }
+    // The pairs of the list are named.
+    let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs[1].name.clone();
+    studio.send(LibraryCommand::SetFilter(listed.clone()).into());
+    studio.send(DialCommand::Over(DialPairs::Listed).into());
+    let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+    studio.send(DialCommand::Start.into());
+    let found = studio.state.dial.result.clone().expect("the dial was turned");
+    let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
+    assert!(words.windows(2).any(|two| two[0] == "--only" && two[1].contains(&listed)), "{words:?}");
+    let mut said = json(&words, home.path());
+    let mut shown: Value = serde_json::from_str(&serde_json::to_string(&*found).unwrap()).unwrap();
+    assert!(shown["seconds"].take().is_number() && said["seconds"].take().is_number());
+    assert_eq!(shown, said);
+    studio.send(LibraryCommand::SetFilter(String::new()).into());
     // A value that is put in force is the one that the panes compute with, and that their commands say.
     studio.send(DialCommand::Use(Dial::Gate.parse("0.6").unwrap()).into());
     studio.send(DialCommand::Use(Dial::Threshold.parse("4").unwrap()).into());
@@ -575,6 +591,41 @@ fn every_pane_says_a_command_that_the_program_understands() {
         let shown = studio.state.pose(source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
+}
+
+/// The value of an option in the command of a pane.
+fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
+    let words = studio.state.equivalent_words(pane, 0.004)?;
+    touch2touch::headless::check_command(&words).unwrap();
+    let at = words.iter().position(|word| word == option)?;
+    words.get(at + 1).cloned()
+}
+
+#[test]
+fn commands_of_tables_and_fits_say_what_decides_them() {
+    let home = tempfile::tempdir().unwrap();
+    let mut studio = Studio::open(Place::Demo, home.path());
+    for pane in [Pane::Results, Pane::Table, Pane::Scatter] {
+        studio.send(SettingsCommand::SetShift(ShiftMode::ExactInverse).into());
+        studio.send(SettingsCommand::SetRuntime(EngineChoice::Rten).into());
+        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"), "{pane:?}");
+        assert_eq!(said(&studio, pane, "--runtime").as_deref(), Some("rten"), "{pane:?}");
+        studio.send(SettingsCommand::SetShift(ShiftMode::Parts(CorrectionParts::NONE)).into());
+        assert_eq!(said(&studio, pane, "--fit-parts").as_deref(), Some("none"), "{pane:?}");
+        studio.send(SettingsCommand::SetShift(ShiftMode::PaperShift).into());
+        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"), "{pane:?}");
+    }
+    assert_eq!(said(&studio, Pane::Adapt, "--pairs"), None);
+    let names: Vec<String> =
+        studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().map(|pair| pair.name.clone()).collect();
+    studio.send(LibraryCommand::SetFilter(names[1].clone()).into());
+    studio.send(AdaptCommand::Choose(AdaptPairs::Listed).into());
+    let listed: Vec<String> = studio.state.library.order.iter().map(|id| names[id.0 as usize].clone()).collect();
+    assert!(!listed.is_empty() && listed.len() < names.len());
+    assert_eq!(said(&studio, Pane::Adapt, "--pairs"), Some(listed.join(",")));
+    // Nothing is marked done: there is nothing to fit, and no command for it.
+    studio.send(AdaptCommand::Choose(AdaptPairs::Done).into());
+    assert_eq!(studio.state.equivalent_words(Pane::Adapt, 0.004), None);
 }
 
 #[test]

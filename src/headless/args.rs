@@ -17,6 +17,7 @@ use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_work::io::atomic;
 use touch2touch_work::io::dataset::{Dataset, OpenError, ToolScale};
+use touch2touch_work::pairs;
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]
@@ -163,7 +164,7 @@ pub(super) struct LimitArgs {
 impl LimitArgs {
     /// The positions that are taken of `len`.
     pub(super) fn spread(self, len: usize) -> Vec<usize> {
-        super::spread(len, self.limit)
+        pairs::spread(len, self.limit).collect()
     }
 
     /// The position of the pair that is named, else those that are taken of all.

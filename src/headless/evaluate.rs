@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 
 use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::predict::{RuntimeArg, ShiftArg};
+use super::predict::{MappingArgs, RuntimeArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
@@ -54,9 +54,8 @@ pub(super) struct EvaluateArgs {
     /// The way from noise to an image (default: each bundle's).
     #[arg(long, value_parser = keyed::<Sampler>())]
     sampler: Option<Sampler>,
-    /// How the decoder's output becomes meters.
-    #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
-    shift: ShiftArg,
+    #[command(flatten)]
+    mapping: MappingArgs,
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
@@ -174,6 +173,8 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
             refused.concat()
         );
     }
+    let only = if let [one] = generators.as_slice() { Some(Bundle::open(one.clone())?) } else { None };
+    let shift = args.mapping.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
     Ok(Setup {
         bundles: generators,
         mask_bundle: first(&args.mask_bundle, |b| b.mask_unet().is_some()),
@@ -181,7 +182,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         mask: args.mask.choice(),
         hand: !args.mask.no_hand,
         engine: args.engine,
-        shift: args.shift.mode(),
+        shift,
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,

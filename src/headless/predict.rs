@@ -11,7 +11,7 @@ use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Spacing};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
-use touch2touch_core::postprocess::{CorrectionParts, DepthChain, RefitShift, ShiftMode};
+use touch2touch_core::postprocess::{DepthChain, ShiftMode};
 use touch2touch_core::rig::{PadId, PerPad, Rig, SensorId};
 use touch2touch_core::sample::{PadTouch, Sample};
 use touch2touch_work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
@@ -19,7 +19,6 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint::{self, chain_of, imprints_of};
 use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::infer::engine::{EngineChoice, resolve};
-use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintOf, ImprintSource};
 use touch2touch_work::mask::{Contact, MaskChoice, MaskInputs, MaskSource};
@@ -29,7 +28,7 @@ use touch2touch_work::prediction::Prediction;
 use touch2touch_work::tuning::unfinished_folder;
 
 use args::SpacingArg;
-pub(super) use args::{AnyShiftArg, ModelArgs, RuntimeArg, ShiftArg};
+pub(super) use args::{MappingArgs, ModelArgs, RuntimeArg};
 
 /// The models of one run of the program, as the arguments want them.
 pub(super) struct Predictor {
@@ -38,7 +37,8 @@ pub(super) struct Predictor {
     found: Option<FoundBundles>,
     generator: Option<BundleInfo>,
     mask_model: Option<BundleInfo>,
-    refit: Option<RefitShift>,
+    /// How the generator's output becomes meters.
+    shift: Option<ShiftMode>,
     /// The sensors of the data.
     rig: Arc<Rig>,
     /// Where the generator starts and ends in them.
@@ -60,7 +60,7 @@ impl Predictor {
             found: None,
             generator: None,
             mask_model: None,
-            refit: None,
+            shift: None,
             rig: rig.clone(),
             ends: None,
         }
@@ -75,7 +75,7 @@ impl Predictor {
         if self.generator.is_none() {
             let bundle = self.take(BundleKind::Generator, self.args.bundle.clone())?;
             self.ends = bundle.ends(&self.rig).transpose()?;
-            self.refit = self.read_refit(&bundle)?;
+            self.shift = Some(self.args.mapping.mode(Some((&bundle.name, &bundle.id)))?);
             self.generator = Some(bundle);
         }
         Ok(self.generator.as_ref().expect("it was just found"))
@@ -96,20 +96,6 @@ impl Predictor {
     pub(super) fn no_condition(&self) -> anyhow::Error {
         let sensor = self.ends.and_then(|ends| self.rig.sensor(ends.input));
         anyhow::anyhow!("no {} image", sensor.map_or("GelSlim", |sensor| &sensor.name))
-    }
-
-    /// The statistics for the refit shift, which must be of this bundle.
-    fn read_refit(&self, bundle: &BundleInfo) -> anyhow::Result<Option<RefitShift>> {
-        match (&self.args.stats, self.args.shift) {
-            (Some(file), AnyShiftArg::Refit) => {
-                Ok(Some(ShiftStatistics::read(file)?.shift_for(&bundle.name, &bundle.id)?))
-            }
-            (None, AnyShiftArg::Refit) => {
-                anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`")
-            }
-            (Some(_), _) => anyhow::bail!("--stats is for --shift refit; add that, or leave the statistics out"),
-            (None, _) => Ok(None),
-        }
     }
 
     /// That the generator was fitted to other data than this sample.
@@ -204,13 +190,8 @@ impl Predictor {
 
     /// The reading of the decoder's output; call it after [`Self::bundle`].
     pub(super) fn shift(&self) -> ShiftMode {
-        match self.args.shift {
-            AnyShiftArg::Refit => ShiftMode::Refit(self.refit.expect("read with the bundle")),
-            AnyShiftArg::Raw => ShiftMode::Raw,
-            AnyShiftArg::Paper => ShiftMode::PaperShift,
-            AnyShiftArg::Exact if self.args.fit_parts == CorrectionParts::ALL => ShiftMode::ExactInverse,
-            AnyShiftArg::Exact => ShiftMode::Parts(self.args.fit_parts),
-        }
+        // Without a generator nothing is read by it; what was asked for is still said.
+        self.shift.unwrap_or_else(|| self.args.mapping.mode(None).unwrap_or_default())
     }
 
     /// The way to meters that a bundle offers for a reading, or why it offers none.

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, FingerArg, LimitArgs};
+use super::args::{DatasetArgs, FingerArg, at_least_one};
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
@@ -16,7 +16,8 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models::Wanted;
-use touch2touch_work::statistics::{StatisticsSetup, statistics};
+use touch2touch_work::pairs;
+use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
 /// Arguments of `stats`.
 #[derive(Debug, Args)]
@@ -29,8 +30,9 @@ pub(super) struct StatsArgs {
     /// Which finger's touches: right, left (or as the data set names it), both.
     #[arg(long, default_value = "both")]
     finger: FingerArg,
-    #[command(flatten)]
-    limit: LimitArgs,
+    /// Take only this many pairs, spread evenly over the data set.
+    #[arg(long, value_name = "N", default_value_t = PAIRS, value_parser = at_least_one::<usize>)]
+    limit: usize,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -50,7 +52,8 @@ struct Report {
 
 pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let ids: Vec<PairId> = args.limit.spread(dataset.index.pairs.len()).into_iter().map(|i| PairId(i as u32)).collect();
+    let ids: Vec<PairId> =
+        pairs::spread(dataset.index.pairs.len(), Some(args.limit)).map(|at| PairId(at as u32)).collect();
     let output = Output::new(args.common, "predicting", ids.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let setup = StatisticsSetup {

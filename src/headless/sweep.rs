@@ -9,6 +9,7 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::pairs;
 use touch2touch_work::sweep::{Dial, InForce, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
 
 /// Arguments of `sweep`.
@@ -27,6 +28,9 @@ pub(super) struct SweepArgs {
     /// Take only this many pairs, spread evenly over the data set.
     #[arg(long, visible_alias = "limit", value_name = "N", value_parser = at_least_one::<usize>)]
     pairs: Option<usize>,
+    /// Only these pairs: their names, separated by commas.
+    #[arg(long, value_name = "NAME,NAME", value_delimiter = ',', conflicts_with = "pairs")]
+    only: Vec<String>,
     /// Leave the predictions out: measured imprints only.
     #[arg(long)]
     measured_only: bool,
@@ -46,8 +50,12 @@ pub(super) struct SweepArgs {
 pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let values = values(args).map_err(anyhow::Error::msg)?;
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
-    let positions = super::spread(dataset.index.pairs.len(), args.pairs);
-    let output = Output::new(args.common, "turning the dial", positions.len());
+    let pairs: Vec<PairId> = if args.only.is_empty() {
+        pairs::spread(dataset.index.pairs.len(), args.pairs).map(|at| PairId(at as u32)).collect()
+    } else {
+        args.only.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
+    };
+    let output = Output::new(args.common, "turning the dial", pairs.len());
     let mut predictor = Predictor::new(&args.model, &dataset.rig);
     let choice = args.mask.choice();
     let generator = if args.measured_only { None } else { Some((predictor.bundle()?.clone(), predictor.config()?)) };
@@ -55,7 +63,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let source = if args.dial == Dial::Probability { MaskSource::Unet } else { choice.source };
     let setup = SweepSetup {
         values,
-        pairs: positions.into_iter().map(|at| PairId(at as u32)).collect(),
+        pairs,
         mask_model: predictor.mask_model(&MaskChoice { source, ..choice })?,
         in_force: InForce { mask: choice, registration: args.engine, shift: predictor.shift() },
         generator,

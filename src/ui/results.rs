@@ -80,6 +80,9 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         let tip = "Grasps of each tool, spread evenly; the paper has 46. Default 4";
         response.response.accessible_name("Grasps per tool").on_hover_text(tip);
+        let tip = "The table compares generators as they are meant to be used; the steps and the seed of the pane \
+                   Generate are for the other panes. `evaluate --steps N --seed N` gives all of them the same";
+        ui.label(caption("each with its own steps and seed", cx.p)).on_hover_text(tip);
         let mut published = cx.state.table.published;
         let tip =
             "Adds what the paper and the lab's notebook printed, on real data: compare the form, not the decimals";

@@ -270,14 +270,6 @@ struct ToolWork {
     ids: Vec<PairId>,
 }
 
-/// At most `limit` of the pairs, spread evenly.
-fn spread(ids: &[PairId], limit: Option<usize>) -> Vec<PairId> {
-    match limit {
-        Some(n) if n < ids.len() => (0..n).map(|i| ids[i * ids.len() / n]).collect(),
-        _ => ids.to_vec(),
-    }
-}
-
 /// The pairs by tool, in the order of the index.
 fn by_tool(dataset: &Dataset) -> BTreeMap<Option<String>, Vec<PairId>> {
     let mut tools: BTreeMap<Option<String>, Vec<PairId>> = BTreeMap::new();

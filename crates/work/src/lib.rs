@@ -43,6 +43,7 @@ pub mod mask;
 pub mod models;
 pub mod new_bundle;
 pub mod pair_files;
+pub mod pairs;
 pub mod pose;
 pub mod predict;
 pub mod prediction;

@@ -15,8 +15,8 @@ use touch2touch_core::postprocess::{ShiftFit, ShiftMode};
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::{Sample, Scale};
 
-/// Pairs that the studio's pass takes at most, spread evenly: minutes, not hours. The command line takes all.
-pub const STUDIO_PAIRS: usize = 96;
+/// Pairs that a pass takes at most, spread evenly, where no other number is asked for: minutes, not hours.
+pub const PAIRS: usize = 96;
 
 /// Name of the job in errors.
 const WHAT: &str = "Shift statistics";

@@ -6,6 +6,7 @@ use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::pairs;
 use touch2touch_work::sweep::{Dial, InForce, Setting, Sweep, SweepSetup};
 
 /// Over which pairs a dial is turned.
@@ -78,11 +79,8 @@ impl State {
     pub fn dial_pairs(&self) -> Vec<PairId> {
         let len = self.library.open.as_ref().map_or(0, |open| open.source.index().pairs.len());
         match self.dial.pairs {
-            DialPairs::Spread(count) if count < len => {
-                // As the verbs spread what they take.
-                (0..count).map(|i| PairId((i * len / count) as u32)).collect()
-            }
-            DialPairs::Spread(_) | DialPairs::All => (0..len as u32).map(PairId).collect(),
+            DialPairs::Spread(count) => pairs::spread(len, Some(count)).map(|at| PairId(at as u32)).collect(),
+            DialPairs::All => (0..len as u32).map(PairId).collect(),
             DialPairs::Listed => self.library.order.clone(),
         }
     }

@@ -1,13 +1,16 @@
 //! The command that does in a shell what a pane shows: [`State::equivalent`].
 
+use super::super::adapt::state::AdaptPairs;
 use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
 use super::super::settings::state::ColorMap;
 use super::super::state::State;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::mask::MaskSource;
 use touch2touch_work::subject::{Subject, Wish};
@@ -116,7 +119,8 @@ impl State {
                 let grasps = self.table.grasps_per_tool;
                 words = words.option_if(grasps.is_some(), "--grasps", grasps.unwrap_or(1));
                 let words = if self.table.published { words.word("--paper") } else { words };
-                self.mask_words(words.option("--engine", engine))
+                let words = self.mask_words(words.option("--engine", engine));
+                runtime_words(self.shift_words(words), self.settings.runtime)
             }
             (Pane::Dial, _) => {
                 let dial = &self.dial;
@@ -126,16 +130,26 @@ impl State {
                 let words = match dial.pairs {
                     DialPairs::All => words,
                     DialPairs::Spread(count) => words.option("--pairs", count),
-                    // The verb does not know the list.
-                    DialPairs::Listed => return None,
+                    DialPairs::Listed => words.option("--only", self.names(self.dial_pairs())?),
                 };
                 let words = if dial.predictions { words } else { words.word("--measured-only") };
-                self.model_words(self.mask_words(words.option("--engine", engine)))
+                let words = self.mask_words(words.option("--engine", engine));
+                let words = match self.bundle(BundleKind::Generator) {
+                    Ok(bundle) => generator_words(words, bundle, &self.settings.generate.config(bundle)),
+                    Err(_) => words,
+                };
+                runtime_words(self.shift_words(words), self.settings.runtime)
             }
             (Pane::Adapt, _) => {
+                let setup = self.adapt_setup()?;
                 let words = verb("adapt").option("--out", "fitted");
                 let words = words.option_if(self.adapt.tune, "--tune", self.adapt.steps);
-                self.model_words(self.mask_words(words))
+                let words = match self.adapt.pairs {
+                    AdaptPairs::All => words,
+                    AdaptPairs::Done | AdaptPairs::Listed => words.option("--pairs", self.names(setup.pairs)?),
+                };
+                let words = generator_words(self.mask_words(words), &setup.bundle, &setup.config);
+                runtime_words(words, setup.engine)
             }
             (Pane::Train, _) => {
                 let form = self.train.form;
@@ -203,33 +217,52 @@ impl State {
         let Some((recipe, bundle)) = recipe.and_then(|r| Some((r.clone(), self.library.bundle(&r.bundle)?))) else {
             return words;
         };
-        let config = recipe.config();
-        let sampler: &'static str = config.sampler.into();
-        let spacing = match config.spacing {
-            Spacing::Trailing => "trailing",
-            Spacing::Lab => "lab",
-        };
-        let words = words
-            .option("--bundle", bundle.origin.path().display())
-            .option("--steps", config.steps)
-            .option("--seed", config.seed)
-            .option("--sampler", sampler)
-            .option("--spacing", spacing)
-            .option("--eta", config.eta)
-            .option_if(config.guidance != 1.0, "--guidance", config.guidance);
-        let words = match self.settings.shift {
+        runtime_words(self.shift_words(generator_words(words, bundle, &recipe.config())), recipe.runtime)
+    }
+
+    /// The names of these pairs, as one word; `None` where there are none.
+    fn names(&self, pairs: impl IntoIterator<Item = PairId>) -> Option<String> {
+        let all = &self.library.open.as_ref()?.source.index().pairs;
+        let names: Vec<&str> = pairs.into_iter().filter_map(|id| Some(all.get(id.0 as usize)?.name.as_str())).collect();
+        (!names.is_empty()).then(|| names.join(","))
+    }
+
+    /// How a decoder's output becomes meters.
+    fn shift_words(&self, words: Words) -> Words {
+        match self.settings.shift {
             ShiftMode::Raw => words.option("--shift", "raw"),
             ShiftMode::PaperShift => words.option("--shift", "paper"),
             ShiftMode::ExactInverse => words.option("--shift", "exact"),
             ShiftMode::Parts(parts) => words.option("--shift", "exact").option("--fit-parts", parts_text(parts)),
             // `stats --out statistics.json` writes it.
             ShiftMode::Refit(_) => words.option("--shift", "refit").option("--stats", "statistics.json"),
-        };
-        match recipe.runtime {
-            EngineChoice::Auto => words,
-            EngineChoice::Rten => words.option("--runtime", "rten"),
-            EngineChoice::Ort => words.option("--runtime", "ort"),
         }
+    }
+}
+
+/// A generator and the choices of a generation.
+fn generator_words(words: Words, bundle: &BundleInfo, config: &GenerateConfig) -> Words {
+    let sampler: &'static str = config.sampler.into();
+    let spacing = match config.spacing {
+        Spacing::Trailing => "trailing",
+        Spacing::Lab => "lab",
+    };
+    words
+        .option("--bundle", bundle.origin.path().display())
+        .option("--steps", config.steps)
+        .option("--seed", config.seed)
+        .option("--sampler", sampler)
+        .option("--spacing", spacing)
+        .option("--eta", config.eta)
+        .option_if(config.guidance != 1.0, "--guidance", config.guidance)
+}
+
+/// The engine that runs the models.
+fn runtime_words(words: Words, engine: EngineChoice) -> Words {
+    match engine {
+        EngineChoice::Auto => words,
+        EngineChoice::Rten => words.option("--runtime", "rten"),
+        EngineChoice::Ort => words.option("--runtime", "ort"),
     }
 }
 

@@ -16,7 +16,6 @@ use super::super::view::state::UiRequest;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::mesh::sampling::spread;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::adapt;
@@ -29,7 +28,8 @@ use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::folders;
 use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::models::Wanted;
-use touch2touch_work::statistics::{STUDIO_PAIRS, StatisticsSetup, statistics};
+use touch2touch_work::pairs;
+use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
 /// A place as the system knows it, whatever folder the program was started in: what a note says must be found again.
 fn absolute(place: PathBuf) -> PathBuf {
@@ -79,13 +79,13 @@ impl Runtime {
             Effect::Refit { ticket, recipe, bundle, source } => {
                 let services = self.services.clone();
                 let body: Body<Answer> = Box::new(move |cx| {
-                    let pairs = spread(source.index().pairs.len(), STUDIO_PAIRS);
+                    let pairs = pairs::spread(source.index().pairs.len(), Some(PAIRS));
                     let rig = source.rig();
                     let fail = |err| TaskError::from_error("Shift statistics", &err);
                     let ends = bundle.ends(&rig).transpose().map_err(fail)?;
                     let no_generator = || TaskError::new("Shift statistics", "the bundle is not a generator");
                     let setup = StatisticsSetup {
-                        pairs: pairs.into_iter().map(|i| PairId(i as u32)).collect(),
+                        pairs: pairs.map(|at| PairId(at as u32)).collect(),
                         fingers: rig.pad_list(),
                         input: ends.ok_or_else(no_generator)?.input,
                         config: recipe.config(),

@@ -16,7 +16,7 @@ use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
 use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
 use crate::headless::output::says;
-use crate::headless::{Output, VerbResult, spread};
+use crate::headless::{Output, VerbResult};
 use touch2touch_core::align::{AlignError, AlignReport, icp};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
@@ -26,6 +26,7 @@ use touch2touch_core::units::angle_error;
 use touch2touch_work::canvas;
 use touch2touch_work::io::atomic;
 use touch2touch_work::io::cases::{Case, CaseSet};
+use touch2touch_work::pairs;
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
 const REPEAT_MS: f64 = 8.0;
@@ -162,7 +163,8 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     if !args.no_peers {
         let prepared = prepare(&set, args.masks)?;
         output.note("asking Python for Open3D and small_gicp ...");
-        match peers::run(&args.python, &prepared, &set.tools, &spread(prepared.len(), Some(args.peer_limit))) {
+        let asked: Vec<usize> = pairs::spread(prepared.len(), Some(args.peer_limit)).collect();
+        match peers::run(&args.python, &prepared, &set.tools, &asked) {
             Ok(found) => {
                 report.engines.extend(found.rows);
                 report.notes.extend(found.notes);

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::predict::{RuntimeArg, ShiftArg};
+use super::super::predict::{MappingArgs, RuntimeArg};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Figure;
 use touch2touch_core::pose::RegistrationChoice;
@@ -41,9 +41,8 @@ pub(in super::super) struct QueueArgs {
     /// The registration that gives the angles.
     #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
     engine: RegistrationChoice,
-    /// How kept predictions become meters.
-    #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
-    shift: ShiftArg,
+    #[command(flatten)]
+    mapping: MappingArgs,
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
@@ -66,28 +65,28 @@ struct Report {
 }
 
 /// As the studio does it with its preferences at their defaults.
-fn setup(args: &QueueArgs, dataset: &Dataset) -> Setup {
+fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let bundles = find_all(&[]).bundles;
     let first = |fits: fn(&Bundle) -> bool| bundles.iter().find(|b| fits(b)).map(|b| b.origin().clone());
     let generator = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
-    Setup {
+    Ok(Setup {
         bundles: bundles.iter().filter(generator).map(|b| b.origin().clone()).collect(),
         mask_bundle: args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some())),
         classifier: first(|b| b.tool_classifier().is_some()),
         mask: args.mask.choice(),
         hand: !args.mask.no_hand,
         engine: args.engine,
-        shift: args.shift.mode(),
+        shift: args.mapping.mode(None)?,
         runtime: args.runtime.choice(),
         ..Setup::default()
-    }
+    })
 }
 
 pub(super) fn run(args: &QueueArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let output = Output::new(args.common, "ranking", 0);
     let models = Models::new(if args.no_cache { None } else { cache::store() });
-    let (found, evaluation) = queue(&dataset, &setup(args, &dataset), &models, &output.job())?;
+    let (found, evaluation) = queue(&dataset, &setup(args, &dataset)?, &models, &output.job())?;
     for skipped in &evaluation.skipped {
         output.note(&format!("{}: {}", skipped.what, skipped.why));
     }

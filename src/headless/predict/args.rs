@@ -10,6 +10,7 @@ use touch2touch_core::diffusion::{GUIDANCE, Preset, Sampler};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::subject::{Mapping, Wish};
 
 /// Which models, and how they are run.
@@ -44,16 +45,8 @@ pub(in crate::headless) struct ModelArgs {
     /// The way from noise to an image (default: the preset's).
     #[arg(long, value_parser = keyed::<Sampler>())]
     pub(super) sampler: Option<Sampler>,
-    /// How the decoder's output becomes meters.
-    #[arg(long, value_enum, default_value_t = AnyShiftArg::Exact)]
-    pub(super) shift: AnyShiftArg,
-    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
-    /// response, separated by commas.
-    #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
-    pub(super) fit_parts: CorrectionParts,
-    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
-    #[arg(long, value_name = "FILE")]
-    pub(super) stats: Option<PathBuf>,
+    #[command(flatten)]
+    pub(super) mapping: MappingArgs,
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     pub(super) runtime: RuntimeArg,
@@ -76,10 +69,7 @@ impl ModelArgs {
         args.seed = wish.seed.or(args.seed);
         match wish.shift {
             None => {}
-            Some(Mapping::Raw) => args.shift = AnyShiftArg::Raw,
-            Some(Mapping::Paper) => args.shift = AnyShiftArg::Paper,
-            Some(Mapping::Exact) => (args.shift, args.fit_parts) = (AnyShiftArg::Exact, CorrectionParts::ALL),
-            Some(Mapping::Unfitted) => (args.shift, args.fit_parts) = (AnyShiftArg::Exact, CorrectionParts::NONE),
+            Some(mapping) => args.mapping = MappingArgs::of(mapping),
         }
         args
     }
@@ -114,19 +104,23 @@ pub(super) enum SpacingArg {
     Lab,
 }
 
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::headless) enum ShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
-    Raw,
-    /// The paper's mean-and-deviation shift of that.
-    Paper,
-    /// The doubled mapping undone exactly.
-    Exact,
+/// How the decoder's output becomes meters, as the command line says it.
+#[derive(Debug, Clone, Args)]
+pub(in crate::headless) struct MappingArgs {
+    /// How the decoder's output becomes meters.
+    #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
+    shift: ShiftArg,
+    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
+    /// response, separated by commas.
+    #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
+    fit_parts: CorrectionParts,
+    /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
+    #[arg(long, value_name = "FILE")]
+    stats: Option<PathBuf>,
 }
 
-/// [`ShiftArg`] where statistics of a data set can be named.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(in crate::headless) enum AnyShiftArg {
+enum ShiftArg {
     /// What the lab's released script saves: its range is mapped twice.
     Raw,
     /// The paper's mean-and-deviation shift of that.
@@ -137,14 +131,37 @@ pub(in crate::headless) enum AnyShiftArg {
     Refit,
 }
 
-impl ShiftArg {
-    /// The reading of the decoder's output.
-    pub(in crate::headless) fn mode(self) -> ShiftMode {
-        match self {
+impl MappingArgs {
+    fn of(mapping: Mapping) -> Self {
+        let (shift, fit_parts) = match mapping {
+            Mapping::Raw => (ShiftArg::Raw, CorrectionParts::ALL),
+            Mapping::Paper => (ShiftArg::Paper, CorrectionParts::ALL),
+            Mapping::Exact => (ShiftArg::Exact, CorrectionParts::ALL),
+            Mapping::Unfitted => (ShiftArg::Exact, CorrectionParts::NONE),
+        };
+        Self { shift, fit_parts, stats: None }
+    }
+
+    /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
+    pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
+        if self.shift != ShiftArg::Refit && self.stats.is_some() {
+            anyhow::bail!("--stats is for --shift refit; add that, or leave the statistics out");
+        }
+        Ok(match self.shift {
             ShiftArg::Raw => ShiftMode::Raw,
             ShiftArg::Paper => ShiftMode::PaperShift,
-            ShiftArg::Exact => ShiftMode::ExactInverse,
-        }
+            ShiftArg::Exact if self.fit_parts == CorrectionParts::ALL => ShiftMode::ExactInverse,
+            ShiftArg::Exact => ShiftMode::Parts(self.fit_parts),
+            ShiftArg::Refit => {
+                let Some(file) = &self.stats else {
+                    anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`");
+                };
+                let Some((name, id)) = bundle else {
+                    anyhow::bail!("statistics are of one generator; name it with --bundle");
+                };
+                ShiftMode::Refit(ShiftStatistics::read(file)?.shift_for(name, id)?)
+            }
+        })
     }
 }
 

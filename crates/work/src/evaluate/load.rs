@@ -4,11 +4,12 @@ use std::sync::mpsc::sync_channel;
 
 use rayon::prelude::*;
 
-use super::{Setup, Skipped, ToolWork, by_tool, spread};
+use super::{Setup, Skipped, ToolWork, by_tool};
 use crate::error::TaskError;
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::job::JobCx;
 use crate::labels::{Labels, PairLabels};
+use crate::pairs;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Group;
 use touch2touch_core::grid::Grid;
@@ -63,7 +64,10 @@ impl Labeled {
 pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
     by_tool(dataset)
         .into_iter()
-        .map(|(tool, ids)| ToolWork { tool, ids: spread(&ids, setup.grasps_per_tool) })
+        .map(|(tool, ids)| {
+            let taken = pairs::spread(ids.len(), setup.grasps_per_tool);
+            ToolWork { tool, ids: taken.map(|at| ids[at]).collect() }
+        })
         .collect()
 }
 
