@@ -174,6 +174,10 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
     assert_eq!(found["pads"].as_array().unwrap().len(), 2);
     let angle = |which: &str| found[which]["angle"]["count"].as_u64();
     assert_eq!((angle("before"), angle("closed_form")), (Some(6), Some(6)), "{found:#}");
+    // By the registration that is asked for: one that may not look at all leaves no pose.
+    let tried = [&fixed[..10], &["--engine", "distance_field:gate=0.001"]].concat();
+    let strict = json(&run(&tried, dir.path()));
+    assert_ne!(strict["before"]["angle"], found["before"]["angle"], "{strict:#}");
     let gain = found["closed_form"]["psnr_db"].as_f64().unwrap() - found["before"]["psnr_db"].as_f64().unwrap();
     assert!(gain > 1.0, "{found:#}");
     let to = dir.path().join("pictures");
@@ -198,6 +202,7 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
         pairs: (0..4).map(PairId).collect(),
         folds: 2,
         mask: (MaskChoice::default(), None),
+        registration: RegistrationChoice::default(),
         tuning: Some(Tuning::Steps(2)),
         unfinished,
         out: None,

@@ -6,11 +6,12 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs, parse_minutes};
+use super::args::{DatasetArgs, LimitArgs, RegistrationParser, parse_minutes};
 use super::contact_mask::MaskArgs;
 use super::predict::{ModelArgs, Predictor};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 
 /// Arguments of `adapt`.
@@ -46,6 +47,9 @@ pub(super) struct AdaptArgs {
     limit: LimitArgs,
     #[command(flatten)]
     mask: MaskArgs,
+    /// The registration that gives the angles, where the data have poses.
+    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    engine: RegistrationChoice,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -83,6 +87,7 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         pairs,
         folds: args.validate,
         mask: (choice, predictor.mask_model(&choice)?),
+        registration: args.engine,
         tuning: args.minutes.map(Tuning::Within).or((args.tune > 0).then_some(Tuning::Steps(args.tune))),
         unfinished: predictor.unfinished(),
         out: args.out.clone(),

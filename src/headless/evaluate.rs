@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 use touch2touch_work::io::dataset::Dataset;
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
+use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::predict::{MappingArgs, RuntimeArg};
 use super::{Common, Output, ToolArgs, VerbResult};
@@ -36,9 +36,10 @@ pub(super) struct EvaluateArgs {
     /// The registration that gives the angles.
     #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
     engine: RegistrationChoice,
-    /// Whose images are compared. Angles always come from the contact of both fingers.
-    #[arg(long, value_enum, default_value_t = Fingers::Both)]
-    fingers: Fingers,
+    /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
+    /// both fingers.
+    #[arg(long, value_name = "FINGER", default_value = "both")]
+    fingers: FingerArg,
     /// Neither look for predictions and figures that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     no_cache: bool,
@@ -87,12 +88,6 @@ pub(super) struct EvaluateArgs {
     tool: ToolArgs,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Fingers {
-    Both,
-    Right,
 }
 
 fn batch(text: &str) -> Result<usize, String> {
@@ -173,6 +168,8 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
             refused.concat()
         );
     }
+    let fingers = args.fingers.fingers(&dataset.rig)?;
+    let finger = fingers.first().copied().filter(|_| fingers.len() < dataset.rig.pads().len());
     let only = if let [one] = generators.as_slice() { Some(Bundle::open(one.clone())?) } else { None };
     let shift = args.mapping.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
     Ok(Setup {
@@ -188,7 +185,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         sampler: args.sampler,
         runtime: args.runtime.choice(),
         grasps_per_tool: args.grasps,
-        both_fingers: args.fingers == Fingers::Both,
+        finger,
         batch: args.batch,
         resamples: args.resamples,
     })

@@ -19,7 +19,6 @@ use super::catalog;
 use super::dataset::{PairEntry, Split};
 use super::label::Doubt;
 use super::metrics::{AngleSummary, Unstretched, frechet_distance};
-use super::rig::{PadId, Rig};
 use super::sample::Scale;
 
 pub use figure::{Condition, Figure};
@@ -380,11 +379,6 @@ pub fn squared_error(prediction: &super::grid::Grid<f32>, truth: &super::grid::G
         prediction.as_slice().iter().zip(truth.as_slice()).filter(|(p, t)| p.is_finite() && t.is_finite()).count();
     let mse = super::metrics::mse(prediction, truth).ok()?;
     Some(SquaredError { sum: mse * pixels as f64, pixels })
-}
-
-/// The pads that a finger choice names, in the rig's order: all, or the first.
-pub fn fingers(rig: &Rig, all: bool) -> impl Iterator<Item = PadId> + use<> {
-    rig.pads().take(if all { usize::MAX } else { 1 })
 }
 
 #[cfg(test)]

@@ -30,6 +30,7 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::lattice::template;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::Correction;
 use touch2touch_core::rig::PerPad;
 #[cfg(not(feature = "tune"))]
@@ -73,6 +74,8 @@ pub struct AdaptSetup {
     pub folds: usize,
     /// How contact is found where the data have poses, and with which model.
     pub mask: (MaskChoice, Option<BundleInfo>),
+    /// The registration that gives the angles there.
+    pub registration: RegistrationChoice,
     /// Whether and how long the networks themselves are tuned after the closed form: once for each part that is left out,
     /// and once for all.
     pub tuning: Option<Tuning>,

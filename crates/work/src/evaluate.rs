@@ -31,6 +31,7 @@ use touch2touch_core::evaluation::{self, Group, Row, Scores};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 pub use export::{Report, export, rows};
@@ -66,8 +67,8 @@ pub struct Setup {
     pub runtime: EngineChoice,
     /// At most so many grasps of each tool, spread evenly.
     pub grasps_per_tool: Option<usize>,
-    /// Whether images of both fingers are compared, or only the right one's. Poses always come from both.
-    pub both_fingers: bool,
+    /// The only finger whose images are compared, or all. Poses always come from all.
+    pub finger: Option<PadId>,
     /// Images that go through a generator at once.
     pub batch: usize,
     /// Drawings for the intervals.
@@ -89,7 +90,7 @@ impl Default for Setup {
             sampler: None,
             runtime: EngineChoice::default(),
             grasps_per_tool: None,
-            both_fingers: true,
+            finger: None,
             batch: 8,
             resamples: 400,
         }
@@ -224,7 +225,7 @@ pub fn evaluate(
     scores.retain(|s| !s.grasps.is_empty());
     let rows = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
     let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
-    notes.append(&mut models.missing(setup, scale));
+    notes.append(&mut models.missing(setup, &dataset.rig, scale));
     notes.append(&mut models.masks_made_otherwise());
     Ok(Evaluation {
         dataset: dataset.title.clone(),

@@ -102,6 +102,7 @@ impl State {
             pairs: self.adapt_pairs().collect(),
             folds: FOLDS,
             mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
+            registration: self.settings.pose_engine,
             tuning: self.adapt.tune.then_some(Tuning::Steps(self.adapt.steps)),
             unfinished: None,
             out: None,

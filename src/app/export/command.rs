@@ -148,7 +148,8 @@ impl State {
                     AdaptPairs::All => words,
                     AdaptPairs::Done | AdaptPairs::Listed => words.option("--pairs", self.names(setup.pairs)?),
                 };
-                let words = generator_words(self.mask_words(words), &setup.bundle, &setup.config);
+                let words = self.mask_words(words.option("--engine", engine));
+                let words = generator_words(words, &setup.bundle, &setup.config);
                 runtime_words(words, setup.engine)
             }
             (Pane::Train, _) => {

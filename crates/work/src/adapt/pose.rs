@@ -12,7 +12,6 @@ use crate::tool::Tools;
 use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Scale;
 
@@ -32,6 +31,7 @@ pub(super) fn angles(
 ) -> Result<Option<AngleSummary>, TaskError> {
     let (choice, model) = (setup.mask.0, setup.mask.1.as_ref());
     let by = Masking { choice, model, engine: setup.engine };
+    let registration = setup.registration.method();
     let grasps: Vec<&[Touch]> = touches.chunk_by(|a, b| a.id == b.id).collect();
     let mut errors = Vec::new();
     let (mut at, stride) = (0, grasps.len().div_ceil(MOST_GRASPS).max(1));
@@ -51,11 +51,12 @@ pub(super) fn angles(
         for (touch, picture) in grasp.iter().zip(own) {
             imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
         }
+        // What people drew on a prediction is of that picture, and each of these is another one.
         let inputs = MaskInputs { sample: &sample, tool: Some(tool), labels: None, of: None };
         let found = models
             .contact(by, imprints, inputs)
             .and_then(|contact| contact.points(&sample))
-            .and_then(|points| pose(&points, tool, &*Registration::default().method(), Ask::default(), Some(truth)));
+            .and_then(|points| pose(&points, tool, &*registration, Ask::default(), Some(truth)));
         errors.push(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN));
     }
     Ok((!errors.is_empty()).then(|| AngleSummary::from_errors(&errors)))

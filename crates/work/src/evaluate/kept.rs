@@ -23,6 +23,7 @@ use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem};
 use touch2touch_core::evaluation::{GraspScore, Group};
 use touch2touch_core::read_as::list;
+use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
@@ -195,7 +196,7 @@ fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &str) -> Str
         classifier: Option<&'a str>,
         engine: &'a str,
         registration: String,
-        both_fingers: bool,
+        finger: Option<PadId>,
         kind: String,
         rig: String,
     }
@@ -208,7 +209,7 @@ fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &str) -> Str
         classifier: models.classifier_hash(),
         engine: models.engine(),
         registration: setup.engine.to_string(),
-        both_fingers: setup.both_fingers,
+        finger: setup.finger,
         kind: format!("{:?}", dataset.kind),
         rig: format!("{:?}", dataset.rig),
     };

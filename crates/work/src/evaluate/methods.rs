@@ -21,7 +21,7 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Scores;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::rig::{PadId, PerPad, SensorKind};
+use touch2touch_core::rig::{PadId, PerPad, Rig, SensorKind};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::turn::Turn;
@@ -190,12 +190,12 @@ impl Models {
     }
 
     /// What is missing from the table, and why.
-    pub(super) fn missing(&self, setup: &Setup, scale: Scale) -> Vec<String> {
-        let mut notes = vec![if setup.both_fingers {
-            "images of both fingers; one angle per grasp, from the contact of both".to_owned()
-        } else {
-            "images of the right finger only; one angle per grasp, from the contact of both".to_owned()
-        }];
+    pub(super) fn missing(&self, setup: &Setup, rig: &Rig, scale: Scale) -> Vec<String> {
+        let images = match setup.finger {
+            None => "images of both fingers".to_owned(),
+            Some(pad) => format!("images of the {} finger only", rig.pad_key(pad)),
+        };
+        let mut notes = vec![format!("{images}; one angle per grasp, from the contact of both")];
         for method in &self.methods {
             if let Method::Generator(method) = method
                 && method.bundle.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Color)

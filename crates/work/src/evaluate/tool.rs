@@ -25,7 +25,7 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, fingers, squared_error};
+use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
 use touch2touch_core::grid::{DepthMap, Grid, Mask, RgbGrid};
 use touch2touch_core::label::Doubt;
 use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
@@ -390,8 +390,8 @@ fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
         Some(Image { finger: finger.index(), prediction, truth, noise_free, unstretched: None, verdict: None })
     };
-    let present = |f: &PadId| case.sample.pad(*f).is_some();
-    fingers(&case.sample.rig, setup.both_fingers).filter(present).filter_map(image).collect()
+    let meant = |pad: &PadId| setup.finger.is_none_or(|only| only == *pad) && case.sample.pad(*pad).is_some();
+    case.sample.rig.pads().filter(meant).filter_map(image).collect()
 }
 
 /// The work on one pair: a panic in it is that pair's failure and not the end of the run.
