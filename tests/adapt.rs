@@ -8,6 +8,7 @@ use serde_json::Value;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::Grid;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::adapt::{AdaptSetup, Tuning, adapt};
 use touch2touch_work::bundles::{BundleKind, find};
 use touch2touch_work::error::TaskErrorKind;

@@ -275,7 +275,7 @@ pub fn threads() -> usize {
 
 #[cfg(all(test, not(feature = "onnx")))]
 mod tests {
-    use super::*;
+    use super::{EngineChoice, EngineError, resolve};
 
     #[test]
     fn a_build_without_engines_says_so() {
