@@ -13,7 +13,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::hand::{AcceptedPose, HandPose};
 use touch2touch_core::pose::Registration;
 use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{MaskStore, StoredReview};
+use touch2touch_work::io::masks::{ByImprint, MaskStore, StoredReview};
 
 use crate::support::{self, run};
 
@@ -113,6 +113,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let planar = PlanarPose { theta_rad: -0.1, y_m: 0.001, z_m: 0.002 };
     let pose = HandPose { pitch_rad: 0.05, ..planar.into() };
     let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
+    let accepted = ByImprint { accepted, ..ByImprint::default() };
     let name = cases[0]["name"].as_str().unwrap();
     store.save_review(name, &StoredReview { review: "todo".into(), accepted, ..StoredReview::default() }).unwrap();
     let labeled = json(&run(&["pose", set_text, "--json"], data_path));

@@ -371,7 +371,7 @@ fn export(state: &State, source: ImprintSource) -> Option<Command> {
 /// Accepts the pose shown, or withdraws it if it is the accepted one.
 fn accept(state: &State, source: ImprintSource) -> Option<Command> {
     let shown = state.pose(source).ready()?.grasp_from_object;
-    let accepted = state.document.pair(state.pair_name()).and_then(|labels| labels.accepted(source));
+    let accepted = state.accepted(source);
     let editable = state.document.is_editable(state.pair_name());
     when(editable, LabelsCommand::AcceptPose(source, accepted != Some(shown.into())))
 }

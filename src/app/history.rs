@@ -2,12 +2,11 @@
 
 use std::borrow::Cow;
 
-use strum::IntoEnumIterator as _;
-
-use super::keys::{ImprintSource, Revision};
+use super::keys::Revision;
 use super::labels::state::{Document, HandMask, MaskPlace, Review};
 use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::PackedMask;
+use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::labels::{Change, Past};
 
 /// A corrected mask in few bytes.
@@ -66,7 +65,7 @@ pub enum Edit {
         /// The pair's name.
         pair: String,
         /// The imprint it was made from.
-        source: ImprintSource,
+        of: ImprintOf,
         /// `grasp_from_object`.
         pose: Option<AcceptedPose>,
     },
@@ -83,9 +82,9 @@ impl Edit {
             }
             Self::Review { pair, review } => *review = doc.set_review(pair, *review),
             Self::Note { pair, note } => *note = doc.set_note(pair, std::mem::take(note)),
-            Self::Pose { pair, source, pose } => {
+            Self::Pose { pair, of, pose } => {
                 let labels = doc.labels.entry(pair.clone()).or_default();
-                std::mem::swap(&mut labels.accepted[*source as usize], pose);
+                *pose = labels.put_accepted(of, pose.take());
             }
         }
     }
@@ -137,8 +136,8 @@ impl Gesture {
         }
         edits.extend(change.review.map(|[before, _]| Edit::Review { pair: pair(), review: before }));
         edits.extend(change.note.as_ref().map(|[before, _]| Edit::Note { pair: pair(), note: before.clone() }));
-        for (source, accepted) in ImprintSource::iter().zip(change.accepted) {
-            edits.extend(accepted.map(|[before, _]| Edit::Pose { pair: pair(), source, pose: before }));
+        for (of, [before, _]) in &change.accepted {
+            edits.push(Edit::Pose { pair: pair(), of: of.clone(), pose: *before });
         }
         Self { name, edits }
     }

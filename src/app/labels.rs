@@ -29,6 +29,7 @@ use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, See
 use touch2touch_core::rig::PadId;
 use touch2touch_work::cloud::seen;
 use touch2touch_work::error::TaskError;
+use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::labels::{Act, Deed, note, system_person};
 use touch2touch_work::propose::accepted;
 
@@ -520,10 +521,22 @@ pub(super) fn set_accepted(
     pose: Option<AcceptedPose>,
     effects: &mut Vec<Effect>,
 ) {
+    let Some(of) = state.shown_imprint(source) else {
+        return state.log.error(&TaskError::new("Accept the pose", "the fingers show different predictions"));
+    };
     let pair = state.pair_name().to_owned();
-    let mut edit = Edit::Pose { pair: pair.clone(), source, pose };
-    edit.swap(&mut state.document);
-    state.history.record(Gesture { name: name.into(), edits: vec![edit] });
+    let before = state.document.pair(&pair).cloned().unwrap_or_default();
+    let mut after = before.clone();
+    after.accept(&of, pose);
+    let mut edits = Vec::new();
+    for of in [ImprintOf::unknown(), of] {
+        let pose = after.accepted.get(&of).copied();
+        if before.accepted.get(&of).copied() != pose {
+            edits.push(Edit::Pose { pair: pair.clone(), of, pose });
+        }
+    }
+    edits.iter_mut().for_each(|edit| edit.swap(&mut state.document));
+    state.history.record(Gesture { name: name.into(), edits });
     save_pair(state, &pair, Deed::named(name), effects);
 }
 

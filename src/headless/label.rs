@@ -150,6 +150,12 @@ impl Touch<'_> {
     }
 }
 
+/// The other imprints of a kind that poses were accepted of, as the end of a sentence.
+fn elsewhere(labels: &PairLabels, imprint: ImprintSource) -> String {
+    let of: Vec<String> = labels.accepted.keys().filter(|of| of.source() == imprint).map(ImprintOf::text).collect();
+    if of.is_empty() { String::new() } else { format!("; there is one of {}", of.join(", ")) }
+}
+
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
 fn change(
@@ -218,16 +224,22 @@ fn change(
         }
     }
     if let Some(imprint) = args.withdraw {
-        labels.accepted[imprint as usize] = None;
+        let of = Predictor::new(&args.model, &dataset.rig).of(imprint)?;
+        if labels.accepted(&of).is_none() {
+            anyhow::bail!("no pose was accepted of {}, so none is withdrawn{}", of.text(), elsewhere(labels, imprint));
+        }
+        labels.accept(&of, None);
     }
     if let Some(imprint) = args.accept {
-        labels.accepted[imprint as usize] = Some(match args.pose {
+        let of = Predictor::new(&args.model, &dataset.rig).of(imprint)?;
+        let pose = match args.pose {
             Some(planar) => AcceptedPose { pose: planar.into(), by_hand: true },
             None => match &mut touch {
                 Some(touch) => touch.pose(imprint, labels)?.into(),
                 None => Touch::load(args, dataset, id)?.pose(imprint, labels)?.into(),
             },
-        });
+        };
+        labels.accept(&of, Some(pose));
     }
     if let Some(review) = args.review {
         labels.review = review;

@@ -95,7 +95,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 influence: influence.as_deref(),
                 inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels), of: None },
                 tool,
-                accepted: labels.accepted(imprint),
+                accepted: predictor.of(imprint).ok().and_then(|of| labels.accepted(&of)),
             };
             let work = || pose_cases(args, &asked, imprint, &mut predictor);
             match guarded(dataset.pair_files(PairId(id as u32)), work) {

@@ -18,6 +18,7 @@ use touch2touch_core::postprocess::{Severity, Stage, Stats};
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_work::compare::Comparison;
+use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::verdict::Verdict;
 
 /// Figures that only this pane shows.
@@ -118,13 +119,17 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ImprintSource::Measured => Action::AcceptMeasuredPose,
                 ImprintSource::Predicted => Action::AcceptPredictedPose,
             };
-            let labels = cx.state.document.pair(cx.state.pair_name());
-            let accepted = labels.and_then(|l| l.accepted(source)) == Some(p.into());
+            let accepted = cx.state.accepted(source) == Some(p.into());
             let text = if accepted { "Accepted (withdraw)" } else { "Accept this pose" };
             if let Some(hand) = cx.state.by_hand(source) {
                 by_hand(cx, ui, source, hand);
             } else {
                 cx.action_button(ui, action, text);
+            }
+            let elsewhere = cx.state.accepted_elsewhere();
+            if source == ImprintSource::Predicted && !elsewhere.is_empty() {
+                let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
+                ui.label(caption("accepted of another prediction", cx.p)).on_hover_text(of.join("\n"));
             }
         }
     }

@@ -58,10 +58,9 @@ fn the_pose_follows_the_mask() {
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
     bench.send(accept);
-    let name = bench.state.pair_name().to_owned();
-    assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_some());
+    assert!(bench.state.accepted(MEASURED).is_some());
     bench.send(LabelsCommand::Undo);
-    assert!(bench.state.document.pair(&name).unwrap().accepted(MEASURED).is_none());
+    assert!(bench.state.accepted(MEASURED).is_none());
 }
 
 #[test]

@@ -14,7 +14,7 @@ use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
+use touch2touch_work::io::masks::{ByImprint, FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
 
 use super::touch_file;
 
@@ -141,14 +141,15 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
         "accepted":[{"theta_rad":0.1,"y_m":0.002,"z_m":-0.03333333333333333},null]}"#;
     std::fs::write(dir.path().join("old.review.json"), old).unwrap();
     let read = store.load_review("old").unwrap().unwrap();
-    assert_eq!(read.accepted, [Some(planar.into()), None]);
+    assert_eq!(read.accepted, ByImprint { accepted: [Some(planar.into()), None], ..ByImprint::default() });
     store.save_review("plain", &read).unwrap();
     assert!(text("plain").contains("\"version\":1") && !text("plain").contains("by_hand"));
 
     let tilted = HandPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
     for pose in [HandPose::from(planar), tilted] {
         let by_hand = Some(AcceptedPose { pose, by_hand: true });
-        let review = StoredReview { review: "todo".into(), accepted: [None, by_hand], ..StoredReview::default() };
+        let accepted = ByImprint { accepted: [None, by_hand], ..ByImprint::default() };
+        let review = StoredReview { review: "todo".into(), accepted, ..StoredReview::default() };
         store.save_review("hand", &review).unwrap();
         assert!(text("hand").contains("\"version\":2"));
         assert_eq!(store.load_review("hand").unwrap(), Some(review));
@@ -157,6 +158,12 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
     store.save_review("noted", &noted).unwrap();
     assert!(text("noted").contains("\"version\":3"), "an older program would lose the note");
     assert_eq!(store.load_review("noted").unwrap(), Some(noted));
+    let of = PredictedId::new("b0", &GenerateConfig::default(), ShiftMode::Raw);
+    let accepted = ByImprint { accepted_predicted: [(of, planar.into())].into(), ..ByImprint::default() };
+    let predicted = StoredReview { review: "todo".into(), accepted, ..StoredReview::default() };
+    store.save_review("predicted", &predicted).unwrap();
+    assert!(text("predicted").contains("\"version\":4"), "an older program would lose of which prediction it is");
+    assert_eq!(store.load_review("predicted").unwrap(), Some(predicted));
     for bad in [text("hand").replace("\"version\":2", "\"version\":9"), text("hand").replace("0.05", "1e999")] {
         std::fs::write(dir.path().join("hand.review.json"), &bad).unwrap();
         assert!(store.load_review("hand").is_err(), "{bad}");
@@ -168,7 +175,8 @@ fn reviews_and_the_journal() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().to_owned());
     let pose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.1 / 3.0 };
-    let review = StoredReview { review: "done".into(), accepted: [Some(pose.into()), None], ..StoredReview::default() };
+    let accepted = ByImprint { accepted: [Some(pose.into()), None], ..ByImprint::default() };
+    let review = StoredReview { review: "done".into(), accepted, ..StoredReview::default() };
     store.save_review("b", &review).unwrap();
     store.save_review("a", &StoredReview { review: "flagged".into(), ..StoredReview::default() }).unwrap();
     assert_eq!(store.load_review("b").unwrap(), Some(review));

@@ -141,7 +141,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     let stored = |rig: &Rig| {
         let dataset = Dataset::open(&rig.data).unwrap();
         let review = MaskStore::for_dataset(&dataset).unwrap().load_review(&name).unwrap();
-        review.and_then(|r| r.accepted[0])
+        review.and_then(|r| r.accepted.accepted[0])
     };
     assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
     assert_eq!(stored(&rig).map(|a| (a.pose, a.by_hand)), Some((pose, true)));

@@ -43,6 +43,11 @@ impl PredictedId {
         Self(text.into())
     }
 
+    /// A prediction of which nobody wrote down which one it is.
+    pub fn unknown() -> Self {
+        Self::verbatim(String::new())
+    }
+
     /// The text.
     pub fn as_str(&self) -> &str {
         &self.0

@@ -1,6 +1,8 @@
 //! A case: one pair with everything that its results depend on, in one file that gives the same results elsewhere
 //! ([`make`], [`open`], [`check`]).
 
+use super::io::masks::ByImprint;
+use super::labels::{by_imprint, of_imprints};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -86,7 +88,8 @@ struct CaseMask {
 struct CaseLabels {
     masks: Vec<CaseMask>,
     review: Review,
-    accepted: [Option<AcceptedPose>; 2],
+    #[serde(flatten)]
+    accepted: ByImprint<AcceptedPose>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     note: String,
 }
@@ -208,7 +211,7 @@ impl CaseLabels {
         Self {
             masks: labels.masks.iter().map(mask).collect(),
             review: labels.review,
-            accepted: labels.accepted,
+            accepted: by_imprint(&labels.accepted),
             note: labels.note.clone(),
         }
     }
@@ -216,7 +219,7 @@ impl CaseLabels {
     fn labels(&self) -> Result<PairLabels, TaskError> {
         let mut labels = PairLabels {
             review: self.review,
-            accepted: self.accepted,
+            accepted: of_imprints(self.accepted.clone()),
             note: note(&self.note),
             ..PairLabels::default()
         };

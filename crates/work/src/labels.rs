@@ -10,6 +10,7 @@ pub use journal::{Act, Change, Deed, Past, Told};
 pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
 pub use recovery::{Recovered, Unsaved, recover, take_in};
 pub use stored::Labels;
+pub(crate) use stored::{by_imprint, of_imprints};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -17,6 +18,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
+use super::prediction::settings_text;
 use crate::io::masks;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -160,6 +162,25 @@ impl ImprintOf {
     /// The prediction of a generator (its bundle's identity) with these choices.
     pub fn predicted(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
         Self::Predicted(PredictedId::new(bundle, config, shift))
+    }
+
+    /// A prediction of which nobody wrote down which one it is.
+    pub fn unknown() -> Self {
+        Self::Predicted(PredictedId::unknown())
+    }
+
+    /// Which prediction it is, for people: the first digits of its bundle's identity, the choices, the shift.
+    pub fn text(&self) -> String {
+        match self {
+            Self::Measured => "the measured imprint".into(),
+            Self::Predicted(id) => match id.parts() {
+                Some((bundle, config, shift)) => {
+                    let bundle: String = bundle.chars().take(8).collect();
+                    format!("the prediction of bundle {bundle} · {} · {}", settings_text(&config), shift.label())
+                }
+                None => "a prediction that was not written down".into(),
+            },
+        }
     }
 
     /// Which of the two it is.
@@ -318,8 +339,8 @@ pub struct PairLabels {
     pub masks: BTreeMap<MaskPlace, HandMask>,
     /// The review state.
     pub review: Review,
-    /// Accepted `grasp_from_object` poses: from the measured, from the predicted imprint.
-    pub accepted: [Option<AcceptedPose>; 2],
+    /// Accepted `grasp_from_object` poses, by the imprint that they were made from.
+    pub accepted: BTreeMap<ImprintOf, AcceptedPose>,
     /// What a person wrote about it, in one line; empty for nothing. See [`note`].
     pub note: String,
 }
@@ -377,8 +398,26 @@ impl PairLabels {
         }
     }
 
-    /// The pose accepted for `source`.
-    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
-        self.accepted[source as usize]
+    /// The pose accepted of an imprint; for a prediction, else the one of which earlier versions did not write down which
+    /// prediction it is of.
+    pub fn accepted(&self, of: &ImprintOf) -> Option<AcceptedPose> {
+        let unknown = || self.accepted.get(&ImprintOf::unknown()).filter(|_| of.source() == ImprintSource::Predicted);
+        self.accepted.get(of).or_else(unknown).copied()
+    }
+
+    /// Accepts a pose of an imprint, or withdraws the one that [`Self::accepted`] finds.
+    pub fn accept(&mut self, of: &ImprintOf, pose: Option<AcceptedPose>) {
+        let place = if pose.is_some() || self.accepted.contains_key(of) { of } else { &ImprintOf::unknown() };
+        if of.source() == place.source() {
+            self.put_accepted(place, pose);
+        }
+    }
+
+    /// Puts an accepted pose in its place, or takes it away; returns what was there.
+    pub fn put_accepted(&mut self, of: &ImprintOf, pose: Option<AcceptedPose>) -> Option<AcceptedPose> {
+        match pose {
+            Some(pose) => self.accepted.insert(of.clone(), pose),
+            None => self.accepted.remove(of),
+        }
     }
 }

@@ -461,9 +461,11 @@ mod tests {
     use touch2touch_core::grid::Mask;
     use touch2touch_core::hand::{AcceptedPose, HandPose};
     use touch2touch_core::label::Provenance;
+    use touch2touch_core::postprocess::ShiftMode;
     use touch2touch_core::rig::lab;
     use touch2touch_work::export::{LeftOut, Which};
     use touch2touch_work::io::masks::MaskStore;
+    use touch2touch_work::labels::ImprintOf;
     use touch2touch_work::labels::{HandMask, MaskPlace, Revision};
 
     /// A folder with one pair of pictures.
@@ -484,9 +486,13 @@ mod tests {
             .into(),
             review: Review::InProgress,
             accepted: [
-                Some(PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
-                Some(AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true }),
-            ],
+                (ImprintOf::Measured, PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
+                (
+                    ImprintOf::predicted("b0", &GenerateConfig::default(), ShiftMode::Raw),
+                    AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true },
+                ),
+            ]
+            .into(),
             note: "shallow at the edge".into(),
         }
     }

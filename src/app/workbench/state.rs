@@ -11,6 +11,7 @@ use super::super::state::State;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
 use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_work::labels::ImprintOf;
 
 /// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -245,9 +246,25 @@ impl State {
         self.sample().ready()?.grasp_from_object
     }
 
-    /// The pose that was accepted for an imprint of the selected pair.
+    /// The imprint that a pose is made from, where all fingers show the same.
+    pub fn shown_imprint(&self, source: ImprintSource) -> Option<ImprintOf> {
+        let rig = self.rig();
+        let mut of = rig.pads().filter_map(|pad| self.mask_place(source, pad)).map(|place| place.of);
+        let first = of.next()?;
+        of.all(|other| other == first).then_some(first)
+    }
+
+    /// The pose that was accepted of the imprint of the selected pair that is shown.
     pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
-        self.document.pair(self.pair_name())?.accepted(source)
+        self.document.pair(self.pair_name())?.accepted(&self.shown_imprint(source)?)
+    }
+
+    /// The other predictions of the selected pair that a pose was accepted of.
+    pub fn accepted_elsewhere(&self) -> Vec<&ImprintOf> {
+        let shown = self.shown_imprint(ImprintSource::Predicted);
+        let poses = self.document.pair(self.pair_name()).map(|labels| labels.accepted.keys());
+        let other = |of: &&ImprintOf| of.source() == ImprintSource::Predicted && **of != ImprintOf::unknown();
+        poses.into_iter().flatten().filter(other).filter(|of| Some(*of) != shown.as_ref()).collect()
     }
 
     /// The pose that a person set and accepted.

@@ -19,8 +19,8 @@ pub(super) struct Stored {
     masks: Vec<(String, usize)>,
     /// The same of masks on predictions, with what each prediction is.
     predicted: Vec<(String, usize, String)>,
-    /// From the measured, from the predicted imprint.
-    accepted: [Option<AcceptedPose>; 2],
+    /// Accepted poses, each with what it is of.
+    accepted: Vec<Accepted>,
     /// What a person wrote about it; empty for nothing.
     note: String,
 }
@@ -41,7 +41,7 @@ impl Stored {
             review: labels.review.stored(),
             masks,
             predicted,
-            accepted: labels.accepted,
+            accepted: labels.accepted.iter().map(|(of, pose)| Accepted::new(of, *pose)).collect(),
             note: labels.note.clone(),
         }
     }
@@ -51,17 +51,32 @@ impl Stored {
         masks.extend(self.predicted.iter().map(|(pad, px, _)| format!("{pad} {px} px on a prediction")));
         let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
         let mut text = format!("{}: {}; {masks}", self.name, self.review);
-        for (of, accepted) in ["measured", "predicted"].iter().zip(self.accepted) {
-            if let Some(accepted) = accepted {
-                let place = accepted.pose.planar.inverse();
-                let by = if accepted.by_hand { ", by hand" } else { "" };
-                text += &format!("; {of} pose {:.1}° accepted{by}", place.theta_rad.to_degrees());
-            }
+        for Accepted { what, pose, .. } in &self.accepted {
+            let place = pose.pose.planar.inverse();
+            let by = if pose.by_hand { ", by hand" } else { "" };
+            text += &format!("; pose {:.1}° accepted of {what}{by}", place.theta_rad.to_degrees());
         }
         if !self.note.is_empty() {
             text += &format!("; note: {}", self.note);
         }
         text
+    }
+}
+
+/// An accepted pose.
+#[derive(Debug, Serialize)]
+struct Accepted {
+    /// The imprint that it is of.
+    of: ImprintOf,
+    #[serde(skip)]
+    what: String,
+    #[serde(flatten)]
+    pose: AcceptedPose,
+}
+
+impl Accepted {
+    fn new(of: &ImprintOf, pose: AcceptedPose) -> Self {
+        Self { of: of.clone(), what: of.text(), pose }
     }
 }
 

@@ -11,6 +11,7 @@
 mod journal;
 
 use std::cmp::Reverse;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -38,6 +39,8 @@ const MASK_VERSION: u32 = 2;
 const HAND_VERSION: u32 = 2;
 /// Reviews with a note: an older program would write them back without it.
 const NOTE_VERSION: u32 = 3;
+/// Reviews with poses that say of which prediction they were accepted.
+const PREDICTED_VERSION: u32 = 4;
 const MASK_SUFFIX: &str = ".mask.json";
 const PREDICTED_SUFFIX: &str = ".predicted.json";
 const PREDICTED_FORMAT: &str = "touch2touch-predicted-masks";
@@ -108,14 +111,43 @@ pub struct StoredMask {
     pub saved_unix_s: u64,
 }
 
+/// A value for each imprint of a pair that has one, as files hold it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(bound(deserialize = "T: serde::de::DeserializeOwned"))]
+pub struct ByImprint<T> {
+    /// That of the measured imprint, and that of a prediction that earlier versions did not name.
+    #[serde(default = "neither")]
+    pub accepted: [Option<T>; 2],
+    /// Those of predictions, by which one it is.
+    #[serde(default = "BTreeMap::new", skip_serializing_if = "BTreeMap::is_empty")]
+    pub accepted_predicted: BTreeMap<PredictedId, T>,
+}
+
+fn neither<T>() -> [Option<T>; 2] {
+    [None, None]
+}
+
+impl<T> Default for ByImprint<T> {
+    fn default() -> Self {
+        Self { accepted: neither(), accepted_predicted: BTreeMap::new() }
+    }
+}
+
+impl<T> ByImprint<T> {
+    /// All values.
+    pub fn values(&self) -> impl Iterator<Item = &T> {
+        self.accepted.iter().flatten().chain(self.accepted_predicted.values())
+    }
+}
+
 /// What else a person said about a pair.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StoredReview {
     /// The review state by its stored name (e.g. `done`).
     pub review: String,
-    /// Accepted `grasp_from_object`, from the measured and from the predicted imprint.
-    #[serde(default)]
-    pub accepted: [Option<AcceptedPose>; 2],
+    /// Accepted `grasp_from_object`.
+    #[serde(flatten)]
+    pub accepted: ByImprint<AcceptedPose>,
     /// What a person wrote about the pair; empty for nothing.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
@@ -125,8 +157,9 @@ impl StoredReview {
     /// An older program must not read a pose or a note without what it cannot know; all other files it still reads.
     fn version(&self) -> u32 {
         match self {
+            Self { accepted, .. } if !accepted.accepted_predicted.is_empty() => PREDICTED_VERSION,
             Self { note, .. } if !note.is_empty() => NOTE_VERSION,
-            Self { accepted, .. } if !accepted.iter().flatten().all(|a| a.is_plain()) => HAND_VERSION,
+            Self { accepted, .. } if !accepted.values().all(|a| a.is_plain()) => HAND_VERSION,
             _ => VERSION,
         }
     }
@@ -546,8 +579,8 @@ fn contact_px(mask: &Mask) -> usize {
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     let content: ReviewFile = serde_json::from_slice(bytes)
         .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
-    check_format(file, &content.format, REVIEW_FORMAT, content.version, NOTE_VERSION)?;
-    if content.review.accepted.iter().flatten().any(|a| !a.pose.is_finite()) {
+    check_format(file, &content.format, REVIEW_FORMAT, content.version, PREDICTED_VERSION)?;
+    if content.review.accepted.values().any(|a| !a.pose.is_finite()) {
         let reason = "an accepted pose is not a finite number".into();
         return Err(StoreError::Damaged { file: file.to_owned(), reason });
     }

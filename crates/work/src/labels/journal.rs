@@ -1,6 +1,8 @@
 //! The journal of a pair's labels: who did what and when, with what it was before and after. Undo begins where it ended,
 //! also when the program was closed or killed in between.
 
+use super::super::io::masks::ByImprint;
+use super::stored::{by_imprint, of_imprints};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 
@@ -52,8 +54,8 @@ pub struct Change {
     pub masks: BTreeMap<MaskPlace, [Option<HandMask>; 2]>,
     /// The review state.
     pub review: Option<[Review; 2]>,
-    /// The pose accepted of the measured and of the predicted imprint.
-    pub accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    /// Accepted poses.
+    pub accepted: BTreeMap<ImprintOf, [Option<AcceptedPose>; 2]>,
     /// The note.
     pub note: Option<[String; 2]>,
 }
@@ -79,9 +81,11 @@ impl Change {
             }
         }
         change.review = (before.review != after.review).then_some([before.review, after.review]);
-        for (i, accepted) in change.accepted.iter_mut().enumerate() {
-            let pair = [before.accepted[i], after.accepted[i]];
-            *accepted = (pair[0] != pair[1]).then_some(pair);
+        for of in before.accepted.keys().chain(after.accepted.keys()) {
+            let pair = [before.accepted.get(of).copied(), after.accepted.get(of).copied()];
+            if pair[0] != pair[1] {
+                change.accepted.insert(of.clone(), pair);
+            }
         }
         change.note = (before.note != after.note).then(|| [before.note.clone(), after.note.clone()]);
         change
@@ -97,7 +101,7 @@ impl Change {
     pub fn inverse(mut self) -> Self {
         self.masks.values_mut().for_each(|pair| pair.reverse());
         self.review.iter_mut().for_each(|pair| pair.reverse());
-        self.accepted.iter_mut().flatten().for_each(|pair| pair.reverse());
+        self.accepted.values_mut().for_each(|pair| pair.reverse());
         self.note.iter_mut().for_each(|pair| pair.reverse());
         self
     }
@@ -107,7 +111,7 @@ impl Change {
         self.masks.keys().any(|place| other.masks.contains_key(place))
             || self.review.is_some() && other.review.is_some()
             || self.note.is_some() && other.note.is_some()
-            || (0..2).any(|i| self.accepted[i].is_some() && other.accepted[i].is_some())
+            || self.accepted.keys().any(|of| other.accepted.contains_key(of))
     }
 
     /// Whether it ended in these labels.
@@ -115,7 +119,7 @@ impl Change {
         self.masks.iter().all(|(place, [_, after])| same(after.as_ref(), labels.masks.get(place)))
             && self.review.is_none_or(|[_, after]| after == labels.review)
             && self.note.as_ref().is_none_or(|[_, after]| *after == labels.note)
-            && (0..2).all(|i| self.accepted[i].is_none_or(|[_, after]| after == labels.accepted[i]))
+            && self.accepted.iter().all(|(of, [_, after])| *after == labels.accepted.get(of).copied())
     }
 }
 
@@ -161,8 +165,8 @@ pub(super) struct Line {
     masks: Vec<MaskLine>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     review: Option<[Review; 2]>,
-    #[serde(default)]
-    accepted: [Option<[Option<AcceptedPose>; 2]>; 2],
+    #[serde(flatten)]
+    accepted: ByImprint<[Option<AcceptedPose>; 2]>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     note: Option<[String; 2]>,
 }
@@ -183,7 +187,7 @@ impl Line {
             how: deed.how.clone(),
             masks: change.masks.iter().map(mask).collect(),
             review: change.review,
-            accepted: change.accepted,
+            accepted: by_imprint(&change.accepted),
             note: change.note.clone(),
         }
     }
@@ -204,7 +208,7 @@ impl Line {
             }
             masks.insert(MaskPlace { pad, of: line.of }, pair);
         }
-        let change = Change { masks, review: self.review, accepted: self.accepted, note: self.note };
+        let change = Change { masks, review: self.review, accepted: of_imprints(self.accepted), note: self.note };
         Some((self.act, Past { name: self.name.into(), change }))
     }
 }
@@ -273,9 +277,7 @@ fn apply(labels: &mut PairLabels, change: &Change) {
     if let Some([_, after]) = &change.note {
         labels.note.clone_from(after);
     }
-    for (i, accepted) in change.accepted.iter().enumerate() {
-        if let Some([_, after]) = accepted {
-            labels.accepted[i] = *after;
-        }
+    for (of, [_, after]) in &change.accepted {
+        labels.put_accepted(of, *after);
     }
 }

@@ -248,9 +248,9 @@ fn merge(now: &mut PairLabels, change: Change) {
     {
         now.review = after;
     }
-    for (now, accepted) in now.accepted.iter_mut().zip(change.accepted) {
-        if let Some([_, after]) = accepted.filter(|[before, _]| before == now) {
-            *now = after;
+    for (of, [before, after]) in change.accepted {
+        if now.accepted.get(&of).copied() == before {
+            now.put_accepted(&of, after);
         }
     }
     if let Some([before, after]) = change.note

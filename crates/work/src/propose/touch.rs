@@ -119,7 +119,7 @@ pub fn propose(
             near(CadPose::Registered(found.grasp_from_object), found.grasp_from_object.into())
         }
         ProposalSource::CadHand => {
-            let accepted = labels.accepted[setup.imprint as usize].filter(|accepted| accepted.by_hand);
+            let accepted = labels.accepted(touch.of).filter(|accepted| accepted.by_hand);
             let pose = setup.pose.or(accepted.map(|accepted| accepted.pose));
             let pose = pose.ok_or_else(|| {
                 lacks("nobody set the pose of this pair by hand").with_hint("Set it first, or name it with --pose.")
