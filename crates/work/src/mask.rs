@@ -121,6 +121,21 @@ impl Default for MaskChoice {
 }
 
 impl MaskChoice {
+    /// The same without the numbers of other sources.
+    #[must_use]
+    pub fn of_its_source(&self) -> Self {
+        let Self { source, threshold_m, probability, top_percent, cad_distance_m } = *self;
+        let from = Self { source, ..Self::default() };
+        match source {
+            MaskSource::Auto => Self { threshold_m, probability, ..from },
+            MaskSource::Unet => Self { probability, ..from },
+            MaskSource::Threshold => Self { threshold_m, ..from },
+            MaskSource::TopPercent => Self { top_percent, ..from },
+            MaskSource::Cad => Self { cad_distance_m, ..from },
+            MaskSource::Truth => from,
+        }
+    }
+
     /// The recipe, `model` being the mask model's identity; `None` if it takes a model and there is none.
     pub fn recipe(&self, model: Option<&Arc<str>>) -> Option<MaskRecipe> {
         let threshold = MaskRecipe::Threshold(self.threshold_m.into());

@@ -1,0 +1,240 @@
+//! [`feel`]: the way from a touch to its pose. No other place strings its steps together.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use strum::IntoEnumIterator as _;
+
+use super::error::TaskError;
+use super::imprint::{imprints_of, measured};
+use super::job::JobCx;
+use super::labels::{ImprintOf, ImprintSource, PairLabels};
+use super::mask::{Contact, MaskInputs, contact_mask};
+use super::models::Models;
+use super::pose::{PoseResult, pose};
+use super::predict::Generating;
+use super::prediction::Prediction;
+use super::recipe::{Recipe, Stage, no_mask_model};
+use crate::infer::mask::contact_of;
+use crate::io::dataset::Dataset;
+use touch2touch_core::align::{Ask, Register};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::sample::Sample;
+
+/// A pair with what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch<'a> {
+    /// The data set.
+    pub dataset: &'a Dataset,
+    /// Which pair.
+    pub pair: PairId,
+    /// The pair itself.
+    pub sample: &'a Sample,
+    /// The tool; `Err` says why there is none.
+    pub tool: Result<&'a ToolModel, &'a TaskError>,
+    /// What people said about it.
+    pub labels: &'a PairLabels,
+}
+
+/// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
+type Probability = Arc<(Grid<f32>, f32)>;
+
+/// What came of a touch by a recipe, as far as it was asked for. It is cheap to copy.
+#[derive(Clone, Debug, Default)]
+pub struct Felt {
+    recipe: Recipe,
+    reached: Option<Stage>,
+    /// What the generator drew; empty where the imprints are measured.
+    pub predictions: Arc<PerPad<Prediction>>,
+    /// Meters, raw orientation.
+    pub imprints: Arc<PerPad<DepthMap>>,
+    probabilities: PerPad<Probability>,
+    contact: Option<Arc<Contact>>,
+    points: Option<Arc<Result<Vec<DVec3>, TaskError>>>,
+    pose: Option<Arc<Result<PoseResult, TaskError>>>,
+}
+
+/// The results of a touch up to a stage.
+///
+/// # Errors
+/// If prediction, imprint or mask cannot be made. That there are no points or no pose is a result, with the reason.
+pub fn feel(touch: Touch<'_>, recipe: &Recipe, stage: Stage, models: &Models, cx: &JobCx) -> Result<Felt, TaskError> {
+    Felt::new(recipe).reach(touch, stage, models, cx)
+}
+
+impl Felt {
+    /// Nothing yet, by a recipe.
+    pub fn new(recipe: &Recipe) -> Self {
+        Self { recipe: recipe.clone(), ..Self::default() }
+    }
+
+    /// Predictions that were made together with others.
+    pub fn of_predictions(recipe: &Recipe, made: PerPad<Prediction>) -> Self {
+        Self { predictions: Arc::new(made), reached: Some(Stage::Prediction), ..Self::new(recipe) }
+    }
+
+    /// Imprints that no recipe makes, such as the mean of several. Nobody can have drawn on them.
+    pub fn of_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+        let recipe = Recipe { hand: false, ..recipe.clone() };
+        Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(&recipe) }
+    }
+
+    /// The part of it that another recipe makes just so.
+    #[must_use]
+    pub fn again(&self, recipe: &Recipe) -> Self {
+        let mut felt = Self::new(recipe);
+        for stage in Stage::iter() {
+            if self.reached < Some(stage) || self.recipe.until(stage) != recipe.until(stage) {
+                break;
+            }
+            felt.reached = Some(stage);
+            match stage {
+                Stage::Prediction => felt.predictions = self.predictions.clone(),
+                Stage::Imprint => {
+                    felt.imprints = self.imprints.clone();
+                    if self.recipe.mask_model == recipe.mask_model && self.recipe.engine == recipe.engine {
+                        felt.probabilities = self.probabilities.clone();
+                    }
+                }
+                Stage::Mask => felt.contact = self.contact.clone(),
+                Stage::Cloud => felt.points = self.points.clone(),
+                Stage::Pose => felt.pose = self.pose.clone(),
+            }
+        }
+        felt
+    }
+
+    /// The same, up to a later stage.
+    ///
+    /// # Errors
+    /// As [`feel`].
+    pub fn reach(self, touch: Touch<'_>, stage: Stage, models: &Models, cx: &JobCx) -> Result<Self, TaskError> {
+        self.reach_asking(touch, stage, Ask::default(), models, cx)
+    }
+
+    /// The same with a request to the registration, such as to record its steps.
+    ///
+    /// # Errors
+    /// As [`feel`].
+    pub fn reach_asking(
+        mut self,
+        touch: Touch<'_>,
+        stage: Stage,
+        ask: Ask<'_>,
+        models: &Models,
+        cx: &JobCx,
+    ) -> Result<Self, TaskError> {
+        let sample = touch.sample;
+        for next in Stage::iter().filter(|next| *next <= stage) {
+            if self.reached >= Some(next) {
+                continue;
+            }
+            match next {
+                Stage::Prediction if self.recipe.imprint == ImprintSource::Predicted => {
+                    let (bundle, config) = self.recipe.generator("Predict")?;
+                    let generating = Generating { bundle, engine: self.recipe.engine, config };
+                    self.predictions = Arc::new(generating.pair(models, sample, cx)?);
+                }
+                Stage::Prediction => {}
+                Stage::Imprint => {
+                    self.imprints = Arc::new(match self.recipe.imprint {
+                        ImprintSource::Measured => measured(sample),
+                        ImprintSource::Predicted => imprints_of(&self.predictions, self.recipe.shift, sample)?,
+                    });
+                }
+                Stage::Mask => self.contact = Some(Arc::new(self.masks(touch, models)?)),
+                Stage::Cloud => {
+                    self.points = self.contact.as_ref().map(|contact| Arc::new(contact.points(sample)));
+                }
+                Stage::Pose => {
+                    let found = self.pose_by(touch, &*self.recipe.registration.method(), ask);
+                    self.pose = Some(Arc::new(found));
+                }
+            }
+            self.reached = Some(next);
+        }
+        Ok(self)
+    }
+
+    /// The pose by a registration that no recipe names, such as one with the traps of the lab's.
+    ///
+    /// # Errors
+    /// Why there is none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn pose_by(
+        &self,
+        touch: Touch<'_>,
+        registration: &dyn Register,
+        ask: Ask<'_>,
+    ) -> Result<PoseResult, TaskError> {
+        let points = self.points().map_err(Clone::clone)?;
+        let tool = touch.tool.map_err(Clone::clone)?;
+        pose(points, tool, registration, ask, touch.sample.grasp_from_object)
+    }
+
+    fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
+        let made_by = self.recipe.mask_recipe()?;
+        let of: ImprintOf = self.recipe.imprint_of();
+        let labels = self.recipe.hand.then_some(touch.labels);
+        let inputs = MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(&of) };
+        let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
+        for (pad, imprint) in imprints.entries() {
+            let unet = |imprint: &DepthMap| {
+                let known = &mut self.probabilities[pad];
+                let found = match known {
+                    Some(found) => found.clone(),
+                    None => {
+                        let model = self.recipe.mask_model.as_ref().ok_or_else(no_mask_model)?;
+                        let found = models.probability(model, self.recipe.engine, imprint)?;
+                        known.insert(Arc::new(found)).clone()
+                    }
+                };
+                let (map, own) = &*found;
+                Ok(contact_of(map, imprint, self.recipe.mask.probability.unwrap_or(*own)))
+            };
+            masks[pad] = Some(contact_mask(&made_by, imprint, pad, inputs, unet)?);
+        }
+        let model = self.recipe.mask_model.as_ref().map(|model| model.name.clone());
+        Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
+    }
+
+    /// The recipe that it is by.
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    /// The contact masks with their imprints.
+    ///
+    /// # Panics
+    /// Before [`Stage::Mask`].
+    pub fn contact(&self) -> &Contact {
+        self.contact.as_ref().expect("the masks were asked for")
+    }
+
+    /// The contact points of all pads, grasp frame, meters.
+    ///
+    /// # Errors
+    /// Why there are none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn points(&self) -> Result<&Vec<DVec3>, &TaskError> {
+        (**self.points.as_ref().expect("the points were asked for")).as_ref()
+    }
+
+    /// The pose.
+    ///
+    /// # Errors
+    /// Why there is none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Pose`].
+    pub fn pose(&self) -> Result<&PoseResult, &TaskError> {
+        (**self.pose.as_ref().expect("the pose was asked for")).as_ref()
+    }
+}

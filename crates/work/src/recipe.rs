@@ -1,0 +1,275 @@
+//! [`Recipe`]: everything that decides the result of a touch, as one value.
+
+mod words;
+
+use std::fmt;
+use std::ops::Deref;
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::bundles::BundleInfo;
+use super::error::TaskError;
+use super::labels::{ImprintOf, ImprintSource};
+use super::mask::{MaskChoice, MaskRecipe, MaskSource};
+use crate::infer::engine::EngineChoice;
+use crate::io::digest::sha256;
+use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::postprocess::ShiftMode;
+
+pub use words::{Words, meters, millimeters, quoted, shift_words};
+
+/// Version of [`Recipe::id`].
+const VERSION: &str = "r1";
+/// The choices of a generation that an id does not name. Part of the format: they stay when defaults change.
+const UNNAMED: GenerateConfig =
+    GenerateConfig { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing, guidance: 1.0 };
+
+/// The steps from a touch to a pose, in order; the result of each is made from the one before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
+pub enum Stage {
+    /// What the generator draws.
+    Prediction,
+    /// The imprint in meters, measured or predicted.
+    Imprint,
+    /// The contact masks.
+    Mask,
+    /// The contact points.
+    Cloud,
+    /// The tool's pose in the hand.
+    Pose,
+}
+
+/// Everything that decides the result of a touch. Models are `M`: [`Model`] where they can be used, [`ModelName`] in files.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recipe<M = Model> {
+    /// The imprint that mask, cloud and pose are made from.
+    #[serde(default, skip_serializing_if = "is_measured")]
+    pub imprint: ImprintSource,
+    /// The generator with the choices of a generation; `None` where nothing is predicted.
+    pub generator: Option<(M, GenerateConfig)>,
+    /// The mapping of predictions to meters.
+    pub shift: ShiftMode,
+    /// The source of the masks that nobody drew.
+    pub mask: MaskChoice,
+    /// The mask model, where there is one.
+    pub mask_model: Option<M>,
+    /// A mask drawn by hand wins where there is one.
+    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    pub hand: bool,
+    /// The registration; files have called it the engine from the beginning.
+    #[serde(rename = "engine")]
+    pub registration: RegistrationChoice,
+    /// The engine that runs the models.
+    #[serde(rename = "runtime")]
+    pub engine: EngineChoice,
+}
+
+fn is_measured(source: &ImprintSource) -> bool {
+    *source == ImprintSource::Measured
+}
+
+fn yes() -> bool {
+    true
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
+fn is_yes(value: &bool) -> bool {
+    *value
+}
+
+/// A model bundle, as files name it.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+pub struct ModelName {
+    /// Its name.
+    pub name: String,
+    /// Its identity.
+    pub id: String,
+}
+
+/// A model bundle that can be opened; the same as another one of its identity, wherever that lies.
+#[derive(Clone, Debug)]
+pub struct Model(Arc<BundleInfo>);
+
+impl Deref for Model {
+    type Target = BundleInfo;
+
+    fn deref(&self) -> &BundleInfo {
+        &self.0
+    }
+}
+
+impl PartialEq for Model {
+    fn eq(&self, other: &Self) -> bool {
+        self.id == other.id
+    }
+}
+
+impl From<BundleInfo> for Model {
+    fn from(bundle: BundleInfo) -> Self {
+        Self(Arc::new(bundle))
+    }
+}
+
+impl From<&Model> for ModelName {
+    fn from(model: &Model) -> Self {
+        Self { name: model.name.clone(), id: model.id.to_string() }
+    }
+}
+
+impl Serialize for Model {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        ModelName::from(self).serialize(serializer)
+    }
+}
+
+/// A digest of all that decides a result: equal ids are equal results of the same touch. Choices are named in it and those
+/// at their defaults left out, so that a new choice changes no id.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
+pub struct RecipeId(String);
+
+impl fmt::Display for RecipeId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl<M> Default for Recipe<M> {
+    fn default() -> Self {
+        Self {
+            imprint: ImprintSource::Measured,
+            generator: None,
+            shift: ShiftMode::default(),
+            mask: MaskChoice::default(),
+            mask_model: None,
+            hand: true,
+            registration: RegistrationChoice::default(),
+            engine: EngineChoice::default(),
+        }
+    }
+}
+
+impl<M> Recipe<M> {
+    /// The same with other models; `None` where one has no counterpart.
+    pub fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
+        let generator = match self.generator {
+            Some((model, config)) => Some((find(model)?, config)),
+            None => None,
+        };
+        let mask_model = match self.mask_model {
+            Some(model) => Some(find(model)?),
+            None => None,
+        };
+        let Self { imprint, shift, mask, hand, registration, engine, .. } = self;
+        Some(Recipe { imprint, generator, shift, mask, mask_model, hand, registration, engine })
+    }
+
+    /// The same from another imprint.
+    #[must_use]
+    pub fn of(&self, imprint: ImprintSource) -> Self
+    where
+        M: Clone,
+    {
+        Self { imprint, ..self.clone() }
+    }
+
+    /// Whether the mask model is run.
+    fn takes_mask_model(&self) -> bool {
+        matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
+    }
+}
+
+impl Recipe {
+    /// Only what decides the result of a stage: what comes later is at its default, and what is not used as well.
+    #[must_use]
+    pub fn until(&self, stage: Stage) -> Self {
+        let predicted = self.imprint == ImprintSource::Predicted;
+        let masked = stage >= Stage::Mask;
+        let unet = masked && self.takes_mask_model() && self.mask_model.is_some();
+        let from = Self::default();
+        Self {
+            imprint: self.imprint,
+            generator: self.generator.clone().filter(|_| predicted),
+            shift: if predicted && stage >= Stage::Imprint { self.shift } else { from.shift },
+            mask: if masked { self.mask.of_its_source() } else { from.mask },
+            mask_model: self.mask_model.clone().filter(|_| unet),
+            hand: self.hand || !masked,
+            registration: if stage >= Stage::Pose { self.registration } else { from.registration },
+            engine: if predicted || unet { self.engine } else { from.engine },
+        }
+    }
+
+    /// The identity of the result of a stage, of any touch.
+    pub fn id(&self, stage: Stage) -> RecipeId {
+        let digest = sha256(self.named(stage).to_string().as_bytes());
+        RecipeId(format!("{VERSION}-{digest:.16}"))
+    }
+
+    /// What decides the result of a stage, by name, without what is at its default.
+    fn named(&self, stage: Stage) -> Value {
+        let of = self.until(stage);
+        let mut named = Map::new();
+        let mut name = |key: &str, value: Value, default: Value| {
+            if value != default {
+                named.insert(key.into(), value);
+            }
+        };
+        let from = Self::default();
+        name("imprint", json(&of.imprint), json(&from.imprint));
+        if let Some((model, config)) = &of.generator {
+            name("bundle", json(&model.id), Value::Null);
+            // + 0.0 turns -0 into 0, which means the same.
+            let config = GenerateConfig { eta: config.eta + 0.0, guidance: config.guidance + 0.0, ..*config };
+            let (Value::Object(choices), Value::Object(defaults)) = (json(&config), json(&UNNAMED)) else {
+                unreachable!("choices are named")
+            };
+            for (key, value) in choices {
+                let default = defaults.get(&key).cloned().unwrap_or_default();
+                name(&key, value, default);
+            }
+        }
+        name("shift", json(&of.shift), json(&from.shift));
+        name("mask", json(&of.mask), json(&from.mask));
+        name("mask_model", json(&of.mask_model.as_ref().map(|model| &model.id)), Value::Null);
+        name("hand", json(&of.hand), json(&from.hand));
+        name("registration", json(&of.registration.to_string()), json(&from.registration.to_string()));
+        name("engine", json(&of.engine), json(&from.engine));
+        Value::Object(named)
+    }
+
+    /// The imprint that it is about, for masks and poses that people filed under it.
+    pub fn imprint_of(&self) -> ImprintOf {
+        match (self.imprint, &self.generator) {
+            (ImprintSource::Predicted, Some((model, config))) => ImprintOf::predicted(&model.id, config, self.shift),
+            _ => ImprintOf::Measured,
+        }
+    }
+
+    /// The generator with its choices.
+    ///
+    /// # Errors
+    /// If there is none.
+    pub fn generator(&self, what: &str) -> Result<(&BundleInfo, &GenerateConfig), TaskError> {
+        let generator = self.generator.as_ref().map(|(model, config)| (&**model, config));
+        generator.ok_or_else(|| TaskError::new(what, "there is no generator to predict with"))
+    }
+
+    /// The making of the masks that nobody drew.
+    ///
+    /// # Errors
+    /// If it takes a mask model and there is none.
+    pub fn mask_recipe(&self) -> Result<MaskRecipe, TaskError> {
+        self.mask.recipe(self.mask_model.as_ref().map(|model| &model.id)).ok_or_else(no_mask_model)
+    }
+}
+
+/// What to say where a mask model is asked for and there is none.
+pub(crate) fn no_mask_model() -> TaskError {
+    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
+}
+
+fn json(value: &impl Serialize) -> Value {
+    serde_json::to_value(value).unwrap_or_default()
+}
