@@ -24,8 +24,8 @@ mod models;
 mod notes;
 mod output;
 mod pose;
-mod predict;
 mod read_as;
+mod recipe;
 mod report;
 mod seeds;
 mod simulate;
@@ -46,7 +46,9 @@ use output::{PrintError, says};
 
 pub use output::Output;
 
+use touch2touch_core::rig::Rig;
 use touch2touch_work::io::dataset::ToolScale;
+use touch2touch_work::recipe::Recipe;
 
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
 ///
@@ -179,6 +181,20 @@ pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Ite
         // Help and version are answers.
         Err(err) if err.use_stderr() => Err(err.to_string()),
         _ => Ok(()),
+    }
+}
+
+/// The recipe of a command line of `pose`, the program's name first, for the sensors of `rig`; nothing is predicted.
+///
+/// # Errors
+/// What the program would say.
+pub fn recipe_of<T: Into<OsString> + Clone>(
+    arguments: impl IntoIterator<Item = T>,
+    rig: &Rig,
+) -> anyhow::Result<Recipe> {
+    match parse(arguments.into_iter().map(Into::into))?.and_then(|cli| cli.verb) {
+        Some(Verb::Pose(args)) => args.recipe(rig),
+        _ => anyhow::bail!("it is no command of pose"),
     }
 }
 

@@ -18,6 +18,7 @@ use touch2touch_work::io::images;
 use touch2touch_work::job::{Cancel, JobCx, Progress};
 use touch2touch_work::mask::MaskChoice;
 use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::{run, shared};
@@ -198,18 +199,18 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     let bundle = find(&[]).take(BundleKind::Generator, None, &dataset.rig).unwrap();
     let info = bundle.generator.as_ref().unwrap();
     let setup = |unfinished: Option<PathBuf>| AdaptSetup {
-        config: GenerateConfig { steps: 2, ..info.defaults },
-        engine: EngineChoice::Rten,
+        recipe: Recipe {
+            generator: Some((bundle.clone().into(), GenerateConfig { steps: 2, ..info.defaults })),
+            engine: EngineChoice::Rten,
+            ..Recipe::default()
+        },
         pairs: (0..4).map(PairId).collect(),
         folds: 2,
-        mask: (MaskChoice::default(), None),
-        registration: RegistrationChoice::default(),
         tuning: Some(Tuning::Steps(2)),
         unfinished,
         out: None,
         force: false,
         replace: false,
-        bundle: bundle.clone(),
     };
     let models = Models::new(None);
     let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();

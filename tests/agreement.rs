@@ -4,6 +4,7 @@ mod exchange;
 mod in_3d;
 mod influence;
 mod proposals;
+mod recipes;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -25,6 +25,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 /// The generator that ships, under another name: a bundle of one's own.
 fn own_generator(folder: &Path) -> BundleInfo {
@@ -55,11 +56,12 @@ fn case(folder: &Path) -> PathBuf {
     let dataset = Dataset::open(&data).unwrap();
     let setup = CaseSetup {
         pair: PairId(0),
-        generator: Some((own_generator(&model), GenerateConfig { steps: 1, ..GenerateConfig::default() })),
-        shift: Default::default(),
-        mask: (MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }, None),
-        engine: Default::default(),
-        runtime: EngineChoice::Rten,
+        recipe: Recipe {
+            generator: Some((own_generator(&model).into(), GenerateConfig { steps: 1, ..GenerateConfig::default() })),
+            mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+            engine: EngineChoice::Rten,
+            ..Recipe::default()
+        },
         labels: PairLabels::default(),
         view: None,
     };

@@ -17,7 +17,8 @@ use touch2touch_work::job::{Cancel, JobCx, Progress};
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
-use touch2touch_work::sweep::{Dial, InForce, Outcome, Setting, Sweep, SweepSetup, sweep};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::sweep::{Dial, Outcome, Setting, Sweep, SweepSetup, sweep};
 
 use crate::support::run;
 
@@ -48,18 +49,15 @@ fn setup(dataset: &Dataset, dial: Dial, list: &str) -> SweepSetup {
     SweepSetup {
         values: values(dial, list),
         pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
-        in_force: InForce { mask, ..InForce::default() },
-        mask_model: None,
-        generator: None,
-        hand: true,
-        engine: EngineChoice::default(),
+        recipe: Recipe { mask, ..Recipe::default() },
     }
 }
 
 fn with_generator(setup: SweepSetup) -> SweepSetup {
     let generator = bundle("generator");
     let config = generator.generator.as_ref().unwrap().defaults;
-    SweepSetup { generator: Some((generator, config)), ..setup }
+    let recipe = Recipe { generator: Some((generator.into(), config)), ..setup.recipe };
+    SweepSetup { recipe, ..setup }
 }
 
 fn turned(dataset: &Dataset, setup: &SweepSetup) -> Sweep {
@@ -79,7 +77,7 @@ fn the_poses_are_those_of_the_results_table_bit_for_bit() {
     assert_eq!(found.at, Some(Dial::Threshold.parse("5").unwrap()));
     let mut compared = 0;
     for (at, point) in found.series[0].points.iter().enumerate() {
-        let InForce { mask, .. } = found.series[0].points[at].value.unwrap().put(found.in_force).unwrap();
+        let Recipe { mask, .. } = found.series[0].points[at].value.unwrap().put(&found.in_force).unwrap();
         let table = Setup {
             bundles: vec![Origin::from(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator"))],
             mask,
@@ -133,8 +131,8 @@ fn gate_and_trim_are_those_of_the_registration() {
     let dataset = write(folder.path(), 2);
     let with = |dial, list: &str, by: &str| {
         let setup = setup(&dataset, dial, list);
-        let in_force = InForce { registration: by.parse().unwrap(), ..setup.in_force };
-        turned(&dataset, &SweepSetup { in_force, ..setup })
+        let recipe = Recipe { registration: by.parse().unwrap(), ..setup.recipe };
+        turned(&dataset, &SweepSetup { recipe, ..setup })
     };
     for by in [Registration::DistanceField, Registration::PlanarPointToPoint] {
         let own = RegistrationChoice::from(by).gate_m().unwrap() * 1e3;
@@ -170,8 +168,8 @@ fn a_shift_moves_predictions_alone_and_a_probability_the_masks_of_the_model() {
     };
     let setup = setup(&dataset, Dial::Probability, "0.05,0.5,0.95");
     let mask = MaskChoice::default();
-    let in_force = InForce { mask, ..setup.in_force };
-    let found = turned(&dataset, &SweepSetup { mask_model: Some(model), in_force, ..setup });
+    let recipe = Recipe { mask, mask_model: Some(model.clone().into()), ..setup.recipe };
+    let found = turned(&dataset, &SweepSetup { recipe, ..setup });
     let series = &found.series[0];
     // A larger probability leaves no more pixels.
     for pair in 0..2 {

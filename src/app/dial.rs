@@ -10,7 +10,8 @@ use super::effect::Effect;
 use super::settings::{self, MaskSettings, SettingsCommand};
 use super::state::State;
 use super::tasks::state::{Level, Ticket};
-use touch2touch_work::sweep::{Dial, InForce, Setting, Sweep};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::sweep::{Dial, Setting, Sweep};
 
 /// What can happen to the dial.
 #[derive(Clone, Copy, Debug)]
@@ -54,8 +55,8 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
             effects.push(Effect::Sweep { ticket, source, setup: Box::new(setup) });
         }
         DialCommand::Use(setting) => {
-            let before = state.in_force();
-            let Ok(InForce { mask, registration, shift }) = setting.put(before) else { return };
+            let before = state.dial_recipe();
+            let Ok(Recipe { mask, registration, shift, .. }) = setting.put(&before) else { return };
             let change = match setting {
                 Setting::Threshold(_) | Setting::Probability(_) => {
                     SettingsCommand::SetMask(MaskSettings { choice: mask, ..state.settings.mask.clone() })
@@ -64,7 +65,7 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
                 Setting::Shift(_) => SettingsCommand::SetShift(shift),
             };
             settings::step(state, change, effects);
-            if state.in_force() != before {
+            if state.dial_recipe() != before {
                 state.log.info(format!("{} is {} now", setting.dial().name(), setting.label()));
             }
         }

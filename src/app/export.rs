@@ -99,8 +99,8 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     let recipe = &case.recipe;
     state.settings.shift = recipe.shift;
     state.settings.mask.choice = recipe.mask;
-    state.settings.pose_engine = recipe.engine;
-    state.settings.runtime = recipe.runtime;
+    state.settings.pose_engine = recipe.registration;
+    state.settings.runtime = recipe.engine;
     if let Some((model, config)) = &recipe.generator {
         state.settings.generate = GenerateSettings {
             bundle: Some(model.name.clone()),
@@ -147,7 +147,7 @@ pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
     let id: Arc<str> = model.id.as_str().into();
     state.library.lacking = Some((id.clone(), model.name.clone()));
     let Some(open) = &state.library.open else { return };
-    let (pair, runtime) = (open.key(pair), case.recipe.runtime);
+    let (pair, runtime) = (open.key(pair), case.recipe.engine);
     let imprints = held.imprints.iter().filter(|((source, _), _)| *source == ImprintSource::Predicted);
     for ((_, finger), imprint) in imprints {
         let recipe = PredictionKey::new(pair.finger(*finger), id.clone(), runtime, config);

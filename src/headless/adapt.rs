@@ -8,11 +8,12 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs, RegistrationParser, parse_minutes};
 use super::contact_mask::MaskArgs;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
+use touch2touch_work::labels::ImprintSource;
 
 /// Arguments of `adapt`.
 #[derive(Debug, Args)]
@@ -78,23 +79,19 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         args.pairs.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
     };
     let output = Output::new(args.common, "fitting", pairs.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let choice = args.mask.choice();
+    let models = args.model.models();
+    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.engine)?;
     let setup = AdaptSetup {
-        bundle: predictor.bundle()?.clone(),
-        engine: predictor.engine(),
-        config: predictor.config()?,
+        recipe,
         pairs,
         folds: args.validate,
-        mask: (choice, predictor.mask_model(&choice)?),
-        registration: args.engine,
         tuning: args.minutes.map(Tuning::Within).or((args.tune > 0).then_some(Tuning::Steps(args.tune))),
-        unfinished: predictor.unfinished(),
+        unfinished: args.model.unfinished(),
         out: args.out.clone(),
         force: args.force,
         replace: args.replace,
     };
-    let adapted = adapt(&dataset, &setup, predictor.models(), &output.job())?;
+    let adapted = adapt(&dataset, &setup, &models, &output.job())?;
     super::notes::say_found(&output, &dataset, &adapted.notes);
     for remark in &adapted.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
@@ -109,7 +106,8 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
         output.note(&format!("against this fit: {objection}"));
     }
     let complete = adapted.left_out.is_empty() && adapted.unwritten.is_none();
-    let report = Report { adapted, from: setup.bundle.name.clone(), engine: predictor.engine_label()? };
+    let report =
+        Report { adapted, from: setup.recipe.generating()?.bundle.name.clone(), engine: args.model.engine_label()? };
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }

@@ -8,17 +8,18 @@ use serde::Serialize;
 use super::args::{DatasetArgs, JsonArgs, RegistrationParser, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Output, VerbResult};
+use touch2touch_core::align::Run;
 use touch2touch_core::align::basin::{Basin, Plane};
-use touch2touch_core::align::{Ask, Run};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::units::{angle_error, fixed, mm, wrap_angle};
+use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::recipe::Stage;
 use touch2touch_work::tool::load_tool;
 
 /// Arguments of `basin`.
@@ -95,21 +96,19 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let (tool, odd) = load_tool(&dataset, name)?;
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
-    let of = predictor.of(args.imprint)?;
+    let models = args.model.models();
+    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     notes.take(&output, &odd);
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels: args.mask.drawn(&labels), of: Some(&of) };
-    let contact = predictor.contact(&args.mask, imprints, inputs)?;
-    let points = contact.points(&sample)?;
+    let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: Ok(&tool), labels: &labels };
+    let felt = feel(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
+    let (contact, points) = (felt.contact(), felt.points().map_err(Clone::clone)?);
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
-    let registration = args.engine.method();
-    let own = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), sample.grasp_from_object)?;
+    let own = felt.pose().map_err(Clone::clone)?;
     let started = Instant::now();
-    let basin = touch2touch_work::pose::basin(&points, &tool, args.engine, args.plane.into(), &output.job())?;
+    let basin = touch2touch_work::pose::basin(points, &tool, args.engine, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
         engine: args.engine.to_string(),
@@ -118,7 +117,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
         mask_notes: contact.notes(&sample.rig),
         notes: notes.into_list(&output),
         truth: sample.grasp_from_object,
-        own_starts: own.report.runs,
+        own_starts: own.report.runs.clone(),
         ms: started.elapsed().as_secs_f64() * 1e3,
         basin,
     };

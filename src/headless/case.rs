@@ -7,12 +7,13 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::case::{CaseSetup, check, make, open};
-use touch2touch_work::labels::Labels;
+use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 /// What is done with a case.
 #[derive(Debug, Subcommand)]
@@ -76,28 +77,17 @@ fn run_make(args: &MakeArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let pair = super::find_pair(&dataset, &args.pair)?;
     let output = Output::new(args.common, "making", 1);
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let generator = if args.measured_only {
-        None
-    } else {
-        let config = predictor.config()?;
-        Some((predictor.bundle()?.clone(), config))
-    };
+    let models = args.model.models();
+    let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
+    // A shift is of predictions.
+    let shift = if args.measured_only { Default::default() } else { recipe.shift };
     let labels = match args.mask.no_hand {
         true => Default::default(),
         false => labels_of(&Labels::of(&dataset), &dataset.index.pairs[pair.0 as usize].name, &output),
     };
-    let setup = CaseSetup {
-        pair,
-        shift: if generator.is_some() { predictor.shift() } else { Default::default() },
-        generator,
-        mask: (args.mask.choice(), predictor.mask_model(&args.mask.choice())?),
-        engine: args.engine,
-        runtime: predictor.engine(),
-        labels,
-        view: None,
-    };
-    let case = make(&dataset, &setup, predictor.models(), &args.out, &output.job())?;
+    let setup = CaseSetup { pair, recipe: Recipe { shift, hand: true, ..recipe }, labels, view: None };
+    let case = make(&dataset, &setup, &models, &args.out, &output.job())?;
     let angle = |pose: touch2touch_core::frames::PlanarPose| pose.inverse().theta_rad.to_degrees();
     let angles_deg = case.results.iter().map(|r| (r.imprint.key(), r.pose.map(angle))).collect();
     let made = Made { file: &args.out, pair: &case.pair, angles_deg };

@@ -10,28 +10,27 @@ use super::args::{DatasetArgs, JsonArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::ledger::write_colored;
 use super::notes::Notes;
-use super::predict::{ModelArgs, Predictor};
-use super::{Output, ToolArgs, VerbResult, seeds};
-use touch2touch_core::align::Ask;
+use super::recipe::ModelArgs;
+use super::{Output, ToolArgs, VerbResult};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::hand::PoseDifference;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel};
-use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::{PadId, PerPad, Text};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_work::compare::{Comparison, Depicted, beside, between, tile_of};
-use touch2touch_work::imprint;
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::fan::seeds_of;
+use touch2touch_work::feel::{Felt, Touch, feel};
 use touch2touch_work::io::npz;
 use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintOf, ImprintSource, Labels};
-use touch2touch_work::mask::MaskInputs;
-use touch2touch_work::pose::{PoseResult, pose};
-use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{Subject, Wish};
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::models::Models;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::recipe::Stage;
+use touch2touch_work::subject::Subject;
 use touch2touch_work::tool::load_tool;
 
 /// Half the range of the difference's colors in a written picture, meters.
@@ -130,13 +129,8 @@ struct Report {
 }
 
 /// A subject as this pair has it.
-#[derive(Default)]
 struct Found {
-    imprints: PerPad<DepthMap>,
-    drawn: PerPad<Prediction>,
-    shift: ShiftMode,
-    /// What masks drawn on it are told by; `None` where nobody can have drawn on it.
-    of: Option<ImprintOf>,
+    felt: Felt,
     tile: Option<DepthMap>,
 }
 
@@ -147,53 +141,48 @@ impl Found {
         pad: PadId,
         tile: Option<&'a DepthMap>,
     ) -> anyhow::Result<Option<Depicted<'a>>> {
-        let Some(imprint) = &self.imprints[pad] else { return Ok(None) };
+        let Some(imprint) = &self.felt.imprints[pad] else { return Ok(None) };
         if let Some(own) = &self.tile {
             return Ok(Some(Depicted { imprint, tile: Some(Cow::Borrowed(own)) }));
         }
-        let drawn = self.drawn[pad].as_ref().map(|made| (made, self.shift));
+        let drawn = self.felt.predictions[pad].as_ref().map(|made| (made, self.felt.recipe().shift));
         Ok(Some(Depicted::predicted(imprint, drawn, sample, pad, tile)?))
     }
 }
 
 /// Makes what a subject asks for.
-fn find(
-    args: &CompareArgs,
-    subject: &Subject,
-    dataset: &Dataset,
-    pair: touch2touch_core::dataset::PairId,
-    sample: &Sample,
-) -> anyhow::Result<Found> {
-    let predictor = |wish: &Wish| Predictor::new(&args.model.with(wish), &dataset.rig);
+fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models) -> anyhow::Result<Found> {
+    let Touch { dataset, pair, sample, .. } = touch;
+    let cx = JobCx::unwatched();
+    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.engine);
     match subject {
         Subject::Measured => {
+            let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let tile = tile_of(dataset, pair, sample)?;
-            Ok(Found { imprints: imprint::measured(sample), tile, of: Some(ImprintOf::Measured), ..Found::default() })
+            Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile })
         }
         Subject::Stored => {
+            let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let found = beside(dataset, pair, sample)?;
             let found = found.ok_or_else(|| anyhow::anyhow!("there is no NAME_vqvae.png beside this pair"))?;
             // Picture pairs have one finger.
             let pads = sample.rig.pads().map(|pad| sample.pad(pad).map(|_| found.imprint.clone()));
-            Ok(Found { imprints: pads.collect(), tile: Some(found.tile), ..Found::default() })
+            Ok(Found { felt: Felt::of_imprints(&recipe, pads.collect()), tile: Some(found.tile) })
         }
         Subject::Predicted(wish) => {
-            let mut predictor = predictor(wish);
-            let drawn = predictor.predictions(sample, &JobCx::unwatched())?;
-            let imprints = predictor.in_meters(sample, &drawn)?;
-            let of = Some(predictor.of(ImprintSource::Predicted)?);
-            Ok(Found { imprints, drawn, shift: predictor.shift(), of, tile: None })
+            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
+            Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile: None })
         }
         Subject::Mean(wish, count) => {
-            let mut predictor = predictor(wish);
+            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
             let mut imprints = PerPad::default();
-            for (pad, touch) in sample.pads.entries() {
-                if predictor.condition(touch)?.is_some() {
-                    let made = seeds::predict(&mut predictor, sample, pad, *count as u16)?;
-                    imprints[pad] = Some(made.spread.mean);
+            for (pad, _) in sample.pads.entries() {
+                if recipe.generating()?.picture(sample, pad)?.is_some() {
+                    let made = seeds_of((sample, pad), &recipe, *count, models, &cx)?;
+                    imprints[pad] = Some(made.ensemble.spread.mean);
                 }
             }
-            Ok(Found { imprints, ..Found::default() })
+            Ok(Found { felt: Felt::of_imprints(&recipe, imprints), tile: None })
         }
     }
 }
@@ -206,8 +195,18 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let sample = dataset.load(id)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
-    let found = [find(args, &args.a, &dataset, id, &sample)?, find(args, &args.b, &dataset, id, &sample)?];
-    let measured = find(args, &Subject::Measured, &dataset, id, &sample)?;
+    let tool = match &entry.tool {
+        Some(name) => Some(load_tool(&dataset, name)?),
+        None => None,
+    };
+    notes.take(&output, tool.as_ref().map_or(&[], |(_, odd)| odd));
+    let lacks = TaskError::new("Compare", "no tool is named, so there is no CAD model");
+    let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
+    let tool = tool.as_ref().map(|(tool, _)| tool);
+    let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
+    let models = args.model.models();
+    let found = [find(args, &args.a, touch, &models)?, find(args, &args.b, touch, &models)?];
+    let measured = find(args, &Subject::Measured, touch, &models)?;
     let tile = measured.tile.as_ref();
     let mut fingers = Vec::new();
     for pad in sample.rig.pads() {
@@ -231,17 +230,12 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         anyhow::bail!("{}: no finger has both {} and {}", entry.name, args.a, args.b);
     }
     let mut poses = None;
-    if let Some(name) = &entry.tool {
-        let (tool, odd) = load_tool(&dataset, name)?;
-        notes.take(&output, &odd);
-        let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-        let mut predictor = Predictor::new(&args.model, &dataset.rig);
-        let mut pose_of = |found: &Found| -> anyhow::Result<PoseResult> {
-            let (labels, of) = (args.mask.drawn(&labels), found.of.as_ref());
-            let inputs = MaskInputs { sample: &sample, tool: Some(&tool), labels, of };
-            posed(args, &mut predictor, &found.imprints, inputs, &tool)
-        };
-        match (pose_of(&found[0]), pose_of(&found[1])) {
+    if tool.is_some() {
+        let [a, b] = found.map(|found| -> Result<PoseResult, TaskError> {
+            let felt = found.felt.reach(touch, Stage::Pose, &models, &JobCx::unwatched())?;
+            felt.pose().map_err(Clone::clone).cloned()
+        });
+        match (a, b) {
             (Ok(a), Ok(b)) => poses = Some(apart(&a, &b)),
             (Err(err), _) | (_, Err(err)) => output.note(&format!("no poses: {err:#}")),
         }
@@ -258,18 +252,6 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
-}
-
-fn posed(
-    args: &CompareArgs,
-    predictor: &mut Predictor,
-    imprints: &PerPad<DepthMap>,
-    inputs: MaskInputs<'_>,
-    tool: &ToolModel,
-) -> anyhow::Result<PoseResult> {
-    let contact = predictor.contact(&args.mask, imprints.clone(), inputs)?;
-    let points = contact.points(inputs.sample)?;
-    Ok(pose(&points, tool, &*args.engine.method(), Ask::default(), inputs.sample.grasp_from_object)?)
 }
 
 fn apart(a: &PoseResult, b: &PoseResult) -> Poses {

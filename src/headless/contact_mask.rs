@@ -1,5 +1,7 @@
 //! The options that say where contact masks come from, and the labels that lie by the data.
 
+use std::str::FromStr;
+
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator as _;
@@ -7,6 +9,7 @@ use strum::IntoEnumIterator as _;
 use super::Output;
 use touch2touch_work::labels::{Labels, PairLabels};
 use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::recipe::{meters, millimeters};
 
 /// Where masks come from.
 #[derive(Debug, Clone, Copy, Args)]
@@ -17,17 +20,17 @@ pub(super) struct MaskArgs {
     #[arg(long, default_value = MaskSource::default().key(), value_parser = parse_source())]
     mask: MaskSource,
     /// Imprint depth from which a pixel counts as contact, for `--mask threshold`.
-    #[arg(long, value_name = "MM", default_value_t = MaskChoice::default().threshold_m * 1e3, value_parser = finite, allow_hyphen_values = true)]
-    threshold_mm: f32,
+    #[arg(long, value_name = "MM", default_value_t = in_mm(MaskChoice::default().threshold_m), value_parser = finite::<f64>, allow_hyphen_values = true)]
+    threshold_mm: f64,
     /// Probability of contact from which a pixel counts, 0 to 1, for the mask model (default: the bundle's own).
     #[arg(long, value_name = "P", value_parser = probability)]
     probability: Option<f32>,
     /// Share of the deepest pixels, for `--mask top_percent`.
-    #[arg(long, value_name = "PERCENT", default_value_t = MaskChoice::default().top_percent, value_parser = finite)]
+    #[arg(long, value_name = "PERCENT", default_value_t = MaskChoice::default().top_percent, value_parser = finite::<f32>)]
     top_percent: f32,
     /// Largest distance to the CAD model at the true pose, for `--mask cad`.
-    #[arg(long, value_name = "MM", default_value_t = MaskChoice::default().cad_distance_m * 1e3, value_parser = finite)]
-    cad_mm: f32,
+    #[arg(long, value_name = "MM", default_value_t = in_mm(MaskChoice::default().cad_distance_m), value_parser = finite::<f64>)]
+    cad_mm: f64,
     /// Leave out the masks that were drawn by hand.
     #[arg(long)]
     pub no_hand: bool,
@@ -39,8 +42,13 @@ fn parse_source() -> impl TypedValueParser<Value = MaskSource> {
     PossibleValuesParser::new(MaskSource::iter().map(name)).map(|key| key.parse().unwrap_or_default())
 }
 
-fn finite(text: &str) -> Result<f32, String> {
-    text.parse().ok().filter(|number: &f32| number.is_finite()).ok_or_else(|| "a number is needed".to_owned())
+fn in_mm(length_m: f32) -> f64 {
+    millimeters(length_m).parse().unwrap_or_default()
+}
+
+fn finite<T: FromStr + Copy + Into<f64>>(text: &str) -> Result<T, String> {
+    let number = text.parse().ok().filter(|number: &T| (*number).into().is_finite());
+    number.ok_or_else(|| "a number is needed".to_owned())
 }
 
 fn probability(text: &str) -> Result<f32, String> {
@@ -52,16 +60,11 @@ impl MaskArgs {
     pub(super) fn choice(&self) -> MaskChoice {
         MaskChoice {
             source: self.mask,
-            threshold_m: self.threshold_mm / 1e3,
+            threshold_m: meters(self.threshold_mm),
             probability: self.probability,
             top_percent: self.top_percent,
-            cad_distance_m: self.cad_mm / 1e3,
+            cad_distance_m: meters(self.cad_mm),
         }
-    }
-
-    /// Of the labels of a pair those that a mask is made from.
-    pub(super) fn drawn<'a>(&self, labels: &'a PairLabels) -> Option<&'a PairLabels> {
-        (!self.no_hand).then_some(labels)
     }
 }
 

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::predict::{MappingArgs, RuntimeArg};
+use super::recipe::{MappingArgs, RuntimeArg};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};

@@ -10,18 +10,17 @@ use strum::IntoEnumIterator as _;
 use super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
-use touch2touch_core::align::Ask;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_work::cloud::clouds;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::figure::note;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::mask::MaskInputs;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
-use touch2touch_work::pose::pose;
+use touch2touch_work::recipe::Stage;
 use touch2touch_work::tool::load_tool;
 
 /// Arguments of `export`.
@@ -92,37 +91,25 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         }
         Err(err) => return Err(err.into()),
     };
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let imprints = predictor.imprints(&sample, args.imprint, &JobCx::unwatched())?;
-    let of = predictor.of(args.imprint)?;
+    let models = args.model.models();
+    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?;
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let inputs = MaskInputs { sample: &sample, tool: tool.as_ref(), labels: args.mask.drawn(&labels), of: Some(&of) };
-    let contact = predictor.contact(&args.mask, imprints, inputs)?;
-    let parts = sample.rig.pads().map(|pad| {
-        let mask = contact.masks[pad].as_ref().map(|found| &found.mask);
-        Some((contact.imprints[pad].as_ref()?, mask))
-    });
-    let clouds = clouds(&sample, &parts.collect())?;
-    let truth = sample.grasp_from_object;
-    let found = tool
-        .as_ref()
-        .map(|tool| pose(&clouds.contact_points(), tool, &*args.engine.method(), Ask::default(), truth))
-        .transpose();
-    let found = match found {
+    let lacks = TaskError::new("Export", "there is no CAD model");
+    let touch =
+        Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.as_ref().ok_or(&lacks), labels: &labels };
+    let felt = feel(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
+    let contact = felt.contact();
+    let (clouds, truth) = (contact.clouds(&sample)?, sample.grasp_from_object);
+    let found = match felt.pose() {
+        _ if tool.is_none() => None,
         Err(err) if args.what == [PairFile::Cloud] => {
             output.note(&err.to_string());
             None
         }
-        found => found?,
+        found => Some(found.map_err(Clone::clone)?),
     };
     let mask = contact.made_of();
-    let prediction = match args.imprint {
-        ImprintSource::Measured => None,
-        ImprintSource::Predicted => {
-            let (config, shift) = (predictor.config()?, predictor.shift());
-            Some(note(&predictor.bundle()?.name, &config, shift))
-        }
-    };
+    let prediction = recipe.generator.as_ref().map(|(bundle, config)| note(&bundle.name, config, recipe.shift));
     let parts = PairParts {
         name: &entry.name,
         source: args.imprint,
@@ -131,7 +118,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         clouds: &clouds,
         mask: &mask,
         engine: args.engine,
-        pose: found.as_ref(),
+        pose: found,
         truth,
         tool: entry.tool.as_deref().zip(tool.as_ref()),
     };

@@ -8,12 +8,12 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::args::{DatasetArgs, FingerArg, keyed};
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
-use touch2touch_work::error::TaskError;
 use touch2touch_work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
+use touch2touch_work::labels::ImprintSource;
 
 /// Arguments of `figure`.
 #[derive(Debug, Args)]
@@ -97,7 +97,7 @@ pub(super) fn run(args: &FigureArgs) -> VerbResult {
         scale: args.scale,
     };
     let output = Output::new(args.common, "drawing", pairs.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let models = args.model.models();
     let mut setup = FigureSetup {
         pairs,
         fingers,
@@ -105,19 +105,15 @@ pub(super) fn run(args: &FigureArgs) -> VerbResult {
         look,
         note: String::new(),
     };
-    if setup.look.panes.iter().any(|pane| pane.is_predicted()) {
-        let (name, config) = (predictor.bundle()?.name.clone(), predictor.config()?);
-        setup.shift = predictor.shift();
-        setup.note = note(&name, &config, setup.shift);
+    let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
+    let imprint = if predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
+    let recipe = args.model.recipe(imprint, &dataset.rig)?;
+    if let Some((bundle, config)) = &recipe.generator {
+        setup.shift = recipe.shift;
+        setup.note = note(&bundle.name, config, setup.shift);
     }
-    let drawn = figure(
-        &dataset,
-        &setup,
-        |_, sample, cx| {
-            predictor.predictions(sample, cx).map_err(|err| TaskError::new("Figure", super::output::says(&err)))
-        },
-        &output.job(),
-    )?;
+    let drawn =
+        figure(&dataset, &setup, |_, sample, cx| recipe.generating()?.pair(&models, sample, cx), &output.job())?;
     let report = Report { file: &args.out, figure: drawn.write(&args.out)?, note: &setup.note };
     output.finish(&report, || {
         let [width, height] = report.figure.size_px;

@@ -11,7 +11,7 @@ use super::args::{DatasetArgs, FingerArg, LimitArgs};
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::{ModelArgs, misgiving};
 use super::report::{RunReport, output_stems};
 use super::seeds::{self, SeedArgs};
 use super::{Common, Output, VerbResult};
@@ -24,10 +24,12 @@ use touch2touch_core::sample::{Sample, Scale};
 use touch2touch_core::{metrics, resample};
 use touch2touch_work::compare;
 use touch2touch_work::doubts;
+use touch2touch_work::fan::seeds_of;
 use touch2touch_work::imprint::{self, imprint_of};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::names::with_ending;
 use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::prediction::Prediction;
 
 use report::{COLOR_CONVENTION, Pair, Report, Stored, Unit, convention, mean, take, text};
@@ -62,8 +64,10 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
     let fingers = args.finger.fingers(&dataset.rig)?;
     let output = Output::new(args.common, "generating", ids.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let config = predictor.config()?;
+    let models = args.model.models();
+    let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
+    let (generating, shift) = (recipe.generating()?, recipe.shift);
+    let config = *generating.config;
     let stems = output_stems(&args.out, &dataset, &ids)?;
     let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
@@ -80,7 +84,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let sample = dataset.load(id)?;
             scale = sample.scale;
             notes.take(&output, &sample.notes);
-            notes.take(&output, predictor.misgiving(&sample)?.as_slice());
+            notes.take(&output, misgiving(&recipe, &sample).as_slice());
             // An image folder has one finger, whichever it was.
             let present: Vec<PadId> = fingers.iter().copied().filter(|f| sample.pad(*f).is_some()).collect();
             let fingers = if present.is_empty() { sample.rig.pad_list() } else { present };
@@ -88,11 +92,15 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             let mut touches = Vec::new();
             for finger in fingers {
                 let Some(touch) = sample.pad(finger) else { continue };
-                let Some(picture) = predictor.condition(touch)? else { return Err(predictor.no_condition()) };
-                touches.push((finger, touch, picture));
+                let picture = generating.picture(&sample, finger)?;
+                touches.push((
+                    finger,
+                    touch,
+                    picture.ok_or_else(|| anyhow::anyhow!("{}", generating.no_input(&sample.rig).why))?,
+                ));
             }
-            let pictures: Vec<_> = touches.iter().map(|(_, _, picture)| &**picture).collect();
-            let predictions = predictor.predict(&pictures, &JobCx::unwatched())?;
+            let pictures: Vec<_> = touches.iter().map(|(_, _, picture)| picture.clone()).collect();
+            let predictions = generating.of(&models, &pictures, &JobCx::unwatched())?;
             for ((finger, touch, _), predicted) in touches.iter().zip(predictions) {
                 let finger = *finger;
                 let key = sample.rig.pad_key(finger);
@@ -112,14 +120,15 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                     made.push(pair);
                     continue;
                 }
-                let imprint = imprint_of(&predicted, predictor.shift(), &sample, finger)?;
+                let imprint = imprint_of(&predicted, shift, &sample, finger)?;
                 write(&stem, &imprint)?;
-                let drawn = Some((&predicted, predictor.shift()));
+                let drawn = Some((&predicted, shift));
                 score(&dataset, id, (finger, &sample), (&imprint, drawn), &mut pair)?;
                 if args.ensemble.seeds > 1 {
-                    let found = seeds::predict(&mut predictor, &sample, finger, args.ensemble.seeds)?;
+                    let count = usize::from(args.ensemble.seeds);
+                    let found = seeds_of((&sample, finger), &recipe, count, &models, &JobCx::unwatched())?;
                     let mut of_mean = Pair::default();
-                    score(&dataset, id, (finger, &sample), (&found.spread.mean, None), &mut of_mean)?;
+                    score(&dataset, id, (finger, &sample), (&found.ensemble.spread.mean, None), &mut of_mean)?;
                     let scores = (of_mean.psnr_db, of_mean.ssim);
                     pair.ensemble = Some(seeds::write(&stem, &found, config.seed, scores)?);
                 }
@@ -132,7 +141,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             Err(err) => {
                 output.note(&format!("{name}: {}", says(&err)));
                 if err.is::<Bug>() {
-                    predictor.recover();
+                    models.forget();
                 }
                 complete = false;
             }
@@ -141,8 +150,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let report = Report {
         mean: mean(&pairs),
         convention: if unit == Unit::Levels { COLOR_CONVENTION } else { convention(scale) },
-        bundle: predictor.bundle()?.name.clone(),
-        runtime: predictor.engine_label()?,
+        bundle: generating.bundle.name.clone(),
+        runtime: args.model.engine_label()?,
         sampler: config.sampler.key(),
         steps: config.steps,
         seed: config.seed,

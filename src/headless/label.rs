@@ -5,13 +5,10 @@ mod report;
 
 use strum::IntoEnumIterator as _;
 
-use super::predict::Predictor;
 use super::{Output, VerbResult, find_pair};
-use touch2touch_core::align::Ask;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::DepthMap;
 use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::{Ground, Provenance};
 use touch2touch_core::pose::ToolModel;
@@ -19,15 +16,16 @@ use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::cloud::seen;
 use touch2touch_work::error::TaskError;
+use touch2touch_work::feel::{Felt, Touch, feel};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{
     Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person, take_in,
 };
-use touch2touch_work::mask::{Contact, MaskInputs};
-use touch2touch_work::pose::pose;
+use touch2touch_work::models::Models;
 use touch2touch_work::propose::{self, Proposal, ProposeSetup, accepted};
+use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::load_tool;
 
 pub(super) use args::LabelArgs;
@@ -86,68 +84,72 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
 }
 
 /// What masks and poses of a pair are made from.
-struct Touch<'a> {
+struct Maker<'a> {
     args: &'a LabelArgs,
+    dataset: &'a Dataset,
+    pair: PairId,
     sample: Sample,
     tool: Result<ToolModel, TaskError>,
-    predictor: Predictor,
+    recipe: Recipe,
+    models: Models,
 }
 
-impl<'a> Touch<'a> {
-    fn load(args: &'a LabelArgs, dataset: &Dataset, id: PairId) -> anyhow::Result<Self> {
-        let entry = &dataset.index.pairs[id.0 as usize];
+impl<'a> Maker<'a> {
+    fn load(args: &'a LabelArgs, dataset: &'a Dataset, pair: PairId) -> anyhow::Result<Self> {
+        let entry = &dataset.index.pairs[pair.0 as usize];
         let tool = match &entry.tool {
             Some(name) => load_tool(dataset, name).map(|(tool, _)| tool),
             None => Err(TaskError::new("Label", format!("{}: no tool is named, so there is no CAD model", entry.name))),
         };
-        Ok(Self { args, sample: dataset.load(id)?, tool, predictor: Predictor::new(&args.model, &dataset.rig) })
+        let (recipe, models) = (recipe(args, dataset)?, args.model.models());
+        Ok(Self { args, dataset, pair, sample: dataset.load(pair)?, tool, recipe, models })
     }
 
-    fn contact(&mut self, imprint: ImprintSource, labels: Option<&PairLabels>) -> anyhow::Result<Contact> {
-        let of = self.predictor.of(imprint)?;
-        let imprints = self.predictor.imprints(&self.sample, imprint, &JobCx::unwatched())?;
-        let inputs = MaskInputs { sample: &self.sample, tool: self.tool.as_ref().ok(), labels, of: Some(&of) };
-        self.predictor.contact(&self.args.mask, imprints, inputs)
+    fn touch<'t>(&'t self, labels: &'t PairLabels) -> Touch<'t> {
+        Touch { dataset: self.dataset, pair: self.pair, sample: &self.sample, tool: self.tool.as_ref(), labels }
     }
 
-    fn pose(&mut self, imprint: ImprintSource, labels: &PairLabels) -> anyhow::Result<PlanarPose> {
-        let contact = self.contact(imprint, self.args.mask.drawn(labels))?;
-        let tool = self.tool.as_ref().map_err(Clone::clone)?;
-        let (points, registration) = (contact.points(&self.sample)?, self.args.engine.method());
-        Ok(pose(&points, tool, &*registration, Ask::default(), self.sample.grasp_from_object)?.grasp_from_object)
+    /// The masks of an imprint; with `hand`, those that were drawn where there are some.
+    fn contact(&self, imprint: ImprintSource, hand: bool, labels: &PairLabels) -> anyhow::Result<Felt> {
+        let recipe = Recipe { hand, ..self.recipe.of(imprint) };
+        Ok(feel(self.touch(labels), &recipe, Stage::Mask, &self.models, &JobCx::unwatched())?)
     }
-}
 
-impl Touch<'_> {
-    /// What `--propose` asks for, for pads of the pair; `imprints` are those of `of`.
+    fn pose(&self, imprint: ImprintSource, labels: &PairLabels) -> anyhow::Result<PlanarPose> {
+        let recipe = self.recipe.of(imprint);
+        let felt = feel(self.touch(labels), &recipe, Stage::Pose, &self.models, &JobCx::unwatched())?;
+        Ok(felt.pose().map_err(Clone::clone)?.grasp_from_object)
+    }
+
+    /// What `--propose` asks for, for pads of the pair; `felt` are its imprints.
     fn proposals(
-        &mut self,
-        (dataset, all, pair): (&Dataset, &Labels, PairId),
-        (imprints, of): (&PerPad<DepthMap>, &ImprintOf),
+        &self,
+        all: &Labels,
+        felt: &Felt,
         pads: &[PadId],
         labels: &PairLabels,
     ) -> anyhow::Result<PerPad<Proposal>> {
-        let (args, choice) = (self.args, self.args.mask.choice());
-        let carry_from = args.carry_from.as_ref().map(|name| find_pair(dataset, name)).transpose()?;
+        let args = self.args;
+        let carry_from = args.carry_from.as_ref().map(|name| find_pair(self.dataset, name)).transpose()?;
         let setup = ProposeSetup {
             source: args.propose.unwrap_or_default(),
-            imprint: args.imprint,
-            mask: choice,
-            mask_model: self.predictor.mask_model(&choice)?,
-            engine: self.predictor.engine(),
-            registration: args.engine,
-            hand: !args.mask.no_hand,
+            recipe: self.recipe.of(args.imprint),
             pose: args.pose.map(Into::into),
             carry_from,
         };
-        let (sample, tool) = (&self.sample, self.tool.as_ref());
-        let touch = propose::Touch { dataset, all, pair, sample, tool, imprints, of, labels };
         let mut out = PerPad::default();
-        for (pad, made) in propose::propose(touch, pads, &setup, self.predictor.models())? {
+        for (pad, made) in propose::propose((self.touch(labels), all), felt, pads, &setup, &self.models)? {
             out[pad] = Some(made?);
         }
         Ok(out)
     }
+}
+
+/// The recipe of the arguments; a generator is looked for where one of them is about a prediction.
+fn recipe(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<Recipe> {
+    let imprints = [Some(args.imprint), args.from, args.accept, args.withdraw];
+    let imprint = imprints.into_iter().flatten().max().unwrap_or_default();
+    args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)
 }
 
 /// The other imprints of a kind that poses were accepted of, as the end of a sentence.
@@ -167,25 +169,26 @@ fn change(
     let mut touch = None;
     let makes = args.adopt || args.from.is_some() || args.propose.is_some();
     if args.remove_mask || makes || !(args.clean.is_empty() && args.draw.is_empty()) {
-        let touch = touch.insert(Touch::load(args, dataset, id)?);
-        let of = touch.predictor.of(args.imprint)?;
+        let touch = touch.insert(Maker::load(args, dataset, id)?);
+        let of = touch.recipe.of(args.imprint).imprint_of();
         let place = |pad| MaskPlace { pad, of: of.clone() };
         for &pad in pads.iter().filter(|_| args.remove_mask) {
             labels.draw(&place(pad), None);
         }
         if !args.remove_mask {
             let by = || Provenance::hand(args.person.clone().or_else(system_person).unwrap_or_default());
-            let found = touch.contact(args.from.unwrap_or(args.imprint), (!args.adopt).then_some(&*labels))?;
+            let felt_by = touch.contact(args.from.unwrap_or(args.imprint), !args.adopt, labels)?;
+            let found = felt_by.contact();
             let felt: Vec<PadId> = pads.into_iter().filter(|pad| found.masks[*pad].is_some()).collect();
             let proposed = match args.propose {
-                Some(_) => touch.proposals((dataset, all, id), (&found.imprints, &of), &felt, labels)?,
+                Some(_) => touch.proposals(all, &felt_by, &felt, labels)?,
                 None => PerPad::default(),
             };
             let mut drawn_on = vec![false; args.draw.len()];
             for pad in felt {
                 let Some(one) = &found.masks[pad] else { continue };
                 let drawn = match args.from {
-                    Some(from) => labels.masks.get(&MaskPlace { pad, of: touch.predictor.of(from)? }),
+                    Some(from) => labels.masks.get(&MaskPlace { pad, of: touch.recipe.of(from).imprint_of() }),
                     None => labels.masks.get(&place(pad)),
                 };
                 let model = found.model.as_deref().unwrap_or_default();
@@ -224,19 +227,19 @@ fn change(
         }
     }
     if let Some(imprint) = args.withdraw {
-        let of = Predictor::new(&args.model, &dataset.rig).of(imprint)?;
+        let of = recipe(args, dataset)?.of(imprint).imprint_of();
         if labels.accepted(&of).is_none() {
             anyhow::bail!("no pose was accepted of {}, so none is withdrawn{}", of.text(), elsewhere(labels, imprint));
         }
         labels.accept(&of, None);
     }
     if let Some(imprint) = args.accept {
-        let of = Predictor::new(&args.model, &dataset.rig).of(imprint)?;
+        let of = recipe(args, dataset)?.of(imprint).imprint_of();
         let pose = match args.pose {
             Some(planar) => AcceptedPose { pose: planar.into(), by_hand: true },
-            None => match &mut touch {
+            None => match &touch {
                 Some(touch) => touch.pose(imprint, labels)?.into(),
-                None => Touch::load(args, dataset, id)?.pose(imprint, labels)?.into(),
+                None => Maker::load(args, dataset, id)?.pose(imprint, labels)?.into(),
             },
         };
         labels.accept(&of, Some(pose));

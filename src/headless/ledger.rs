@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, FingerArg};
 use super::notes::Notes;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::ambiguity::{Ambiguity, ambiguity};
 use touch2touch_core::colormap::{ColorMap, Range};
@@ -19,6 +19,8 @@ use touch2touch_core::postprocess::{ChainReading, Flag, Histogram, Ledger, Orien
 use touch2touch_core::rig::{PadId, Text};
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_work::io::images;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::ledger::{LedgerResult, of_prediction};
 
 /// Arguments of `ledger`.
@@ -125,12 +127,15 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let output = Output::new(args.common, "generating", 1);
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let config = predictor.config()?;
-    let shift = predictor.shift();
-    let picture = predictor.condition(touch)?;
-    let picture = picture.ok_or_else(|| predictor.no_condition().context(name.clone()))?;
-    let made = predictor.predict_one(&picture)?;
+    let models = args.model.models();
+    let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
+    let (generating, shift) = (recipe.generating()?, recipe.shift);
+    let config = *generating.config;
+    if generating.picture(&sample, finger)?.is_none() {
+        anyhow::bail!("{name}: {}", generating.no_input(&sample.rig).why);
+    }
+    let made = generating.seeds(&models, (&sample, finger), &[config.seed], &JobCx::unwatched())?.pop();
+    let made = made.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))?;
     let correct = matches!(args.mapping, Some(MappingArg::Correct));
     let shift_name = if correct { "Correct mapping" } else { shift.label() };
     let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, (&sample, finger))?;
@@ -142,7 +147,7 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     let report = Report {
         pair: name,
         finger: key,
-        bundle: predictor.bundle()?.name.clone(),
+        bundle: generating.bundle.name.clone(),
         bundle_hash: made.bundle.to_string(),
         shift: shift_name,
         steps: config.steps,

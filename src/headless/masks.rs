@@ -15,18 +15,20 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, LimitArgs, keyed};
 use super::contact_mask::MaskArgs;
-use super::output::says;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::rig::PadId;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::agreement::{Agreements, compare_labels};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
+use touch2touch_work::feel::{Felt, Touch};
 use touch2touch_work::io::exchange::{ExportReport, Format};
-use touch2touch_work::labels::Labels;
-use touch2touch_work::mask::MaskInputs;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{ImprintSource, Labels, PairLabels};
+use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::Tools;
 
 /// What can be done with masks.
@@ -203,27 +205,35 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
             format: args.format,
         },
     };
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let models = args.model.models();
+    let automatic_too = args.pairs == Which::All && !args.dry_run;
+    let registration = RegistrationChoice::default();
+    let recipe = args.model.posed(ImprintSource::Measured, &dataset.rig, &args.mask, registration);
+    let recipe = if automatic_too { recipe? } else { Recipe::default() };
     let mut tools = Tools::new(&dataset);
-    let mut automatic = |sample: &Sample, finger: PadId, tool: Option<&str>| {
+    let mut automatic = |pair: PairId, sample: &Sample, finger: PadId, tool: Option<&str>| {
         const WHAT: &str = "Contact mask";
         let tool = tool.and_then(|name| tools.get(name));
-        let touch = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
-        let bubble = touch.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
-        let inputs = MaskInputs::measured(sample, tool, None);
-        let found = predictor.contact_mask(&args.mask, &bubble.imprint, finger, inputs);
-        let found = found.map_err(|err| TaskError::new(WHAT, says(&err)))?;
+        let there = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
+        let bubble = there.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
+        let lacks = TaskError::new(WHAT, "the tool's CAD model is not there");
+        let labels = PairLabels::default();
+        let touch = Touch { dataset: &dataset, pair, sample, tool: tool.ok_or(&lacks), labels: &labels };
+        let mut only = PerPad::default();
+        only[finger] = Some(bubble.imprint.clone());
+        let felt = Felt::of_imprints(&recipe, only).reach(touch, Stage::Mask, &models, &JobCx::unwatched())?;
+        let found = felt.contact().masks[finger].as_ref().ok_or_else(|| TaskError::new(WHAT, "there is no mask"))?;
         if let Some(note) = found.basis.note() {
             output.note(&format!("note: {} finger: {note}", sample.rig.pad_key(finger)));
         }
-        Ok(found.mask)
+        Ok(found.mask.clone())
     };
     let labels = Labels::of(&dataset);
     let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
     let (plan, written) = if args.dry_run {
         (plan(&dataset, &masks, &setup)?, None)
     } else {
-        let automatic: Option<Automatic<'_>> = (args.pairs == Which::All).then_some(&mut automatic);
+        let automatic: Option<Automatic<'_>> = automatic_too.then_some(&mut automatic);
         let (plan, report) = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
         let ExportReport { out_of_range_px, unmeasured_px, .. } = report;
         (plan, Some(Written { out_of_range_px, unmeasured_px }))

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::predict::RuntimeArg;
+use super::recipe::RuntimeArg;
 use super::{Common, Output, VerbResult};
 use touch2touch_work::infer::bundle::Bundle;
 use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};

@@ -11,7 +11,7 @@ use super::contact_mask::labels_of;
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
-use super::predict::Predictor;
+use super::recipe::misgiving;
 use super::report::output_stems;
 use super::{Output, VerbResult, seeds};
 use touch2touch_core::align::Ask;
@@ -20,10 +20,12 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel};
 use touch2touch_work::doubts;
+use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::mask::MaskInputs;
-use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::models::Models;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::load_tool;
 
 pub(super) use args::{Engines, EnginesParser, PoseArgs, parse_start};
@@ -46,7 +48,8 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     };
     let stems = stems(&args.fans.fan_out)?.into_iter().zip(stems(&args.influence)?).collect::<Vec<_>>();
     let output = Output::new(args.common, "aligning", ids.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let models = args.model.models();
+    let recipe = args.recipe(&dataset.rig)?;
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &doubts::notes(&dataset));
@@ -86,18 +89,21 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         };
         let labels = labels_of(&all_labels, &entry.name, &output);
         for &imprint in imprints {
+            let recipe = recipe.of(imprint);
             if imprint == ImprintSource::Predicted {
-                notes.take(&output, predictor.misgiving(&sample).ok().flatten().as_slice());
+                notes.take(&output, misgiving(&recipe, &sample).as_slice());
             }
+            let pair = PairId(id as u32);
             let asked = Asked {
                 name: &entry.name,
                 stem: stem.as_deref(),
                 influence: influence.as_deref(),
-                inputs: MaskInputs { sample: &sample, tool: Some(tool), labels: args.mask.drawn(&labels), of: None },
+                touch: Touch { dataset: &dataset, pair, sample: &sample, tool: Ok(tool), labels: &labels },
                 tool,
-                accepted: predictor.of(imprint).ok().and_then(|of| labels.accepted(&of)),
+                recipe: &recipe,
+                accepted: labels.accepted(&recipe.imprint_of()),
             };
-            let work = || pose_cases(args, &asked, imprint, &mut predictor);
+            let work = || pose_cases(args, &asked, &models);
             match guarded(dataset.pair_files(PairId(id as u32)), work) {
                 Ok(found) => {
                     for note in found.first().iter().flat_map(|case| &case.mask_notes) {
@@ -109,7 +115,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 Err(err) => {
                     output.note(&format!("{} ({} imprint): {}", entry.name, imprint.key(), says(&err)));
                     if err.is::<Bug>() {
-                        predictor.recover();
+                        models.forget();
                     }
                     complete = false;
                 }
@@ -130,24 +136,18 @@ struct Asked<'a> {
     stem: Option<&'a Path>,
     /// Where the influence of its pixels goes.
     influence: Option<&'a Path>,
-    inputs: MaskInputs<'a>,
+    touch: Touch<'a>,
     tool: &'a ToolModel,
+    recipe: &'a Recipe,
     accepted: Option<AcceptedPose>,
 }
 
 /// One case per engine for one pair and one kind of imprint.
-fn pose_cases(
-    args: &PoseArgs,
-    asked: &Asked<'_>,
-    imprint: ImprintSource,
-    predictor: &mut Predictor,
-) -> anyhow::Result<Vec<Case>> {
-    let Asked { name, stem, influence, inputs, tool, accepted } = *asked;
-    let sample = inputs.sample;
-    let imprints = predictor.imprints(sample, imprint, &JobCx::unwatched())?;
-    let of = predictor.of(imprint)?;
-    let contact = predictor.contact(&args.mask, imprints, MaskInputs { of: Some(&of), ..inputs })?;
-    let points = contact.points(sample);
+fn pose_cases(args: &PoseArgs, asked: &Asked<'_>, models: &Models) -> anyhow::Result<Vec<Case>> {
+    let Asked { name, stem, influence, touch, tool, recipe, accepted } = *asked;
+    let (sample, imprint) = (touch.sample, recipe.imprint);
+    let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
+    let contact = felt.contact();
     let truth = sample.grasp_from_object;
     let predicted = imprint == ImprintSource::Predicted;
     // What was measured is as it is; what was predicted may have had nothing to go by.
@@ -158,14 +158,17 @@ fn pose_cases(
     let several = predicted && args.ensemble.seeds > 1;
     let one = |&engine: &RegistrationChoice| {
         let fan = several
-            .then(|| seeds::fan(predictor, inputs, tool, engine, &args.mask, args.ensemble.seeds))
+            .then(|| {
+                let recipe = Recipe { registration: engine, ..recipe.clone() };
+                seeds::fan(touch, &recipe, args.ensemble.seeds, models)
+            })
             .transpose()?;
         if let (Some(fan), Some(stem)) = (&fan, stem) {
             fan.write(stem, name, engine)?;
         }
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, ..Ask::default() };
-        let found = points.clone().and_then(|points| pose(&points, tool, &*registration(args, engine), ask, truth));
+        let found = felt.pose_by(touch, &*registration(args, engine), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
         let influence = influence.zip(answer).map(|(stem, found)| {

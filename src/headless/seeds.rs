@@ -2,29 +2,20 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 
 use clap::Args;
 use serde::Serialize;
 
-use super::contact_mask::MaskArgs;
-use super::predict::Predictor;
-use touch2touch_core::align::Ask;
-use touch2touch_core::contact::MaskBasis;
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::ensemble::{AngleFan, Spread, seeds};
+use touch2touch_core::ensemble::{AngleFan, seeds};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel};
-use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::units::angle_error;
-use touch2touch_work::ensemble::{Ensemble, ensemble};
-use touch2touch_work::imprint::imprint_of;
+use touch2touch_work::fan::{self, Fan, FingerSeeds};
+use touch2touch_work::feel::Touch;
 use touch2touch_work::io::{images, names, npz};
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::mask::MaskInputs;
-use touch2touch_work::pose;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 /// How many seeds.
 #[derive(Debug, Clone, Copy, Args)]
@@ -41,34 +32,6 @@ pub(super) struct FanArgs {
     /// With `--seeds`: write a picture of each fan of poses into this folder.
     #[arg(long, value_name = "DIR", requires = "seeds")]
     pub fan_out: Option<PathBuf>,
-}
-
-/// The predictions of one finger.
-pub(super) struct FingerSeeds {
-    /// Meters, one per seed.
-    pub imprints: Vec<Arc<DepthMap>>,
-    /// Around their mean.
-    pub spread: Spread,
-    /// Mean over the seeds of the spread of the decoder's channels, meters; `None` with a single channel.
-    pub channels: Option<DepthMap>,
-}
-
-/// Predicts one touch with every seed.
-pub(super) fn predict(
-    predictor: &mut Predictor,
-    sample: &Sample,
-    finger: PadId,
-    count: u16,
-) -> anyhow::Result<FingerSeeds> {
-    let touch = sample.pad(finger).ok_or_else(|| predictor.no_condition())?;
-    let picture = predictor.condition(touch)?.ok_or_else(|| predictor.no_condition())?;
-    let list = seeds(predictor.config()?.seed, count.into());
-    let made: Vec<Arc<Prediction>> = predictor.predict_seeds(&picture, &list)?.into_iter().map(Arc::new).collect();
-    let shift = predictor.shift();
-    let imprint = |made: &Arc<Prediction>| imprint_of(made, shift, sample, finger).map(Arc::new);
-    let imprints = made.iter().map(imprint).collect::<Result<Vec<_>, _>>()?;
-    let Ensemble { spread, channels } = ensemble(&made, &imprints, shift, (sample, finger))?;
-    Ok(FingerSeeds { imprints, spread, channels })
 }
 
 /// Metrics of the seeds of one touch.
@@ -95,9 +58,9 @@ pub(super) fn write(
 ) -> anyhow::Result<SeedFigures> {
     let file = |what: &str, ending: &str| names::with_ending(stem, &format!("_{what}.{ending}"));
     let maps = [
-        ("mean", Some(&found.spread.mean)),
-        ("spread", Some(&found.spread.std)),
-        ("channels", found.channels.as_ref()),
+        ("mean", Some(&found.ensemble.spread.mean)),
+        ("spread", Some(&found.ensemble.spread.std)),
+        ("channels", found.ensemble.channels.as_ref()),
     ];
     for (what, map) in maps {
         let Some(map) = map else { continue };
@@ -109,9 +72,9 @@ pub(super) fn write(
     let mean_of = |map: &DepthMap| finite(touch2touch_core::postprocess::Stats::of(map).mean);
     Ok(SeedFigures {
         seeds: seeds(first, found.imprints.len()),
-        spread_mean_m: finite(found.spread.mean_std()),
-        spread_max_m: finite(found.spread.max_std()),
-        channels_mean_m: found.channels.as_ref().and_then(mean_of),
+        spread_mean_m: finite(found.ensemble.spread.mean_std()),
+        spread_max_m: finite(found.ensemble.spread.max_std()),
+        channels_mean_m: found.ensemble.channels.as_ref().and_then(mean_of),
         mean_psnr_db,
         mean_ssim,
     })
@@ -157,58 +120,24 @@ impl PoseFan {
     }
 }
 
-/// Predicts both fingers with every seed and registers each, and the mean imprint.
-pub(super) fn fan(
-    predictor: &mut Predictor,
-    inputs: MaskInputs<'_>,
-    tool: &ToolModel,
-    engine: RegistrationChoice,
-    args: &MaskArgs,
-    count: u16,
-) -> anyhow::Result<PoseFan> {
-    let sample = inputs.sample;
-    let mut fingers: PerPad<FingerSeeds> = PerPad::default();
-    for finger in sample.rig.pads() {
-        let Some(touch) = sample.pad(finger) else { continue };
-        if predictor.condition(touch)?.is_some() {
-            fingers[finger] = Some(predict(predictor, sample, finger, count)?);
-        }
-    }
-    let mut made_otherwise = BTreeMap::new();
-    let (bundle, config, shift) = (predictor.bundle()?.id.clone(), predictor.config()?, predictor.shift());
-    let mut angle = |imprints: PerPad<&DepthMap>, seed: Option<u64>| -> anyhow::Result<Option<f64>> {
-        let of = seed.map(|seed| ImprintOf::predicted(&bundle, &GenerateConfig { seed, ..config }, shift));
-        let inputs = MaskInputs { of: of.as_ref(), ..inputs };
-        let contact = predictor.contact(args, imprints.map(|imprint| imprint.cloned()), inputs)?;
-        for (pad, found) in contact.masks.entries().filter(|(_, found)| found.basis != MaskBasis::Source) {
-            let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source().key()));
-            *made_otherwise.entry(made_of).or_insert(0) += 1;
-        }
-        let found = contact
-            .points(sample)
-            .and_then(|points| pose::pose(&points, tool, &*engine.method(), Ask::default(), sample.grasp_from_object));
-        Ok(found.ok().map(|found| found.angle_rad))
-    };
-    let mut angles = Vec::new();
-    for (i, seed) in seeds(config.seed, count.into()).into_iter().enumerate() {
-        angles.push(angle(fingers.as_ref().map(|f| Some(&*f?.imprints[i])), Some(seed))?);
-    }
-    let of_mean = angle(fingers.as_ref().map(|f| Some(&f?.spread.mean)), None)?;
-    let fan = AngleFan::of(&angles.iter().flatten().copied().collect::<Vec<_>>());
-    let truth = sample.grasp_from_object.map(|p| p.inverse().theta_rad);
+/// The fan of the poses of a touch with several seeds.
+pub(super) fn fan(touch: Touch<'_>, recipe: &Recipe, count: u16, models: &Models) -> anyhow::Result<PoseFan> {
+    let Fan { seeds, angles_rad, of_mean_rad, fan, otherwise } =
+        fan::fan(touch, recipe, count.into(), models, &JobCx::unwatched())?;
+    let truth = touch.sample.grasp_from_object.map(|p| p.inverse().theta_rad);
     let mean = fan.as_ref().and_then(|f| f.mean_rad);
     let error = |angle: Option<f64>| Some(angle_error(angle?, truth?).to_degrees());
     let finite = |v: f64| v.is_finite().then_some(v.to_degrees());
     Ok(PoseFan {
-        seeds: seeds(config.seed, count.into()),
-        angles_deg: angles.iter().map(|a| a.map(f64::to_degrees)).collect(),
+        seeds,
+        angles_deg: angles_rad.iter().map(|a| a.map(f64::to_degrees)).collect(),
         mean_deg: mean.map(f64::to_degrees),
         std_deg: fan.as_ref().and_then(|f| finite(f.std_rad)),
         extremes_deg: fan.as_ref().map(|f| f.extremes_rad).filter(|e| e[0].is_finite()).map(|e| e.map(f64::to_degrees)),
-        mask_notes: made_otherwise,
-        of_mean_deg: of_mean.map(f64::to_degrees),
+        mask_notes: otherwise,
+        of_mean_deg: of_mean_rad.map(f64::to_degrees),
         mean_error_deg: error(mean),
-        of_mean_error_deg: error(of_mean),
+        of_mean_error_deg: error(of_mean_rad),
         fan,
         truth_rad: truth,
     })

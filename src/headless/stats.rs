@@ -7,14 +7,16 @@ use clap::Args;
 use serde::Serialize;
 
 use super::args::{DatasetArgs, FingerArg, at_least_one};
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_work::error::TaskError;
+use touch2touch_work::imprint::chain_of;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::models::Wanted;
 use touch2touch_work::pairs;
 use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
@@ -55,19 +57,22 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let ids: Vec<PairId> =
         pairs::spread(dataset.index.pairs.len(), Some(args.limit)).map(|at| PairId(at as u32)).collect();
     let output = Output::new(args.common, "predicting", ids.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
+    let models = args.model.models();
+    let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
+    let generating = recipe.generating()?;
     let setup = StatisticsSetup {
         pairs: ids,
         fingers: args.finger.fingers(&dataset.rig)?,
-        config: predictor.config()?,
-        bundle: predictor.bundle()?.clone(),
-        input: predictor.input().ok_or_else(|| anyhow::anyhow!("the bundle is not a generator"))?,
+        config: *generating.config,
+        bundle: generating.bundle.clone(),
+        input: generating.input(&dataset.rig)?,
         dataset: dataset.title.clone(),
     };
-    let chain = predictor.chain(ShiftMode::Raw)?;
+    let chain = chain_of(&models.chains(generating.bundle)?, &generating.bundle.id, ShiftMode::Raw)?;
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
-    let predict = |wanted: Wanted<'_>, _: &JobCx| {
-        predictor.predict_one(wanted.difference).map_err(|err| TaskError::new("Predict", err))
+    let predict = |wanted: Wanted<'_>, cx: &JobCx| {
+        let made = models.predict(generating.bundle, generating.engine, generating.config, &[wanted], cx)?;
+        made.into_iter().next().ok_or_else(|| TaskError::new("Predict", "no answer"))
     };
     let (statistics, failed) = statistics(&setup, load, predict, &output.job())?;
     for failure in &failed {

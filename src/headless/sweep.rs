@@ -4,13 +4,14 @@ use clap::Args;
 
 use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_work::mask::{MaskChoice, MaskSource};
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pairs;
-use touch2touch_work::sweep::{Dial, InForce, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -56,21 +57,14 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
         args.only.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
     };
     let output = Output::new(args.common, "turning the dial", pairs.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let choice = args.mask.choice();
-    let generator = if args.measured_only { None } else { Some((predictor.bundle()?.clone(), predictor.config()?)) };
+    let models = args.model.models();
+    let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
     // The dial may ask for the mask model where the choice does not.
-    let source = if args.dial == Dial::Probability { MaskSource::Unet } else { choice.source };
-    let setup = SweepSetup {
-        values,
-        pairs,
-        mask_model: predictor.mask_model(&MaskChoice { source, ..choice })?,
-        in_force: InForce { mask: choice, registration: args.engine, shift: predictor.shift() },
-        generator,
-        hand: !args.mask.no_hand,
-        engine: predictor.engine(),
-    };
-    let found = sweep(&dataset, &setup, predictor.models(), &output.job())?;
+    let model = || args.model.mask_model(false, &dataset.rig);
+    let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };
+    let setup = SweepSetup { values, pairs, recipe: Recipe { mask_model, ..recipe } };
+    let found = sweep(&dataset, &setup, &models, &output.job())?;
     for remark in &found.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }

@@ -20,7 +20,7 @@ use super::contact_mask::{MaskArgs, labels_of};
 use super::guard::{Bug, guarded};
 use super::output::says;
 use super::pose::{Engines, EnginesParser};
-use super::predict::{ModelArgs, Predictor};
+use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult, report};
 use done::Done;
 use one::Worker;
@@ -113,7 +113,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     let mut follower = Follower::new(args.dataset.path(), config)?;
     // The models are chosen for the sensors before the first touch is there.
     let rig = rig_of(args.dataset.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
-    let mut worker = Worker::new(args, Predictor::new(&args.model, &rig), stop.clone())?;
+    let mut worker = Worker::new(args, &rig, stop.clone())?;
     let ready = json!({
         "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None, &PairLabels::default())?, "period_ms": PERIOD.as_secs_f64() * 1e3,
         "load_and_warm_up_s": worker.warm_s,

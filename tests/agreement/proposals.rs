@@ -8,6 +8,7 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::models::Models;
 use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_work::recipe::Recipe;
 
 use super::*;
 
@@ -284,18 +285,14 @@ fn proposing_for_many_stops_between_pairs_and_keeps_what_was_done() {
     let setup = BatchSetup {
         propose: ProposeSetup {
             source: ProposalSource::Automatic,
-            imprint: MEASURED,
-            mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
-            mask_model: None,
-            engine: EngineChoice::default(),
-            registration: RegistrationChoice::default(),
-            hand: true,
+            recipe: Recipe {
+                mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+                ..Recipe::default()
+            },
             pose: None,
             carry_from: None,
         },
         pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
-        generator: None,
-        shift: ShiftMode::ExactInverse,
         over_hand: false,
         person: None,
     };

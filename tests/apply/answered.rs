@@ -3,7 +3,8 @@
 use std::path::PathBuf;
 
 use touch2touch_work::adapt::{Adapted, Scored};
-use touch2touch_work::sweep::{Dial, InForce, Sweep};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::sweep::{Dial, Sweep};
 use touch2touch_work::train::Trained;
 
 pub(super) fn swept() -> Sweep {
@@ -12,7 +13,7 @@ pub(super) fn swept() -> Sweep {
         dial: Dial::Gate,
         unit: Dial::Gate.unit(),
         at: None,
-        in_force: InForce::default(),
+        in_force: Recipe::default(),
         series: Vec::new(),
         left_out: Vec::new(),
         notes: Vec::new(),

@@ -18,7 +18,7 @@ use touch2touch_core::sensor::Intrinsics;
 use touch2touch_work::case::{self, CaseSetup};
 use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_work::infer::engine::EngineKind;
-use touch2touch_work::infer::recipe::Recipe;
+use touch2touch_work::infer::kept_key::KeptKey;
 use touch2touch_work::infer::store::Store;
 use touch2touch_work::io::cases::{Case, Stratum};
 use touch2touch_work::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
@@ -29,6 +29,7 @@ use touch2touch_work::io::{cases, exchange, images, npz, pt, stl};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
 
@@ -51,11 +52,10 @@ fn t2tcase_seeds() -> Vec<Seed> {
     let whole = opened(&written(|file| {
         let setup = CaseSetup {
             pair: PairId(0),
-            generator: None,
-            shift: Default::default(),
-            mask: (MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }, None),
-            engine: Default::default(),
-            runtime: Default::default(),
+            recipe: Recipe {
+                mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+                ..Recipe::default()
+            },
             labels: Default::default(),
             view: None,
         };
@@ -398,8 +398,8 @@ fn read_review(dir: &Path, _: &Path) -> Outcome {
     store.load_review("a").map(drop).map_err(said)
 }
 
-fn recipe() -> Recipe {
-    Recipe::new("ab".repeat(32), "cd".repeat(32), EngineKind::Rten, &GenerateConfig::default())
+fn recipe() -> KeptKey {
+    KeptKey::new("ab".repeat(32), "cd".repeat(32), EngineKind::Rten, &GenerateConfig::default())
 }
 
 /// Where a prediction of [`recipe`] is kept: a store says so by writing one.

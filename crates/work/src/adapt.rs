@@ -17,20 +17,17 @@ use std::time::Instant;
 use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::job::{Curve, JobCx};
-use super::mask::MaskChoice;
 use super::models::Models;
+use super::recipe::Recipe;
 use super::tool::Tools;
 use crate::infer::bundle::Role;
-use crate::infer::engine::EngineChoice;
-use crate::infer::recipe::input_digest;
+use crate::infer::kept_key::input_digest;
 use crate::io::dataset::Dataset;
 use crate::io::memory::peak_mib;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::lattice::template;
-use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::Correction;
 use touch2touch_core::rig::PerPad;
 #[cfg(not(feature = "tune"))]
@@ -62,20 +59,13 @@ const DIGITS: usize = 16;
 /// What is fitted, to what, and how it is tried.
 #[derive(Clone, Debug)]
 pub struct AdaptSetup {
-    /// The generator; it stays as it is.
-    pub bundle: BundleInfo,
-    /// The engine that runs it.
-    pub engine: EngineChoice,
-    /// How it generates.
-    pub config: GenerateConfig,
+    /// The generator, which stays as it is, with how it generates; and how contact and pose are found where the data have
+    /// poses.
+    pub recipe: Recipe,
     /// The pairs.
     pub pairs: Vec<PairId>,
     /// In how many parts the pairs are left out in turn; whole tools where three are known. 0 tries nothing.
     pub folds: usize,
-    /// How contact is found where the data have poses, and with which model.
-    pub mask: (MaskChoice, Option<BundleInfo>),
-    /// The registration that gives the angles there.
-    pub registration: RegistrationChoice,
     /// Whether and how long the networks themselves are tuned after the closed form: once for each part that is left out,
     /// and once for all.
     pub tuning: Option<Tuning>,
@@ -97,13 +87,14 @@ pub struct AdaptSetup {
 pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx) -> Result<Adapted, TaskError> {
     let begin = Instant::now();
     let fail = |err: FitError| TaskError::from_error(WHAT, &err);
-    if let Some(fit) = setup.bundle.fit() {
-        return Err(TaskError::new(WHAT, format!("{} was fitted already", setup.bundle.name))
+    let bundle = setup.recipe.generating()?.bundle;
+    if let Some(fit) = bundle.fit() {
+        return Err(TaskError::new(WHAT, format!("{} was fitted already", bundle.name))
             .with_hint(format!("Fit the bundle that it was made from, {}, to all your pairs.", fit.from)));
     }
-    let _claim = setup.out.as_deref().map(|out| write::claim(out, &setup.bundle)).transpose()?;
+    let _claim = setup.out.as_deref().map(|out| write::claim(out, bundle)).transpose()?;
     let gather::Gathered { touches, mut left_out, grouped, mut notes } = gather(dataset, setup, models, cx)?;
-    let source = source(dataset, setup, &touches);
+    let source = source(dataset, bundle, &touches);
     let other = setup.out.as_deref().filter(|_| !setup.replace).and_then(|out| write::of_other_data(out, &source));
     if let (Some(other), Some(_)) = (&other, &setup.tuning) {
         // Before the long part.
@@ -188,7 +179,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     let evidence = judge::Evidence { rig, touches: &touches, fitted: &fitted, unseen: &unseen, doubts: &doubts };
     adapted.objections = judge::objections(&evidence, &adapted);
     if let Some(out) = setup.out.clone() {
-        let unwritten = Unwritten { out, from: setup.bundle.clone(), rig: dataset.rig.clone(), fitted, graphs };
+        let unwritten = Unwritten { out, from: bundle.clone(), rig: dataset.rig.clone(), fitted, graphs };
         if adapted.in_place_of.is_none() && (setup.force || adapted.objections.is_empty()) {
             adapted.bundle = Some(unwritten.write()?);
         } else {
@@ -292,7 +283,7 @@ fn tune(
     Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Fit in closed form."))
 }
 
-fn source(dataset: &Dataset, setup: &AdaptSetup, touches: &[Touch]) -> FitSource {
+fn source(dataset: &Dataset, bundle: &BundleInfo, touches: &[Touch]) -> FitSource {
     let mut pairs: Vec<String> = touches.iter().map(|t| t.name.clone()).collect();
     pairs.dedup();
     let mut pictures: Vec<String> = touches.iter().map(|t| input_digest(&t.picture)[..DIGITS].to_owned()).collect();
@@ -304,8 +295,8 @@ fn source(dataset: &Dataset, setup: &AdaptSetup, touches: &[Touch]) -> FitSource
         scale: touches.first().map_or(Scale::Measured, |t| t.scale),
         pairs,
         pictures,
-        from: setup.bundle.name.clone(),
-        from_sha256: setup.bundle.id.to_string(),
+        from: bundle.name.clone(),
+        from_sha256: bundle.id.to_string(),
     }
 }
 

@@ -1,40 +1,36 @@
 //! A case: one pair with everything that its results depend on, in one file that gives the same results elsewhere
 //! ([`make`], [`open`], [`check`]).
 
-use super::io::masks::ByImprint;
-use super::labels::{by_imprint, of_imprints};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use strum::IntoEnumIterator as _;
 
-use super::bundles::{self, BundleInfo, BundleKind, FoundBundles};
+use super::bundles::{self, BundleInfo, FoundBundles};
 use super::error::TaskError;
-use super::imprint::{imprints_of, measured};
+use super::feel::{Touch, feel};
 use super::job::JobCx;
-use super::labels::{Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note};
-use super::mask::{MaskChoice, MaskInputs};
-use super::models::{Masking, Models};
-use super::pose::pose;
-use super::predict::Generating;
+use super::labels::{
+    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, by_imprint, note, of_imprints,
+};
+use super::models::Models;
+use super::recipe::{Model, ModelName, Recipe, Stage};
 use super::tool::load_tool;
 use crate::infer::bundle::Origin;
-use crate::infer::engine::EngineChoice;
 use crate::io::case_file::{self, CaseContent};
 use crate::io::dataset::{BuiltIn, Dataset, READ_AS_FILE, UNIT_FILE};
 use crate::io::digest::sha256;
+use crate::io::masks::ByImprint;
 use crate::io::{files, npz};
 use touch2touch_core::align::Ask;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::PackedMask;
-use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Sample;
 use touch2touch_core::units::{angle_error, mm};
 
 const WHAT: &str = "Case";
@@ -45,32 +41,6 @@ const VERSION: u32 = 2;
 const MAX_FILE: u64 = 64 << 20;
 /// A model is taken into a case up to this size, bytes; a larger one is named only.
 const MAX_MODEL: u64 = 40 << 20;
-
-/// A model bundle, as a case names it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct CaseModel {
-    /// Its name.
-    pub name: String,
-    /// Its identity.
-    pub id: String,
-}
-
-/// How the results of a case are made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CaseRecipe {
-    /// The generator with the choices of a generation; `None` where nothing is predicted.
-    pub generator: Option<(CaseModel, GenerateConfig)>,
-    /// How predictions become meters.
-    pub shift: ShiftMode,
-    /// Where masks come from that nobody drew.
-    pub mask: MaskChoice,
-    /// The mask model, where there is one.
-    pub mask_model: Option<CaseModel>,
-    /// The registration.
-    pub engine: RegistrationChoice,
-    /// What runs the models.
-    pub runtime: EngineChoice,
-}
 
 /// A mask that a person drew.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -123,7 +93,7 @@ pub struct Case {
     /// The pair.
     pub pair: String,
     /// How the results are made.
-    pub recipe: CaseRecipe,
+    pub recipe: Recipe<ModelName>,
     labels: CaseLabels,
     /// Hashes of the files in it.
     files: BTreeMap<String, String>,
@@ -236,36 +206,31 @@ impl CaseLabels {
 }
 
 /// The results of a pair, with the models at hand.
-fn results(
-    dataset: &Dataset,
-    (pair, sample): (PairId, &Sample),
-    recipe: &CaseRecipe,
-    labels: &PairLabels,
-    [generator, mask_model]: [Option<&BundleInfo>; 2],
-    models: &Models,
-    cx: &JobCx,
-) -> Result<Vec<Made>, TaskError> {
-    let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
-    let tool = tool.and_then(|name| load_tool(dataset, name).ok()).map(|(tool, _)| tool);
+fn results(touch: Touch<'_>, recipe: &Recipe, models: &Models, cx: &JobCx) -> Result<Vec<Made>, TaskError> {
+    let sample = touch.sample;
     let mut out = Vec::new();
-    let mut sources = vec![(ImprintOf::Measured, measured(sample))];
-    if let (Some(bundle), Some((_, config))) = (generator, &recipe.generator) {
-        let made = Generating { bundle, engine: recipe.runtime, config }.pair(models, sample, cx)?;
-        let depths = made.map(|made| made.filter(|made| made.color.is_none()));
-        let imprints = imprints_of(&depths, recipe.shift, sample)?;
-        sources.push((ImprintOf::predicted(&bundle.id, config, recipe.shift), imprints));
-    }
-    for (of, imprints) in sources.into_iter().filter(|(_, imprints)| !imprints.is_empty()) {
+    for source in
+        ImprintSource::iter().filter(|source| recipe.generator.is_some() || *source == ImprintSource::Measured)
+    {
+        let drawn = feel(touch, &recipe.of(source), Stage::Prediction, models, cx)?;
+        // A color picture has no pose.
+        if drawn.predictions.iter().flatten().any(|made| made.color.is_some()) {
+            continue;
+        }
+        let felt = drawn.reach(touch, Stage::Imprint, models, cx)?;
+        if felt.imprints.is_empty() {
+            continue;
+        }
         cx.check(WHAT)?;
-        let by = Masking { choice: recipe.mask, model: mask_model, engine: recipe.runtime };
-        let inputs = MaskInputs { sample, tool: tool.as_ref(), labels: Some(labels), of: Some(&of) };
-        let contact = models.contact(by, imprints, inputs)?;
+        let ask = Ask { record: true, ..Ask::default() };
+        let felt = felt.reach_asking(touch, Stage::Pose, ask, models, cx)?;
+        let contact = felt.contact();
         let mut arrays = BTreeMap::new();
         for (pad, imprint) in contact.imprints.entries() {
             let finger = sample.rig.pad_key(pad);
-            arrays.insert(imprint_name(of.source(), &finger), npz::npy_bytes(imprint));
+            arrays.insert(imprint_name(source, &finger), npz::npy_bytes(imprint));
             if let Some(found) = &contact.masks[pad] {
-                let name = format!("{}{}_{finger}_mask.npy", case_file::RESULTS, of.source().key());
+                let name = format!("{}{}_{finger}_mask.npy", case_file::RESULTS, source.key());
                 arrays.insert(name, npz::npy_bytes(&found.mask.map(|on| f32::from(u8::from(*on)))));
             }
         }
@@ -273,16 +238,13 @@ fn results(
             let mask = contact.masks[pad].as_ref().map_or_else(String::new, |found| mask_hash(&found.mask));
             (sample.rig.pad_key(pad).into_owned(), [imprint_hash(imprint), mask])
         });
-        let ask = Ask { record: true, ..Ask::default() };
         // Without points or a tool there is no pose, and that is a result as well.
-        let found = contact.points(sample).ok().zip(tool.as_ref()).and_then(|(points, tool)| {
-            pose(&points, tool, &*recipe.engine.method(), ask, sample.grasp_from_object).ok()
-        });
+        let found = felt.pose().ok();
         let result = CaseResult {
-            imprint: of.source(),
+            imprint: source,
             fingers: hashes.collect(),
-            pose: found.as_ref().map(|found| found.grasp_from_object),
-            rms_m: found.as_ref().map(|found| found.rms_m),
+            pose: found.map(|found| found.grasp_from_object),
+            rms_m: found.map(|found| found.rms_m),
             trace: found.map_or_else(Vec::new, |f| f.report.trace.iter().map(|step| step.grasp_from_object).collect()),
         };
         out.push(Made { result, arrays });
@@ -290,21 +252,20 @@ fn results(
     Ok(out)
 }
 
+/// The tool of a pair; `Err` says why there is none.
+fn tool_of(dataset: &Dataset, pair: PairId) -> Result<ToolModel, TaskError> {
+    let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
+    let name = tool.ok_or_else(|| TaskError::new(WHAT, "no tool is named"))?;
+    load_tool(dataset, name).map(|(tool, _)| tool)
+}
+
 /// What goes into a case, besides the data.
 #[derive(Clone, Debug)]
 pub struct CaseSetup {
     /// The pair.
     pub pair: PairId,
-    /// The generator and its choices.
-    pub generator: Option<(BundleInfo, GenerateConfig)>,
-    /// How predictions become meters.
-    pub shift: ShiftMode,
-    /// Where masks come from that nobody drew, and the mask model.
-    pub mask: (MaskChoice, Option<BundleInfo>),
-    /// The registration.
-    pub engine: RegistrationChoice,
-    /// What runs the models.
-    pub runtime: EngineChoice,
+    /// What decides its results.
+    pub recipe: Recipe,
     /// What a person said about the pair.
     pub labels: PairLabels,
     /// How the studio shows it.
@@ -328,24 +289,20 @@ pub fn make(dataset: &Dataset, setup: &CaseSetup, models: &Models, file: &Path, 
             content.files.insert(relative(dataset, &path)?, bytes);
         }
     }
-    let model = |bundle: &BundleInfo| CaseModel { name: bundle.name.clone(), id: bundle.id.to_string() };
-    let recipe = CaseRecipe {
-        generator: setup.generator.as_ref().map(|(bundle, config)| (model(bundle), *config)),
-        shift: setup.shift,
-        mask: setup.mask.0,
-        mask_model: setup.mask.1.as_ref().map(model),
-        engine: setup.engine,
-        runtime: setup.runtime,
-    };
-    let bundles = [setup.generator.as_ref().map(|(bundle, _)| bundle), setup.mask.1.as_ref()];
+    let recipe = &setup.recipe;
+    let bundles = [recipe.generator.as_ref().map(|(model, _)| model), recipe.mask_model.as_ref()];
     for bundle in bundles.into_iter().flatten().filter(|bundle| !Origin::ships(&bundle.id)) {
         content.beside.append(&mut packed(bundle)?);
     }
     let mut found = Vec::new();
-    for made in results(dataset, (setup.pair, &sample), &recipe, &setup.labels, bundles, models, cx)? {
+    let tool = tool_of(dataset, setup.pair);
+    let touch = Touch { dataset, pair: setup.pair, sample: &sample, tool: tool.as_ref(), labels: &setup.labels };
+    for made in results(touch, recipe, models, cx)? {
         found.push(made.result);
         content.beside.extend(made.arrays);
     }
+    let named = |model: Model| Some(ModelName::from(&model));
+    let recipe = recipe.clone().with_models(named).unwrap_or_default();
     let case = Case {
         format: FORMAT.into(),
         version: VERSION,
@@ -484,19 +441,20 @@ impl OpenedCase {
 pub fn check(opened: &OpenedCase, found: &FoundBundles, models: &Models, cx: &JobCx) -> Result<CaseReport, TaskError> {
     let OpenedCase { case, dataset, pair, labels, .. } = opened;
     let sample = dataset.load(*pair).map_err(|err| TaskError::from_error(WHAT, &err).with_hint(err.hint()))?;
-    let model = |kind: BundleKind, named: Option<&CaseModel>| {
-        let Some(named) = named else { return Ok(None) };
-        let bundle = found.bundles.iter().find(|bundle| bundle.kind == kind && *bundle.id == *named.id);
-        let lacking = || {
-            TaskError::new(WHAT, format!("the model {} ({:.12}) is not here", named.name, named.id))
-                .with_hint("Name a folder with it in TOUCH2TOUCH_MODELS.")
-        };
-        bundle.cloned().map(Some).ok_or_else(lacking)
+    let here = |named: ModelName| -> Option<Model> {
+        found.bundles.iter().find(|bundle| *bundle.id == *named.id).cloned().map(Model::from)
     };
-    let generator = model(BundleKind::Generator, case.recipe.generator.as_ref().map(|(model, _)| model))?;
-    let mask_model = model(BundleKind::Mask, case.recipe.mask_model.as_ref())?;
-    let bundles = [generator.as_ref(), mask_model.as_ref()];
-    let now = results(dataset, (*pair, &sample), &case.recipe, labels, bundles, models, cx)?;
+    let lacking = || {
+        let (generator, mask_model) = (case.recipe.generator.iter().map(|(model, _)| model), &case.recipe.mask_model);
+        let named = generator.chain(mask_model).find(|named| here((*named).clone()).is_none());
+        let named = named.map_or_else(String::new, |named| format!("{} ({:.12})", named.name, named.id));
+        TaskError::new(WHAT, format!("the model {named} is not here"))
+            .with_hint("Name a folder with it in TOUCH2TOUCH_MODELS.")
+    };
+    let recipe = case.recipe.clone().with_models(here).ok_or_else(lacking)?;
+    let tool = tool_of(dataset, *pair);
+    let touch = Touch { dataset, pair: *pair, sample: &sample, tool: tool.as_ref(), labels };
+    let now = results(touch, &recipe, models, cx)?;
     let now: Vec<CaseResult> = now.into_iter().map(|made| made.result).collect();
     let mut report = CaseReport { pair: case.pair.clone(), ..CaseReport::default() };
     compare(&case.results, &now, &mut report);
@@ -547,8 +505,9 @@ fn compare(then: &[CaseResult], now: &[CaseResult], report: &mut CaseReport) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::infer::engine::EngineChoice;
     use crate::io::simulated::{Layout, write_pair, write_tools};
-    use crate::mask::MaskSource;
+    use crate::mask::{MaskChoice, MaskSource};
     use touch2touch_core::catalog;
     use touch2touch_core::label::Provenance;
     use touch2touch_core::rig::lab;
@@ -557,11 +516,11 @@ mod tests {
     fn setup(labels: PairLabels) -> CaseSetup {
         CaseSetup {
             pair: PairId(0),
-            generator: None,
-            shift: ShiftMode::default(),
-            mask: (MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }, None),
-            engine: RegistrationChoice::default(),
-            runtime: EngineChoice::Rten,
+            recipe: Recipe {
+                mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+                engine: EngineChoice::Rten,
+                ..Recipe::default()
+            },
             labels,
             view: Some(serde_json::json!({ "camera": "here" })),
         }

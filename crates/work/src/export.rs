@@ -229,7 +229,7 @@ pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, setup: &ExportSetup) -> Re
 }
 
 /// Makes the mask of a finger that has none by hand.
-pub type Automatic<'a> = &'a mut dyn FnMut(&Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
+pub type Automatic<'a> = &'a mut dyn FnMut(PairId, &Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
 
 /// Writes masks as [`plan`] says, and reads them back by the rules of their form. Without `automatic`, only masks
 /// drawn by hand can be written.
@@ -279,7 +279,7 @@ pub fn export_masks(
         let (mask, ignored) = match (by_hand, automatic.as_mut()) {
             (Some(hand), _) => ((*hand.mask).clone(), hand.unsaid(setup.choice.hand_checked)),
             (None, Some(automatic)) => {
-                let mask = automatic(&sample, entry.finger, entry.tool.as_deref())?;
+                let mask = automatic(plan.ids[at], &sample, entry.finger, entry.tool.as_deref())?;
                 let unsaid = setup.choice.hand_checked.then(|| mask.map(|_| true));
                 (mask, unsaid)
             }

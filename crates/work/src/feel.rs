@@ -8,14 +8,14 @@ use strum::IntoEnumIterator as _;
 use super::error::TaskError;
 use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
-use super::labels::{ImprintOf, ImprintSource, PairLabels};
+use super::labels::{ImprintOf, ImprintSource, MaskPlace, PairLabels};
 use super::mask::{Contact, MaskInputs, contact_mask};
 use super::models::Models;
 use super::pose::{PoseResult, pose};
-use super::predict::Generating;
 use super::prediction::Prediction;
 use super::recipe::{Recipe, Stage, no_mask_model};
 use crate::infer::mask::contact_of;
+use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use touch2touch_core::align::{Ask, Register};
 use touch2touch_core::dataset::PairId;
@@ -134,9 +134,7 @@ impl Felt {
             }
             match next {
                 Stage::Prediction if self.recipe.imprint == ImprintSource::Predicted => {
-                    let (bundle, config) = self.recipe.generator("Predict")?;
-                    let generating = Generating { bundle, engine: self.recipe.engine, config };
-                    self.predictions = Arc::new(generating.pair(models, sample, cx)?);
+                    self.predictions = Arc::new(self.recipe.generating()?.pair(models, sample, cx)?);
                 }
                 Stage::Prediction => {}
                 Stage::Imprint => {
@@ -157,6 +155,21 @@ impl Felt {
             self.reached = Some(next);
         }
         Ok(self)
+    }
+
+    /// Asks the mask model of the imprints now, so that masks by other choices need not: models run one at a time.
+    pub fn see(&mut self, touch: Touch<'_>, models: &Models) {
+        let Some(model) = &self.recipe.mask_model else { return };
+        let of = self.recipe.imprint_of();
+        for (pad, imprint) in self.imprints.entries() {
+            let place = MaskPlace { pad, of: of.clone() };
+            if self.recipe.hand && touch.labels.drawn(&place, imprint).is_some() {
+                continue;
+            }
+            // What fails here fails again, and is said, where the mask is asked for.
+            let found = caught(|| models.probability(model, self.recipe.engine, imprint));
+            self.probabilities[pad] = found.ok().and_then(Result::ok).map(Arc::new);
+        }
     }
 
     /// The pose by a registration that no recipe names, such as one with the traps of the lab's.
@@ -197,10 +210,18 @@ impl Felt {
                 let (map, own) = &*found;
                 Ok(contact_of(map, imprint, self.recipe.mask.probability.unwrap_or(*own)))
             };
-            masks[pad] = Some(contact_mask(&made_by, imprint, pad, inputs, unet)?);
+            let finger = || touch.sample.rig.pad_key(pad);
+            let found = contact_mask(&made_by, imprint, pad, inputs, unet);
+            let named = |err: TaskError| TaskError { why: format!("{} finger: {}", finger(), err.why), ..err };
+            masks[pad] = Some(found.map_err(named)?);
         }
         let model = self.recipe.mask_model.as_ref().map(|model| model.name.clone());
         Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
+    }
+
+    /// Whether it came to a stage.
+    pub fn has(&self, stage: Stage) -> bool {
+        self.reached >= Some(stage)
     }
 
     /// The recipe that it is by.

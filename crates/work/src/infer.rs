@@ -6,7 +6,7 @@
 //! * [`runtime`]: what was found of that library, and how it is fetched.
 //! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
 //!   from a depth map to a contact mask or to the tool that made it.
-//! * [`recipe`]: everything a generated result depends on; [`store`]: results on the disk, by recipe; [`sheets`]: small ones.
+//! * [`kept_key`]: everything a generated result depends on; [`store`]: results on the disk, by it; [`sheets`]: small ones.
 //!
 //! Without the feature `onnx` everything here compiles, bundles can be opened and checked, and running one is an
 //! error that says so.
@@ -15,10 +15,10 @@ pub mod bundle;
 pub mod classifier;
 pub mod engine;
 pub mod generator;
+pub mod kept_key;
 mod library;
 pub mod mask;
 mod onnx_header;
-pub mod recipe;
 pub mod runtime;
 pub mod sheets;
 pub mod store;

@@ -26,6 +26,7 @@ pub mod ensemble;
 pub mod error;
 pub mod evaluate;
 pub mod export;
+pub mod fan;
 pub mod feel;
 pub mod figure;
 pub mod filter;

@@ -125,6 +125,8 @@ impl MaskChoice {
     #[must_use]
     pub fn of_its_source(&self) -> Self {
         let Self { source, threshold_m, probability, top_percent, cad_distance_m } = *self;
+        // + 0.0 turns -0 into 0, which means the same.
+        let threshold_m = threshold_m + 0.0;
         let from = Self { source, ..Self::default() };
         match source {
             MaskSource::Auto => Self { threshold_m, probability, ..from },

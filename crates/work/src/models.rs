@@ -16,8 +16,8 @@ use super::prediction::{Chains, Prediction};
 use crate::infer::bundle::GeneratorSpec;
 use crate::infer::engine::{EngineChoice, EngineKind, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
+use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{MaskError, MaskModel};
-use crate::infer::recipe::{Recipe, input_digest};
 use crate::infer::sheets::Sheets;
 use crate::infer::store::{Inputs, Store};
 use crate::io::caught::caught;
@@ -137,6 +137,12 @@ impl Models {
         Self { store: self.store.as_ref().map(again).map(Mutex::new), sheets: self.sheets.clone(), ..Self::default() }
     }
 
+    /// Forgets everything that was loaded: a bug may have left it half changed.
+    pub fn forget(&self) {
+        *lock(&self.generator) = None;
+        *lock(&self.mask_model) = None;
+    }
+
     /// Sets what kept predictions may take, bytes.
     pub fn keep_at_most(&self, bytes: u64) {
         if let Some(store) = &self.store {
@@ -240,7 +246,7 @@ impl Models {
             let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
             let recipe = |(item, at): (&Wanted<'_>, &usize)| {
                 let config = GenerateConfig { seed: item.seed, ..*config };
-                Recipe::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
+                KeptKey::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
             };
             keys = wanted.iter().zip(&image).map(recipe).collect();
             let store = lock(store);

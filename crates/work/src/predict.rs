@@ -41,6 +41,48 @@ impl Generating<'_> {
         Ok(ends.map_err(|err| TaskError::from_error(what(), &err))?.input)
     }
 
+    /// What to say where no touch has a reading of the sensor that it starts from.
+    pub fn no_input(self, rig: &Rig) -> TaskError {
+        let sensor = self.input(rig).ok().and_then(|input| rig.sensor(input));
+        let name = sensor.map_or("GelSlim", |sensor| &sensor.name);
+        TaskError::new(format!("Generate with {}", self.bundle.name), format!("no {name} image"))
+    }
+
+    /// The picture of a pad that it starts from; `None` where the pad has no such reading.
+    ///
+    /// # Errors
+    /// As [`Self::input`].
+    pub fn picture(self, sample: &Sample, pad: PadId) -> Result<Option<Cow<'_, RgbGrid>>, TaskError> {
+        let input = self.input(&sample.rig)?;
+        Ok(sample.pad(pad).and_then(|touch| touch.picture(input)))
+    }
+
+    /// The predictions of a pad with several seeds.
+    ///
+    /// # Errors
+    /// If the pad has no picture to start from, or as [`Models::predict`].
+    pub fn seeds(
+        self,
+        models: &Models,
+        (sample, pad): (&Sample, PadId),
+        seeds: &[u64],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        let picture = self.picture(sample, pad)?.ok_or_else(|| self.no_input(&sample.rig))?;
+        let wanted = |&seed: &u64| Wanted { difference: &picture, seed, size: [0, 0] };
+        models.predict(self.bundle, self.engine, self.config, &seeds.iter().map(wanted).collect::<Vec<_>>(), cx)
+    }
+
+    /// The predictions of pictures that it starts from, in their order.
+    ///
+    /// # Errors
+    /// As [`Models::predict`].
+    pub fn of(self, models: &Models, pictures: &[Cow<'_, RgbGrid>], cx: &JobCx) -> Result<Vec<Prediction>, TaskError> {
+        let wanted = |difference| Wanted { difference, seed: self.config.seed, size: [0, 0] };
+        let wanted: Vec<_> = pictures.iter().map(|picture| wanted(&**picture)).collect();
+        models.predict(self.bundle, self.engine, self.config, &wanted, cx)
+    }
+
     fn pictures<'s>(self, samples: &[&'s Sample]) -> Result<Vec<Picture<'s>>, TaskError> {
         let mut found = Vec::new();
         for (at, sample) in samples.iter().enumerate() {

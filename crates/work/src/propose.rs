@@ -27,7 +27,7 @@ use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
 
 pub use batch::{Batch, BatchSetup, propose_all};
-pub use touch::{Proposals, ProposeSetup, Touch, propose};
+pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";
 

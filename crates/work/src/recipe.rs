@@ -13,6 +13,7 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::labels::{ImprintOf, ImprintSource};
 use super::mask::{MaskChoice, MaskRecipe, MaskSource};
+use super::predict::Generating;
 use crate::infer::engine::EngineChoice;
 use crate::io::digest::sha256;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
@@ -243,17 +244,19 @@ impl Recipe {
     pub fn imprint_of(&self) -> ImprintOf {
         match (self.imprint, &self.generator) {
             (ImprintSource::Predicted, Some((model, config))) => ImprintOf::predicted(&model.id, config, self.shift),
-            _ => ImprintOf::Measured,
+            (ImprintSource::Predicted, None) => ImprintOf::unknown(),
+            (ImprintSource::Measured, _) => ImprintOf::Measured,
         }
     }
 
-    /// The generator with its choices.
+    /// The generator with its choices and the engine.
     ///
     /// # Errors
     /// If there is none.
-    pub fn generator(&self, what: &str) -> Result<(&BundleInfo, &GenerateConfig), TaskError> {
-        let generator = self.generator.as_ref().map(|(model, config)| (&**model, config));
-        generator.ok_or_else(|| TaskError::new(what, "there is no generator to predict with"))
+    pub fn generating(&self) -> Result<Generating<'_>, TaskError> {
+        let generator = self.generator.as_ref();
+        let (model, config) = generator.ok_or_else(|| TaskError::new("Predict", "there is no generator"))?;
+        Ok(Generating { bundle: model, engine: self.engine, config })
     }
 
     /// The making of the masks that nobody drew.

@@ -8,38 +8,32 @@ mod dial;
 mod outcome;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
-use glam::DVec3;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::bundles::BundleInfo;
-use super::cloud::contact_points;
 use super::error::{Remark, TaskError};
-use super::imprint::{imprints_of, measured};
+use super::feel::{Felt, Touch};
+use super::imprint::measured;
 use super::job::JobCx;
-use super::labels::{ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels};
-use super::mask::{MaskInputs, MaskRecipe, contact_mask};
-use super::models::{Masking, Models};
-use super::pose::pose;
-use super::predict::{Generating, Predicted};
+use super::labels::{ImprintSource, Labels, PairLabels};
+use super::mask::MaskRecipe;
+use super::models::Models;
+use super::predict::Predicted;
 use super::prediction::Prediction;
+use super::recipe::{Recipe, Stage};
 use super::tool::load_tool;
-use crate::infer::engine::EngineChoice;
-use crate::infer::mask::contact_of;
 use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
-use touch2touch_core::align::Ask;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::{PairId, Problem};
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 
-pub use dial::{Dial, InForce, MOST_VALUES, Setting};
+pub use dial::{Dial, MOST_VALUES, Setting};
 pub use outcome::{Failure, Outcome, Point, Series, Summary};
 
 /// What it is called in errors.
@@ -54,16 +48,8 @@ pub struct SweepSetup {
     pub values: Vec<Setting>,
     /// The pairs.
     pub pairs: Vec<PairId>,
-    /// Mask, registration and shift as they are without the dial.
-    pub in_force: InForce,
-    /// The mask model, where there is one.
-    pub mask_model: Option<BundleInfo>,
-    /// The generator and its choices; `None` leaves the predictions out.
-    pub generator: Option<(BundleInfo, GenerateConfig)>,
-    /// Whether a mask drawn by hand is taken where there is one.
-    pub hand: bool,
-    /// The engine that runs the models.
-    pub engine: EngineChoice,
+    /// The recipe as it is without the dial, of either imprint; without a generator the predictions are left out.
+    pub recipe: Recipe,
 }
 
 /// What every value does to every pair.
@@ -77,8 +63,8 @@ pub struct Sweep {
     pub unit: &'static str,
     /// What the dial stands at without turning it; `None` where something else decides.
     pub at: Option<Setting>,
-    /// Mask, registration and shift besides.
-    pub in_force: InForce,
+    /// The recipe besides.
+    pub in_force: Recipe,
     /// The measured imprints and the predicted ones, as far as they are there.
     pub series: Vec<Series>,
     /// Pairs that have no pose whatever the dial says, and why.
@@ -99,22 +85,35 @@ struct Pair {
     name: String,
     tool: String,
     sample: Sample,
-    labels: Option<PairLabels>,
+    labels: PairLabels,
 }
 
 impl Pair {
+    fn outcome(&self, felt: &Felt) -> Outcome {
+        let (points, found) = (felt.points().map_or(0, Vec::len), felt.pose());
+        let answer = found.ok();
+        Outcome {
+            pair: self.id,
+            name: self.name.clone(),
+            truth: self.sample.grasp_from_object.is_some(),
+            angle_rad: answer.map(|found| found.angle_rad),
+            error_rad: answer.and_then(|found| found.error_rad),
+            change_rad: None,
+            rms_m: answer.map(|found| found.rms_m),
+            points,
+            hand: felt.contact().masks.iter().flatten().any(|found| found.basis == MaskBasis::Hand),
+            failure: match found {
+                Ok(_) => None,
+                Err(_) if felt.points().is_ok() && points == 0 => Some("no contact points".into()),
+                Err(err) => Some(err.why.clone()),
+            },
+        }
+    }
+
     fn failed(&self, why: String) -> Outcome {
         let truth = self.sample.grasp_from_object.is_some();
         Outcome { truth, ..Outcome::failed(self.id, self.name.clone(), why) }
     }
-}
-
-/// The imprints of a pair by one source under one shift, with the mask model's probabilities where they are needed.
-struct Felt {
-    /// What the imprints are, for masks that were drawn on them.
-    of: ImprintOf,
-    imprints: PerPad<DepthMap>,
-    probabilities: PerPad<Result<(Grid<f32>, f32), String>>,
 }
 
 /// A source of a pair's imprints: one for all values, or one for each where the dial is the shift.
@@ -124,7 +123,7 @@ struct Side {
 }
 
 /// The predictions of a pair, or why there are none.
-type Made = Result<PerPad<Prediction>, String>;
+type Made = Result<PerPad<Prediction>, TaskError>;
 
 /// Turns a dial over the pairs of `setup`. Predictions are taken from `models`, where they are kept too. Stops early when
 /// told to, with the pairs that were done.
@@ -148,10 +147,11 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         for pair in read {
             let usable = pair.and_then(|pair| {
                 let tool = tools.entry(pair.tool.clone());
-                let tool = tool.or_insert_with(|| load_tool(dataset, &pair.tool).map(|(tool, _)| tool));
+                let tool = tool.or_insert_with(|| load_tool(dataset, &pair.tool).map(|(tool, _)| Arc::new(tool)));
                 let why =
                     |err: &TaskError| Remark { name: pair.name.clone(), why: format!("{}: {}", err.what, err.why) };
-                tool.as_ref().map(drop).map_err(why).map(|()| pair)
+                let tool = tool.as_ref().map_err(why)?.clone();
+                Ok((pair, tool))
             });
             match usable {
                 Ok(pair) => pairs.push(pair),
@@ -164,15 +164,14 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
             .par_iter()
             .zip(sides)
             .filter(|_| !cx.cancel.is_cancelled())
-            .map(|(pair, sides)| {
-                let Some(Ok(tool)) = tools.get(&pair.tool) else { return Vec::new() };
-                sides.into_iter().map(|side| (side.source, job.outcomes(pair, tool, &side.felt))).collect()
+            .map(|((pair, tool), sides)| {
+                sides.into_iter().map(|side| (side.source, job.outcomes(pair, tool, &side))).collect()
             })
             .collect();
         if cx.cancel.is_cancelled() {
             break;
         }
-        for (pair, found) in pairs.iter().zip(found) {
+        for ((pair, _), found) in pairs.iter().zip(found) {
             if found.is_empty() {
                 let why = "it has neither a measured imprint nor a picture to predict one from".to_owned();
                 left_out.push(Remark { name: pair.name.clone(), why });
@@ -195,10 +194,10 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
     let hand = rows.values().flatten().filter(|row| row.iter().any(|outcome| outcome.hand)).count();
     let line = |p: &Problem| format!("{}: {} ({})", p.file.display(), p.what, p.hint);
     let mut notes: Vec<String> = dataset.problems.iter().map(line).collect();
-    if hand > 0 && setup.hand && matches!(job.dial, Dial::Threshold | Dial::Probability) {
+    if hand > 0 && setup.recipe.hand && matches!(job.dial, Dial::Threshold | Dial::Probability) {
         notes.push(format!("{hand} imprints have a mask that was drawn by hand, which this dial does not move"));
     }
-    if setup.generator.is_none() {
+    if setup.recipe.generator.is_none() {
         notes.push("no generator: the predictions are not in it".into());
     }
     let series = rows.into_iter().map(|(source, rows)| Series::new(source, rows, setup, job.at)).collect();
@@ -207,7 +206,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         dial: job.dial,
         unit: job.dial.unit(),
         at: job.at,
-        in_force: setup.in_force,
+        in_force: setup.recipe.clone(),
         series,
         pairs: posed,
         left_out,
@@ -227,10 +226,10 @@ struct Job<'a> {
     dial: Dial,
     /// Where it stands.
     at: Option<Setting>,
-    /// What is in force without the dial, then with each value.
-    turns: Vec<InForce>,
-    /// The mask recipe of each.
-    recipes: Vec<MaskRecipe>,
+    /// The recipe without the dial, then with each value.
+    turns: Vec<Recipe>,
+    /// Whether one of them asks the mask model.
+    sees: bool,
 }
 
 impl<'a> Job<'a> {
@@ -246,26 +245,26 @@ impl<'a> Job<'a> {
         if setup.pairs.is_empty() {
             return Err(fail("there are no pairs".into()));
         }
-        let model = setup.mask_model.as_ref();
+        let model = setup.recipe.mask_model.as_ref();
         if dial == Dial::Probability && model.is_none() {
             return Err(fail("no mask model was found, whose probability could be dialed".into()));
         }
-        if dial == Dial::Shift && setup.generator.is_none() {
+        if dial == Dial::Shift && setup.recipe.generator.is_none() {
             return Err(fail("a shift is of predictions, and there is no generator".into()));
         }
-        let mut turns = vec![setup.in_force];
+        let mut turns = vec![setup.recipe.clone()];
         for value in &setup.values {
-            turns.push(value.put(setup.in_force).map_err(fail)?);
+            turns.push(value.put(&setup.recipe).map_err(fail)?);
         }
-        let recipe = |turn: &InForce| Masking { choice: turn.mask, model, engine: setup.engine }.recipe();
-        let recipes = turns.iter().map(recipe).collect::<Result<Vec<_>, _>>()?;
+        let made_by = turns.iter().map(Recipe::mask_recipe).collect::<Result<Vec<_>, _>>()?;
         let own = match (dial, model) {
             (Dial::Probability, Some(model)) => Some(models.least_probability(model)?),
             _ => None,
         };
-        let at = dial.of(&setup.in_force, &recipes[0], own);
-        let labels = setup.hand.then(|| Labels::of(dataset));
-        Ok(Self { dataset, setup, models, cx, labels, dial, at, turns, recipes })
+        let at = dial.of(&setup.recipe, &made_by[0], own);
+        let sees = made_by.iter().any(|made_by| matches!(made_by, MaskRecipe::Unet(..)));
+        let labels = setup.recipe.hand.then(|| Labels::of(dataset));
+        Ok(Self { dataset, setup, models, cx, labels, dial, at, turns, sees })
     }
 
     fn read(&self, id: PairId) -> Result<Pair, Remark> {
@@ -280,56 +279,67 @@ impl<'a> Job<'a> {
         }
         let labels = self.labels.as_ref().map(|labels| labels.load(&entry.name)).transpose();
         let labels = labels.map_err(|err| remark(err.to_string()))?;
-        Ok(Pair { id, name: entry.name.clone(), tool, sample, labels })
+        Ok(Pair { id, name: entry.name.clone(), tool, sample, labels: labels.unwrap_or_default() })
+    }
+
+    fn touch<'t>(&'t self, pair: &'t Pair, tool: &'t ToolModel) -> Touch<'t> {
+        Touch { dataset: self.dataset, pair: pair.id, sample: &pair.sample, tool: Ok(tool), labels: &pair.labels }
     }
 
     /// The imprints of each pair. `None` once it was told to stop.
     ///
     /// # Errors
     /// If the generator cannot be used at all.
-    fn sides(&self, pairs: &[Pair]) -> Result<Option<Vec<Vec<Side>>>, TaskError> {
+    fn sides(&self, pairs: &[(Pair, Arc<ToolModel>)]) -> Result<Option<Vec<Vec<Side>>>, TaskError> {
         let mut predictions = self.predictions(pairs)?;
         let mut all = Vec::new();
-        for (at, pair) in pairs.iter().enumerate() {
+        for (at, (pair, tool)) in pairs.iter().enumerate() {
             if self.cx.cancel.is_cancelled() {
                 return Ok(None);
             }
             let mut sides = Vec::new();
-            let felt = measured(&pair.sample);
             // A shift is of predictions alone.
-            if self.dial != Dial::Shift && felt.iter().flatten().next().is_some() {
-                sides.push(Side {
-                    source: ImprintSource::Measured,
-                    felt: vec![Ok(self.felt(pair, ImprintOf::Measured, felt))],
-                });
+            if self.dial != Dial::Shift && !measured(&pair.sample).is_empty() {
+                let source = ImprintSource::Measured;
+                let felt = self.imprints(pair, tool, Felt::new(&self.turns[0].of(source)));
+                sides.push(Side { source, felt: vec![felt] });
             }
             if let Some(made) = predictions.get_mut(at).and_then(Option::take) {
+                let source = ImprintSource::Predicted;
                 let turns = if self.dial == Dial::Shift { &self.turns[..] } else { &self.turns[..1] };
-                let felt = |turn: &InForce| {
-                    let made = made.as_ref().map_err(Clone::clone)?;
-                    let imprints = imprints_of(made, turn.shift, &pair.sample);
-                    let imprints = imprints.map_err(|err| format!("{}: {}", err.what, err.why))?;
-                    let of = self.setup.generator.as_ref();
-                    let of = of.map(|(bundle, config)| ImprintOf::predicted(&bundle.id, config, turn.shift));
-                    Ok(self.felt(pair, of.unwrap_or_default(), imprints))
+                let felt = |turn: &Recipe| {
+                    let made = made.clone().map_err(|err| err.why)?;
+                    self.imprints(pair, tool, Felt::of_predictions(&turn.of(source), made))
                 };
-                sides.push(Side { source: ImprintSource::Predicted, felt: turns.iter().map(felt).collect() });
+                sides.push(Side { source, felt: turns.iter().map(felt).collect() });
             }
             all.push(sides);
         }
         Ok(Some(all))
     }
 
+    /// The imprints, with the mask model's word on them if any value asks for it.
+    fn imprints(&self, pair: &Pair, tool: &ToolModel, felt: Felt) -> Result<Felt, String> {
+        let touch = self.touch(pair, tool);
+        let felt = felt.reach(touch, Stage::Imprint, self.models, &self.cx.quiet());
+        let mut felt = felt.map_err(|err| format!("{}: {}", err.what, err.why))?;
+        if self.sees {
+            felt.see(touch, self.models);
+        }
+        Ok(felt)
+    }
+
     /// The predictions of each pair, or why there are none; `None` where there is nothing to start from.
-    fn predictions(&self, pairs: &[Pair]) -> Result<Vec<Option<Made>>, TaskError> {
-        let Some((bundle, config)) = &self.setup.generator else { return Ok(Vec::new()) };
-        let generating = Generating { bundle, engine: self.setup.engine, config };
-        let samples: Vec<&Sample> = pairs.iter().map(|pair| &pair.sample).collect();
-        let made = generating.pairs(self.models, &samples, &self.cx.quiet())?;
+    fn predictions(&self, pairs: &[(Pair, Arc<ToolModel>)]) -> Result<Vec<Option<Made>>, TaskError> {
+        if self.setup.recipe.generator.is_none() {
+            return Ok(Vec::new());
+        }
+        let samples: Vec<&Sample> = pairs.iter().map(|(pair, _)| &pair.sample).collect();
+        let made = self.setup.recipe.generating()?.pairs(self.models, &samples, &self.cx.quiet())?;
         let one = |made: Predicted| {
             let mut pads = PerPad::default();
             for (at, made) in made.into_iter().enumerate() {
-                pads[PadId::new(at)] = made.transpose().map_err(|err| err.why)?;
+                pads[PadId::new(at)] = made.transpose()?;
             }
             Ok(pads)
         };
@@ -337,102 +347,33 @@ impl<'a> Job<'a> {
         Ok(made.map(|made| (!made.is_empty()).then(|| one(made))).collect())
     }
 
-    /// Imprints with the mask model's word on those whose mask nobody drew, if any value asks for it.
-    fn felt(&self, pair: &Pair, of: ImprintOf, imprints: PerPad<DepthMap>) -> Felt {
-        let mut probabilities = PerPad::default();
-        let asked = self.recipes.iter().any(|recipe| matches!(recipe, MaskRecipe::Unet(..)));
-        if let Some(model) = self.setup.mask_model.as_ref().filter(|_| asked) {
-            for (pad, imprint) in imprints.entries() {
-                let place = MaskPlace { pad, of: of.clone() };
-                if pair.labels.as_ref().is_none_or(|labels| labels.drawn(&place, imprint).is_none()) {
-                    let found = caught(|| self.models.probability(model, self.setup.engine, imprint));
-                    probabilities[pad] = Some(found.and_then(|found| found.map_err(|err| err.why)));
-                }
-            }
-        }
-        Felt { of, imprints, probabilities }
-    }
-
     /// The pose of a pair without the dial, and with each value.
-    fn outcomes(&self, pair: &Pair, tool: &ToolModel, felt: &[Result<Felt, String>]) -> Vec<Outcome> {
+    fn outcomes(&self, pair: &Pair, tool: &ToolModel, side: &Side) -> Vec<Outcome> {
         let bug =
             |message: String| format!("an internal error, which is a bug: {message}; please report it with this pair");
-        let points = |at: usize| {
-            let felt = felt.get(at).or(felt.first()).ok_or("there is no imprint")?;
-            let felt = felt.as_ref().map_err(Clone::clone)?;
-            caught(|| self.points(pair, tool, felt, at)).unwrap_or_else(|message| Err(bug(message)))
-        };
-        // A gate does not move a contact point.
-        let once = matches!(self.dial, Dial::Gate | Dial::Trim).then(|| points(0));
-        let mut all: Vec<Outcome> = Vec::with_capacity(self.turns.len());
+        let (touch, mut all) = (self.touch(pair, tool), Vec::<Outcome>::with_capacity(self.turns.len()));
+        // What a value does not move is made once.
+        let mut before: Option<Felt> = None;
         for (at, turn) in self.turns.iter().enumerate() {
-            let same = self.turns[..at].iter().position(|earlier| earlier == turn);
-            let outcome = match same {
-                Some(same) => all[same].clone(),
-                None => {
-                    let points = once.clone().unwrap_or_else(|| points(at));
-                    let found = caught(|| self.outcome(pair, tool, turn, points));
-                    found.unwrap_or_else(|message| pair.failed(bug(message)))
-                }
+            if let Some(same) = self.turns[..at].iter().position(|earlier| earlier == turn) {
+                all.push(all[same].clone());
+                continue;
+            }
+            let outcome = || -> Result<Felt, String> {
+                let imprints = side.felt.get(at).or(side.felt.first()).ok_or("there is no imprint")?;
+                let imprints = imprints.as_ref().map_err(Clone::clone)?;
+                let turn = turn.of(side.source);
+                let known = before.as_ref().map(|before| before.again(&turn));
+                let felt = known.filter(|known| known.has(Stage::Mask)).unwrap_or_else(|| imprints.again(&turn));
+                let felt = felt.reach(touch, Stage::Pose, self.models, &self.cx.quiet());
+                felt.map_err(|err| err.why)
             };
-            all.push(outcome);
+            let felt = caught(outcome).unwrap_or_else(|message| Err(bug(message)));
+            all.push(felt.as_ref().map_or_else(|why| pair.failed(why.clone()), |felt| pair.outcome(felt)));
+            before = felt.ok().or(before);
         }
         let base = all[0].angle_rad;
         all.iter_mut().for_each(|outcome| outcome.set_change(base));
         all
-    }
-
-    /// The contact points of a pair with one value, and whether a mask behind them was drawn by hand.
-    fn points(&self, pair: &Pair, tool: &ToolModel, felt: &Felt, at: usize) -> Result<(Vec<DVec3>, bool), String> {
-        let (recipe, choice) = (&self.recipes[at], self.turns[at].mask);
-        let labels = pair.labels.as_ref();
-        let inputs = MaskInputs { sample: &pair.sample, tool: Some(tool), labels, of: Some(&felt.of) };
-        let (mut masks, mut hand): (PerPad<Mask>, bool) = (PerPad::default(), false);
-        for (pad, imprint) in felt.imprints.entries() {
-            let unet = |imprint: &DepthMap| match &felt.probabilities[pad] {
-                Some(Ok((map, own))) => Ok(contact_of(map, imprint, choice.probability.unwrap_or(*own))),
-                Some(Err(why)) => Err(TaskError::new(WHAT, why)),
-                None => Err(TaskError::new(WHAT, "the mask model is needed")),
-            };
-            let finger = pair.sample.rig.pad_key(pad);
-            let found = contact_mask(recipe, imprint, pad, inputs, unet)
-                .map_err(|err| format!("{finger} finger: contact mask: {}", err.why))?;
-            hand |= found.basis == MaskBasis::Hand;
-            masks[pad] = Some(found.mask);
-        }
-        let points = contact_points(&pair.sample, &felt.imprints.as_ref(), &masks.as_ref());
-        Ok((points.map_err(|err| err.why)?, hand))
-    }
-
-    fn outcome(
-        &self,
-        pair: &Pair,
-        tool: &ToolModel,
-        turn: &InForce,
-        points: Result<(Vec<DVec3>, bool), String>,
-    ) -> Outcome {
-        let truth = pair.sample.grasp_from_object;
-        let (points, hand) = match points {
-            Ok(found) => found,
-            Err(why) => return pair.failed(why),
-        };
-        let found = pose(&points, tool, &*turn.registration.method(), Ask::default(), truth);
-        let answer = found.as_ref().ok();
-        Outcome {
-            pair: pair.id,
-            name: pair.name.clone(),
-            truth: truth.is_some(),
-            angle_rad: answer.map(|found| found.angle_rad),
-            error_rad: answer.and_then(|found| found.error_rad),
-            change_rad: None,
-            rms_m: answer.map(|found| found.rms_m),
-            points: points.len(),
-            hand,
-            failure: match &found {
-                Ok(_) => None,
-                Err(_) if points.is_empty() => Some("no contact points".into()),
-                Err(err) => Some(err.why.clone()),
-            },
-        }
     }
 }

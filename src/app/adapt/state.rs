@@ -10,6 +10,8 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::job::Curve;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::recipe::Recipe;
 
 /// Parts in which pairs are left out in turn.
 const FOLDS: usize = 3;
@@ -96,13 +98,12 @@ impl State {
     pub fn adapt_setup(&self) -> Option<AdaptSetup> {
         let bundle = self.to_be_fitted()?.clone();
         self.can_adapt().then(|| AdaptSetup {
-            config: self.settings.generate.config(&bundle),
-            bundle,
-            engine: self.settings.runtime,
+            recipe: Recipe {
+                generator: Some((bundle.clone().into(), self.settings.generate.config(&bundle))),
+                ..self.in_force(ImprintSource::Predicted)
+            },
             pairs: self.adapt_pairs().collect(),
             folds: FOLDS,
-            mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
-            registration: self.settings.pose_engine,
             tuning: self.adapt.tune.then_some(Tuning::Steps(self.adapt.steps)),
             unfinished: None,
             out: None,

@@ -5,9 +5,10 @@ use std::sync::Arc;
 use super::super::state::State;
 use super::super::tasks::state::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pairs;
-use touch2touch_work::sweep::{Dial, InForce, Setting, Sweep, SweepSetup};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::sweep::{Dial, Setting, Sweep, SweepSetup};
 
 /// Over which pairs a dial is turned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -70,9 +71,10 @@ impl Default for DialState {
 }
 
 impl State {
-    /// What decides poses now besides models and pair.
-    pub fn in_force(&self) -> InForce {
-        InForce { mask: self.settings.mask.choice, registration: self.settings.pose_engine, shift: self.settings.shift }
+    /// The recipe that the dial changes; without a generator where the predictions are left out.
+    pub fn dial_recipe(&self) -> Recipe {
+        let recipe = self.in_force(ImprintSource::Measured);
+        Recipe { generator: recipe.generator.filter(|_| self.dial.predictions), ..recipe }
     }
 
     /// The pairs that a dial turned now would go over.
@@ -90,35 +92,25 @@ impl State {
     /// # Errors
     /// Why it cannot be turned, in words.
     pub fn sweep_setup(&self) -> Result<SweepSetup, String> {
-        let DialState { dial, range: [first, last], count, predictions, .. } = self.dial;
+        let DialState { dial, range: [first, last], count, .. } = self.dial;
         if self.library.open.is_none() {
             return Err("No data set is open".into());
         }
-        let (values, in_force) = (dial.spread(first, last, count)?, self.in_force());
+        let (values, recipe) = (dial.spread(first, last, count)?, self.dial_recipe());
         for value in &values {
-            value.put(in_force)?;
+            value.put(&recipe)?;
         }
         let pairs = self.dial_pairs();
         if pairs.is_empty() {
             return Err("There are no pairs to turn it over".into());
         }
-        let mask_model = self.bundle(BundleKind::Mask).ok().cloned();
-        if dial == Dial::Probability && mask_model.is_none() {
+        if dial == Dial::Probability && recipe.mask_model.is_none() {
             return Err("There is no mask model".into());
         }
-        let generator = self.bundle(BundleKind::Generator).ok().filter(|_| predictions);
-        if dial == Dial::Shift && generator.is_none() {
+        if dial == Dial::Shift && recipe.generator.is_none() {
             return Err("A shift is of predictions, and they are left out".into());
         }
-        Ok(SweepSetup {
-            values,
-            pairs,
-            in_force,
-            mask_model,
-            generator: generator.map(|bundle| (bundle.clone(), self.settings.generate.config(bundle))),
-            hand: true,
-            engine: self.settings.runtime,
-        })
+        Ok(SweepSetup { values, pairs, recipe })
     }
 
     /// The turn under way.
@@ -129,15 +121,15 @@ impl State {
 
     /// Whether a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.
     pub fn is_dialed(&self, value: Setting, at: bool) -> bool {
-        let now = self.in_force();
-        let then = self.dial.result.as_ref().map(|result| result.in_force);
-        value.put(now) == Ok(now) || (at && then == Some(now))
+        let now = self.dial_recipe();
+        let then = self.dial.result.as_ref().map(|result| &result.in_force);
+        value.put(&now).as_ref() == Ok(&now) || (at && then == Some(&now))
     }
 
     /// Whether something other than the dial was changed since it was turned.
     pub fn is_dial_outdated(&self) -> bool {
         let Some(result) = &self.dial.result else { return false };
         let value = result.series.first().and_then(|series| series.points.first()?.value);
-        value.is_some_and(|value| value.put(self.in_force()) != value.put(result.in_force))
+        value.is_some_and(|value| value.put(&self.dial_recipe()) != value.put(&result.in_force))
     }
 }

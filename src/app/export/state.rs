@@ -16,8 +16,8 @@ use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::case::{CaseModel, CaseSetup};
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::ExportChoice;
@@ -27,6 +27,7 @@ use touch2touch_work::io::case_file;
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
 use touch2touch_work::pose::PoseResult;
+use touch2touch_work::recipe::{ModelName, Recipe};
 use touch2touch_work::tool::NamedTool;
 
 /// Pairs of the list that a figure may take.
@@ -116,7 +117,7 @@ impl State {
         let case = self.library.open.as_ref().and_then(|open| open.source.case());
         // Which models are here is not known at once.
         let Some((_, case, _)) = case.filter(|_| !self.export.predict) else { return Vec::new() };
-        let lacks = |model: &&CaseModel| self.library.bundle(&model.id).is_none();
+        let lacks = |model: &&ModelName| self.library.bundle(&model.id).is_none();
         let generator = case.recipe.generator.as_ref().map(|(model, _)| model);
         let imprints = generator.filter(lacks).map(|model| {
             let name = &model.name;
@@ -366,7 +367,7 @@ impl State {
     pub fn case_setup(&self, camera: &str) -> Option<CaseSetup> {
         let pair = self.selection.pair?;
         let chosen = self.chosen(self.selection.finger).or_else(|| self.rig().pads().find_map(|pad| self.chosen(pad)));
-        let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone(), key.config())));
+        let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone().into(), key.config())));
         // What is of the person stays with the person.
         let settings = self.settings.clone().of_person(&Settings::default());
         let view = CaseView {
@@ -377,11 +378,7 @@ impl State {
         };
         Some(CaseSetup {
             pair,
-            generator,
-            shift: self.settings.shift,
-            mask: (self.settings.mask.choice, self.bundle(BundleKind::Mask).ok().cloned()),
-            engine: self.settings.pose_engine,
-            runtime: self.settings.runtime,
+            recipe: Recipe { generator, ..self.in_force(ImprintSource::Measured) },
             labels: self.document.pair(self.pair_name()).cloned().unwrap_or_default(),
             view: serde_json::to_value(view).ok(),
         })

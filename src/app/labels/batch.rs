@@ -20,23 +20,11 @@ impl State {
     /// What proposing masks for the listed pairs does.
     fn batch_setup(&self) -> BatchSetup {
         let imprint = self.worked_on(self.selection.finger);
-        let generator = self.bundle(BundleKind::Generator).ok().filter(|_| imprint == ImprintSource::Predicted);
         let mask = &self.settings.mask;
+        let recipe = self.in_force(imprint);
         BatchSetup {
-            propose: ProposeSetup {
-                source: mask.proposal,
-                imprint,
-                mask: mask.choice,
-                mask_model: self.bundle(BundleKind::Mask).ok().cloned(),
-                engine: self.settings.runtime,
-                registration: self.settings.pose_engine,
-                hand: true,
-                pose: None,
-                carry_from: None,
-            },
+            propose: ProposeSetup { source: mask.proposal, recipe, pose: None, carry_from: None },
             pairs: self.library.order.clone(),
-            generator: generator.map(|bundle| (bundle.clone(), self.settings.generate.config(bundle))),
-            shift: self.settings.shift,
             over_hand: mask.over_hand,
             person: self.known_person(),
         }

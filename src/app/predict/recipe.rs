@@ -5,6 +5,7 @@ use super::super::state::{Absent, State};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::recipe::{Model, Recipe};
 
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.
@@ -12,6 +13,21 @@ impl State {
         let bundle = self.bundle(BundleKind::Generator).ok()?;
         let config = self.settings.generate.config(bundle);
         Some(PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config))
+    }
+
+    /// The recipe that the settings give, of an imprint.
+    pub fn in_force(&self, imprint: ImprintSource) -> Recipe {
+        let generator = self.bundle(BundleKind::Generator).ok();
+        Recipe {
+            imprint,
+            generator: generator.map(|bundle| (bundle.clone().into(), self.settings.generate.config(bundle))),
+            shift: self.settings.shift,
+            mask: self.settings.mask.choice,
+            mask_model: self.bundle(BundleKind::Mask).ok().cloned().map(Model::from),
+            hand: true,
+            registration: self.settings.pose_engine,
+            engine: self.settings.runtime,
+        }
     }
 
     /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or

@@ -11,7 +11,7 @@ use strum::IntoEnumIterator as _;
 use self::kinds::{Kind, Set, kinds};
 use super::Machine;
 use crate::headless::args::JsonArgs;
-use crate::headless::predict::RuntimeArg;
+use crate::headless::recipe::RuntimeArg;
 use crate::headless::{Output, VerbResult};
 use touch2touch_core::catalog::{ToolSpec, tools};
 use touch2touch_core::doubt::{Doubt, Felt, judge};

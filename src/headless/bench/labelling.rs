@@ -12,7 +12,7 @@ use super::Machine;
 use super::figures::quantile;
 use super::generator::cases::{Case, simulate};
 use crate::headless::args::JsonArgs;
-use crate::headless::predict::{ModelArgs, Predictor};
+use crate::headless::recipe::ModelArgs;
 use crate::headless::{Output, VerbResult};
 use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
@@ -21,13 +21,15 @@ use touch2touch_core::label::{CadPose, DrawTool, Drawing, Ground, Paint, Provena
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::{PadId, PerPad, Rig, lab};
 use touch2touch_work::cloud::{clouds, contact_points};
+use touch2touch_work::imprint::{imprints_of, measured};
 use touch2touch_work::influence::influence;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{HandMask, ImprintSource};
 use touch2touch_work::mask::{MaskChoice, MaskInputs, MaskSource};
-use touch2touch_work::models::Masking;
+use touch2touch_work::models::{Masking, Models};
 use touch2touch_work::pose::pose;
 use touch2touch_work::propose::{self, Side};
+use touch2touch_work::recipe::Recipe;
 
 /// Moves of the pointer in a stroke.
 const MOVES: usize = 60;
@@ -151,19 +153,27 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
         &[ImprintSource::Measured, ImprintSource::Predicted]
     };
     let output = Output::new(args.json.common(), "proposing", cases.len() * imprints.len());
-    let mut predictor = Predictor::new(&args.model, &Rig::lab());
+    let (rig, models) = (Rig::lab(), args.model.models());
     let (mut rows, mut persons) = (Vec::new(), Persons::default());
     for &imprint in imprints {
+        let recipe = args.model.recipe(imprint, &rig)?;
+        let recipe = Recipe { mask_model: args.model.mask_model(false, &rig)?, ..recipe };
         let mut found: Vec<Found> = Vec::new();
         for (at, case) in cases.iter().enumerate() {
             output.step(&case.name);
-            let imprints = predictor.imprints(&case.sample, imprint, &JobCx::unwatched())?;
+            let imprints = match imprint {
+                ImprintSource::Measured => measured(&case.sample),
+                ImprintSource::Predicted => {
+                    let made = recipe.generating()?.pair(&models, &case.sample, &JobCx::unwatched())?;
+                    imprints_of(&made, recipe.shift, &case.sample)?
+                }
+            };
             // What is carried comes from the grasp of the same tool before, else from the next one.
             let same = |from: &&Case| std::sync::Arc::ptr_eq(&from.tool, &case.tool);
             let from = cases[..at].iter().rev().find(same).or_else(|| cases[at + 1..].iter().find(same));
             let truth = true_masks(case)?;
             let true_pose = registered(case, &imprints, &truth);
-            let proposed = proposals(&mut predictor, case, from, (imprint, &imprints), &truth)?;
+            let proposed = proposals((&recipe, &models), case, from, (imprint, &imprints), &truth)?;
             if imprint == ImprintSource::Measured {
                 persons.correct(&proposed, &imprints, &truth, args.simulation_seed);
             }
@@ -277,7 +287,7 @@ type Proposed = (&'static str, PerPad<Mask>, f64);
 
 /// What each source proposes for a grasp, with the milliseconds that a finger took.
 fn proposals(
-    predictor: &mut Predictor,
+    (recipe, models): (&Recipe, &Models),
     case: &Case,
     from: Option<&Case>,
     (of, imprints): (ImprintSource, &PerPad<DepthMap>),
@@ -301,12 +311,10 @@ fn proposals(
         ("mask model", MaskSource::Unet),
     ] {
         let choice = MaskChoice { source, ..MaskChoice::default() };
-        let model = predictor.mask_model(&choice)?;
-        let engine = predictor.engine();
         let inputs = MaskInputs { sample: &case.sample, tool: None, labels: None, of: None };
         by_model = each(name, &mut |pad, imprint| {
-            let by = Masking { choice, model: model.as_ref(), engine };
-            Ok(predictor.models().contact_mask(by, imprint, pad, inputs)?.mask)
+            let by = Masking { choice, model: recipe.mask_model.as_deref(), engine: recipe.engine };
+            Ok(models.contact_mask(by, imprint, pad, inputs)?.mask)
         })?;
     }
     let within_m = MaskChoice::default().cad_distance_m;

@@ -8,7 +8,7 @@ use strum::IntoEnumIterator as _;
 use super::super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::pose::parse_start;
-use super::super::predict::ModelArgs;
+use super::super::recipe::ModelArgs;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanKind, CleanUp, Drawing};

@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::predict::{ModelArgs, Predictor};
+use super::super::recipe::ModelArgs;
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use touch2touch_core::dataset::{PairEntry, PairId};
 use touch2touch_core::pose::RegistrationChoice;
@@ -67,31 +67,19 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
     }
     let pairs: Vec<PairId> = args.limit.spread(meant.len()).into_iter().map(|at| PairId(meant[at])).collect();
     let output = Output::new(args.common, "proposing", pairs.len());
-    let mut predictor = Predictor::new(&args.model, &dataset.rig);
-    let choice = args.mask.choice();
-    let generator = match args.imprint {
-        ImprintSource::Measured => None,
-        ImprintSource::Predicted => Some((predictor.bundle()?.clone(), predictor.config()?)),
-    };
+    let models = args.model.models();
     let setup = BatchSetup {
         propose: ProposeSetup {
             source: args.source,
-            imprint: args.imprint,
-            mask: choice,
-            mask_model: predictor.mask_model(&choice)?,
-            engine: predictor.engine(),
-            registration: args.engine,
-            hand: !args.mask.no_hand,
+            recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?,
             pose: None,
             carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
         },
         pairs,
-        generator,
-        shift: predictor.shift(),
         over_hand: args.over_hand,
         person: args.person.clone(),
     };
-    let found = propose_all(&dataset, &setup, predictor.models(), &output.job())?;
+    let found = propose_all(&dataset, &setup, &models, &output.job())?;
     for remark in &found.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }

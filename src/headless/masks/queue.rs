@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::predict::{MappingArgs, RuntimeArg};
+use super::super::recipe::{MappingArgs, RuntimeArg};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Figure;
 use touch2touch_core::pose::RegistrationChoice;

@@ -7,7 +7,7 @@ use std::time::Duration;
 use clap::Args;
 
 use super::super::args::{DatasetArgs, parse_minutes};
-use super::super::predict::RuntimeArg;
+use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::export::HandMasks;

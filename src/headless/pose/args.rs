@@ -8,12 +8,15 @@ use strum::IntoEnumIterator as _;
 
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser};
 use super::super::contact_mask::MaskArgs;
-use super::super::predict::ModelArgs;
+use super::super::recipe::ModelArgs;
 use super::super::seeds::{FanArgs, SeedArgs};
 use super::super::{Common, ToolArgs};
 use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::rig::Rig;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::recipe::Recipe;
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]
@@ -130,6 +133,17 @@ pub(super) fn parse_trap(text: &str) -> Result<PaperTrap, String> {
         let names: Vec<&'static str> = PaperTrap::iter().map(Into::into).collect();
         format!("the traps are {}", names.join(", "))
     })
+}
+
+impl PoseArgs {
+    /// The recipe of the predicted imprints if they are asked for, else of the measured ones; with the first registration.
+    pub(in crate::headless) fn recipe(&self, rig: &Rig) -> anyhow::Result<Recipe> {
+        let imprint = match self.imprint {
+            Imprints::Measured => ImprintSource::Measured,
+            Imprints::Predicted | Imprints::Both => ImprintSource::Predicted,
+        };
+        self.model.posed(imprint, rig, &self.mask, self.engine.0[0])
+    }
 }
 
 /// The registration as the arguments want it.

@@ -8,30 +8,31 @@ use std::time::{Instant, SystemTime};
 use serde_json::Value;
 
 use super::super::output::says;
-use super::super::predict::Predictor;
+use super::super::recipe::{misgiving, warm_up};
 use super::done::{Done, PoseMetrics, figures};
 use super::summary::Latency;
 use super::{Source, WatchArgs, recipe, write};
-use touch2touch_core::align::Ask;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel};
-use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::compare;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::io::dataset::{Dataset, read_in_meters};
 use touch2touch_work::io::follow::Ready;
 use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::labels::{ImprintSource, PairLabels};
-use touch2touch_work::mask::{Contact, MaskInputs};
-use touch2touch_work::pose;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_work::models::Models;
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::{load_tool, named_tool};
 
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {
     args: &'a WatchArgs,
-    predictor: Predictor,
-    engine: RegistrationChoice,
-    tools: BTreeMap<String, ToolModel>,
+    recipe: Recipe,
+    models: Models,
+    tools: BTreeMap<String, Arc<ToolModel>>,
     stop: Cancel,
     /// Seconds that loading and the first run took.
     pub warm_s: f64,
@@ -39,20 +40,21 @@ pub(super) struct Worker<'a> {
 
 impl<'a> Worker<'a> {
     /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
-    pub(super) fn new(args: &'a WatchArgs, mut predictor: Predictor, stop: Cancel) -> anyhow::Result<Self> {
-        let engine = match args.engine.0.as_slice() {
-            [engine] => *engine,
+    pub(super) fn new(args: &'a WatchArgs, rig: &Rig, stop: Cancel) -> anyhow::Result<Self> {
+        let registration = match args.engine.0.as_slice() {
+            [registration] => *registration,
             _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
         };
-        let start = Instant::now();
-        predictor.warm_up(&args.mask.choice())?;
+        let recipe = args.model.posed(ImprintSource::Predicted, rig, &args.mask, registration)?;
+        let (models, start) = (args.model.models(), Instant::now());
+        warm_up(&recipe, &models)?;
         let warm_s = start.elapsed().as_secs_f64();
-        Ok(Self { args, predictor, engine, tools: BTreeMap::new(), stop, warm_s })
+        Ok(Self { args, recipe, models, tools: BTreeMap::new(), stop, warm_s })
     }
 
     /// After a bug: the models are loaded anew for the next touch.
-    pub(super) fn recover(&mut self) {
-        self.predictor.recover();
+    pub(super) fn recover(&self) {
+        self.models.forget();
     }
 
     /// The tool of a touch: what the command line says, else what the file's name says.
@@ -61,17 +63,8 @@ impl<'a> Worker<'a> {
     }
 
     /// Everything the result depends on besides the touch.
-    pub(super) fn recipe(&mut self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
-        recipe::recipe(self.args, &mut self.predictor, self.engine, tool, labels)
-    }
-
-    /// The CAD model of a tool, from memory; one that was not there is looked for again.
-    fn tool(&mut self, dataset: &Dataset, name: &str) -> Result<&ToolModel, String> {
-        if !self.tools.contains_key(name) {
-            let model = tool_model(dataset, name, self.args).map_err(|err| says(&err))?;
-            self.tools.insert(name.to_owned(), model);
-        }
-        self.tools.get(name).ok_or_else(|| format!("no CAD model of {name}"))
+    pub(super) fn recipe(&self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
+        recipe::told(self.args, &self.recipe, tool, labels)
     }
 
     /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
@@ -94,40 +87,48 @@ impl<'a> Worker<'a> {
         let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
 
         let step = Instant::now();
-        let Some(drawn) = self.predictions(sample)? else { return Ok(None) };
-        let imprints = self.predictor.in_meters(sample, &drawn)?;
+        let tool = self.tool_of(dataset, sample, tool);
+        let model = tool.as_ref().map(|(_, model)| &**model);
+        let touch = Touch { dataset, pair: ready.id, sample, tool: model, labels };
+        let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
+        let felt = match feel(touch, &self.recipe, Stage::Imprint, &self.models, &cx) {
+            Err(_) if self.stop.is_cancelled() => return Ok(None),
+            Ok(felt) if felt.predictions.is_empty() => {
+                return Err(self.recipe.generating()?.no_input(&sample.rig).into());
+            }
+            felt => felt?,
+        };
         latency.generate = ms(step);
         let step = Instant::now();
-        let of = self.predictor.of(ImprintSource::Predicted)?;
-        let inputs = MaskInputs { sample, tool: None, labels: self.args.mask.drawn(labels), of: Some(&of) };
-        let contact = self.predictor.contact(&self.args.mask, imprints, inputs)?;
+        let felt = felt.reach(touch, Stage::Mask, &self.models, &cx)?;
         latency.mask = ms(step);
         let step = Instant::now();
-        let (pose, no_pose) = match self.pose(dataset, sample, tool, &contact) {
-            Ok(pose) => (Some(pose), None),
-            Err(why) => (None, Some(why)),
+        let felt = felt.reach(touch, Stage::Pose, &self.models, &cx)?;
+        let (pose, no_pose) = match (&tool, felt.pose()) {
+            (Ok((name, _)), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
+            (Err(err), _) | (_, Err(err)) => (None, Some(err.why.clone())),
         };
+        let (contact, shift) = (felt.contact(), self.recipe.shift);
         latency.pose = ms(step);
 
         let step = Instant::now();
-        let files = write::predictions(stem, &sample.rig, &contact, &self.args.save)?;
+        let files = write::predictions(stem, &sample.rig, contact, &self.args.save)?;
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
         let tile = compare::tile_of(dataset, ready.id, sample)?;
-        let shift = self.predictor.shift();
-        let drawn = |pad: PadId| Some((drawn[pad].as_ref()?, shift));
+        let drawn = |pad: PadId| Some((felt.predictions[pad].as_ref()?, shift));
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),
             recipe: recipe.clone(),
             files,
-            notes: sample.notes.iter().cloned().chain(self.predictor.misgiving(sample)?).collect(),
+            notes: sample.notes.iter().cloned().chain(misgiving(&self.recipe, sample)).collect(),
             scale: sample.scale.key(),
             mask_notes: contact.notes(&sample.rig),
             fingers: sample
                 .rig
                 .pads()
-                .filter_map(|pad| figures(sample, pad, &contact, drawn(pad), tile.as_ref()))
+                .filter_map(|pad| figures(sample, pad, contact, drawn(pad), tile.as_ref()))
                 .collect(),
             pose,
             no_pose,
@@ -141,46 +142,42 @@ impl<'a> Worker<'a> {
         Ok(Some(done))
     }
 
-    /// Predictions of the fingers that have a GelSlim image; `None` if told to stop.
-    fn predictions(&mut self, sample: &Sample) -> anyhow::Result<Option<PerPad<Prediction>>> {
-        let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        match self.predictor.predictions(sample, &cx) {
-            Err(_) if self.stop.is_cancelled() => Ok(None),
-            Ok(made) if made.is_empty() => Err(self.predictor.no_condition()),
-            made => made.map(Some),
-        }
-    }
-
-    /// The pose, or why there is none.
-    fn pose(
+    /// The name and the CAD model of a touch's tool, or why it has no pose.
+    fn tool_of(
         &mut self,
         dataset: &Dataset,
         sample: &Sample,
-        tool: Option<&str>,
-        contact: &Contact,
-    ) -> Result<PoseMetrics, String> {
-        let name = tool.ok_or("the file's name says no tool; name it with --tool")?;
+        name: Option<&str>,
+    ) -> Result<(String, Arc<ToolModel>), TaskError> {
+        let fail = |why: String| TaskError::new("Pose", why);
+        let name = name.ok_or_else(|| fail("the file's name says no tool; name it with --tool".into()))?;
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
-            return Err("no bubble camera is known; name a bubble file of the rig with --camera".into());
+            return Err(fail("no bubble camera is known; name a bubble file of the rig with --camera".into()));
         }
-        let points = contact.points(sample).map_err(|err| err.why)?;
-        let registration = self.engine.method();
-        let model = self.tool(dataset, name)?;
-        let found = pose::pose(&points, model, &*registration, Ask::default(), sample.grasp_from_object);
-        let found = found.map_err(|err| err.why)?;
+        if !self.tools.contains_key(name) {
+            let model = tool_model(dataset, name, self.args).map_err(|err| fail(says(&err)))?;
+            self.tools.insert(name.to_owned(), Arc::new(model));
+        }
+        let model = self.tools.get(name).ok_or_else(|| fail(format!("no CAD model of {name}")))?;
+        Ok((name.to_owned(), model.clone()))
+    }
+}
+
+impl PoseMetrics {
+    fn new(tool: &str, found: &PoseResult) -> Self {
         let place = found.object_from_grasp();
-        Ok(PoseMetrics {
-            tool: name.to_owned(),
+        Self {
+            tool: tool.to_owned(),
             angle_deg: found.angle_rad.to_degrees(),
             y_m: place.y_m,
             z_m: place.z_m,
             grasp_from_object: found.grasp_from_object,
             rms_m: found.rms_m,
             points: found.num_points,
-            stop: found.stop,
+            stop: found.stop.clone(),
             truth_deg: found.truth_rad.map(f64::to_degrees),
             error_deg: found.error_rad.map(f64::to_degrees),
-        })
+        }
     }
 }
 

@@ -4,39 +4,35 @@ use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 
 use serde_json::{Value, json};
 
-use super::super::predict::Predictor;
 use super::WatchArgs;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::infer::engine::resolve;
 use touch2touch_work::labels::PairLabels;
+use touch2touch_work::recipe::{Recipe, Stage};
 
 /// Everything the result depends on besides the touch.
-pub(super) fn recipe(
+pub(super) fn told(
     args: &WatchArgs,
-    predictor: &mut Predictor,
-    registration: RegistrationChoice,
+    recipe: &Recipe,
     tool: Option<&str>,
     labels: &PairLabels,
 ) -> anyhow::Result<Value> {
-    let choice = args.mask.choice();
-    let model = predictor.mask_model(&choice)?.map(|model| model.id);
-    let drawn: Vec<(String, String)> = args
-        .mask
-        .drawn(labels)
-        .into_iter()
-        .flat_map(|l| l.masks.iter())
+    let generating = recipe.generating()?;
+    let (bundle, config) = (generating.bundle, generating.config);
+    let model = recipe.mask_model.as_ref().map(|model| &model.id);
+    let drawn: Vec<(String, String)> = labels
+        .masks
+        .iter()
+        .filter(|_| recipe.hand)
         .map(|(place, hand)| (format!("{place:?}"), digest(&hand.mask)))
         .collect();
-    let mask = json!({"choice": choice, "model": model.as_deref(), "drawn": drawn});
-    let config = predictor.config()?;
-    let shift = predictor.shift();
-    let engine = resolve(predictor.engine())?;
-    let bundle = predictor.bundle()?;
+    let mask = json!({"choice": recipe.mask, "model": model.map(|id| &**id), "drawn": drawn});
     Ok(json!({
-        "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": engine,
+        "id": recipe.id(Stage::Pose),
+        "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": resolve(recipe.engine)?,
         "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
-        "spacing": config.spacing, "guidance": config.guidance, "shift": shift, "mask": mask, "registration": registration, "tool": tool,
+        "spacing": config.spacing, "guidance": config.guidance, "shift": recipe.shift, "mask": mask,
+        "registration": recipe.registration, "tool": tool,
         "camera": args.camera, "version": env!("CARGO_PKG_VERSION"),
     }))
 }

@@ -130,7 +130,7 @@ fn cell(
     ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
     let dialed = match point.value {
         Some(value) => cx.state.is_dialed(value, point.in_force),
-        None => cx.state.in_force() == found.in_force,
+        None => cx.state.dial_recipe() == found.in_force,
     };
     ui.horizontal(|ui| {
         ui.set_width(width);
@@ -142,7 +142,9 @@ fn cell(
             let tip = "The best of these values: most pairs within 5°, then within 10°, then the least median";
             ui.label(RichText::new("best").size(SMALL).color(cx.p.good)).on_hover_text(tip);
         }
-        let Some(value) = point.value.filter(|value| !dialed && value.put(cx.state.in_force()).is_ok()) else { return };
+        let Some(value) = point.value.filter(|value| !dialed && value.put(&cx.state.dial_recipe()).is_ok()) else {
+            return;
+        };
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let button = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).small());
             let button = button.accessible_name(format!("Use {}", value.label()));

@@ -7,6 +7,7 @@ use crate::imprint::{chain, window};
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::models::{Models, Wanted};
+use crate::predict::Generating;
 use crate::usable::unusable;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::findings::Findings;
@@ -79,7 +80,12 @@ pub(super) fn gather(
     models: &Models,
     cx: &JobCx,
 ) -> Result<Gathered, TaskError> {
-    let ends = setup.bundle.ends(&dataset.rig).ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
+    let ends = setup
+        .recipe
+        .generating()?
+        .bundle
+        .ends(&dataset.rig)
+        .ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
     let input = ends.map_err(|err| TaskError::from_error(WHAT, &err))?.input;
     let (mut touches, mut left_out) = (Vec::new(), Vec::new());
     let mut notes = Findings::default();
@@ -176,11 +182,10 @@ fn predict(
     left_out: &mut Vec<Remark>,
     cx: &JobCx,
 ) -> Result<(), TaskError> {
-    let wanted: Vec<Wanted<'_>> = waiting
-        .iter()
-        .map(|touch| Wanted { difference: &touch.picture, seed: setup.config.seed, size: [0, 0] })
-        .collect();
-    let made = models.predict(&setup.bundle, setup.engine, &setup.config, &wanted, &cx.quiet())?;
+    let Generating { bundle, engine, config } = setup.recipe.generating()?;
+    let wanted: Vec<Wanted<'_>> =
+        waiting.iter().map(|touch| Wanted { difference: &touch.picture, seed: config.seed, size: [0, 0] }).collect();
+    let made = models.predict(bundle, engine, config, &wanted, &cx.quiet())?;
     for (touch, made) in waiting.into_iter().zip(made) {
         let chain = chain(&made, ShiftMode::ExactInverse)?.placed(touch.window);
         let size = made.raw.channels.first().map_or([0, 0], Grid::size);

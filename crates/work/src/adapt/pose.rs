@@ -1,15 +1,15 @@
 //! The in-hand angle that pictures lead to, where the data have poses.
 
-use super::gather::Touch;
+use super::gather::Touch as Gathered;
 use super::{AdaptSetup, WHAT};
 use crate::error::TaskError;
+use crate::feel::{Felt, Touch};
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::mask::MaskInputs;
-use crate::models::{Masking, Models};
-use crate::pose::pose;
+use crate::labels::PairLabels;
+use crate::models::Models;
+use crate::recipe::Stage;
 use crate::tool::Tools;
-use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
@@ -25,14 +25,11 @@ pub(super) fn angles(
     setup: &AdaptSetup,
     models: &Models,
     tools: &mut Tools<'_>,
-    touches: &[Touch],
+    touches: &[Gathered],
     pictures: &[Option<&Grid<f32>>],
     cx: &JobCx,
 ) -> Result<Option<AngleSummary>, TaskError> {
-    let (choice, model) = (setup.mask.0, setup.mask.1.as_ref());
-    let by = Masking { choice, model, engine: setup.engine };
-    let registration = setup.registration.method();
-    let grasps: Vec<&[Touch]> = touches.chunk_by(|a, b| a.id == b.id).collect();
+    let grasps: Vec<&[Gathered]> = touches.chunk_by(|a, b| a.id == b.id).collect();
     let mut errors = Vec::new();
     let (mut at, stride) = (0, grasps.len().div_ceil(MOST_GRASPS).max(1));
     for (number, grasp) in grasps.iter().enumerate() {
@@ -42,8 +39,7 @@ pub(super) fn angles(
         let (Some(tool), false, 0) = (&first.tool, first.scale == Scale::Assumed, number % stride) else { continue };
         cx.check(WHAT)?;
         let Ok(sample) = dataset.load(first.id) else { continue };
-        let Some(truth) = sample.grasp_from_object else { continue };
-        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
+        if sample.grasp_from_object.is_none() || sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             continue;
         }
         let Some(tool) = tools.get(tool) else { continue };
@@ -52,12 +48,11 @@ pub(super) fn angles(
             imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
         }
         // What people drew on a prediction is of that picture, and each of these is another one.
-        let inputs = MaskInputs { sample: &sample, tool: Some(tool), labels: None, of: None };
-        let found = models
-            .contact(by, imprints, inputs)
-            .and_then(|contact| contact.points(&sample))
-            .and_then(|points| pose(&points, tool, &*registration, Ask::default(), Some(truth)));
-        errors.push(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN));
+        let nothing = PairLabels::default();
+        let touch = Touch { dataset, pair: first.id, sample: &sample, tool: Ok(tool), labels: &nothing };
+        let felt = Felt::of_imprints(&setup.recipe, imprints).reach(touch, Stage::Pose, models, &cx.quiet());
+        let error = felt.ok().and_then(|felt| felt.pose().ok()?.error_rad);
+        errors.push(error.unwrap_or(f64::NAN));
     }
     Ok((!errors.is_empty()).then(|| AngleSummary::from_errors(&errors)))
 }

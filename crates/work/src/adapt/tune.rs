@@ -10,9 +10,10 @@ use super::gather::Touch;
 use super::{AdaptSetup, Tuned, Tuning, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::Role;
-use crate::infer::recipe::input_digest;
+use crate::infer::kept_key::input_digest;
 use crate::io::digest::hex;
 use crate::job::JobCx;
+use crate::predict::Generating;
 use crate::tuning::{Kept, Look, Runs, steps_within};
 use touch2touch_core::fit::{Case, closed_form};
 use touch2touch_core::grid::DepthMap;
@@ -42,17 +43,18 @@ pub(super) fn tune(
     rig: &Rig,
     cx: &JobCx,
 ) -> Result<Tuned, TaskError> {
-    let source = Source::open(setup)?;
+    let generating = setup.recipe.generating()?;
+    let source = Source::open(generating)?;
     let real: Vec<Pair> =
         touches.iter().map(|t| source.pair(&t.picture, &t.target, Some(t.pad.index()))).collect::<Result<_, _>>()?;
     cx.progress(0, 0, "simulating touches that keep the model from forgetting");
-    let simulated = source.simulated(setup, rig)?;
+    let simulated = source.simulated(rig)?;
     cx.check(WHAT)?;
     let with_simulated = |real: Vec<Pair>| -> Vec<Pair> { real.into_iter().chain(simulated.iter().cloned()).collect() };
     let count = parts.iter().max().map_or(0, |most| most + 1);
-    let kept = Kept::of(setup.unfinished.as_deref(), &digest(setup, touches));
-    let start = source.start(setup, source.placement(corrections));
-    let config = Config { seed: setup.config.seed, ..Config::default() };
+    let kept = Kept::of(setup.unfinished.as_deref(), &digest(setup, generating, touches));
+    let start = source.start(source.placement(corrections));
+    let config = Config { seed: generating.config.seed, ..Config::default() };
     let steps = match tuning {
         Tuning::Steps(steps) => steps,
         Tuning::Within(time) => steps_within((time, STEPPING), count + 1, (WHAT, fail), (&kept, cx), || {
@@ -75,7 +77,7 @@ pub(super) fn tune(
         let run = Run {
             file: format!("part-{}", part + 1),
             name: format!("without part {} of {count}", part + 1),
-            start: source.start(setup, source.placement(&without)),
+            start: source.start(source.placement(&without)),
             pairs: with_simulated(others.iter().map(|&i| real[i].clone()).collect()),
             held: held.iter().map(|&i| &real[i]).collect(),
         };
@@ -100,10 +102,10 @@ fn fail(err: touch2touch_tuning::Error) -> TaskError {
 }
 
 /// Everything that a run depends on.
-fn digest(setup: &AdaptSetup, touches: &[Touch]) -> String {
+fn digest(setup: &AdaptSetup, generating: Generating<'_>, touches: &[Touch]) -> String {
     let mut all = Sha256::new();
     let asked = json!({
-        "program": env!("CARGO_PKG_VERSION"), "bundle": *setup.bundle.id, "config": setup.config,
+        "program": env!("CARGO_PKG_VERSION"), "bundle": *generating.bundle.id, "config": generating.config,
         "tuning": setup.tuning, "folds": setup.folds,
     });
     all.update(asked.to_string());

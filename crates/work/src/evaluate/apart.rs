@@ -8,7 +8,7 @@ use super::kept::Entry;
 use super::methods::Models;
 use crate::bundles::BundleInfo;
 use crate::imprint::imprint_of;
-use crate::infer::recipe::input_digest;
+use crate::infer::kept_key::input_digest;
 use crate::io::dataset::Dataset;
 use crate::models;
 use touch2touch_core::dataset::PairId;

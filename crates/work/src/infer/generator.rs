@@ -10,7 +10,7 @@ use preview::Watching;
 
 use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType, Unconditional};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
-use super::recipe::Recipe;
+use super::kept_key::KeptKey;
 use super::trial::admit;
 use touch2touch_core::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
@@ -134,9 +134,9 @@ impl Generator {
     }
 
     /// The key of what [`Generator::generate`] returns for the image with the digest `input` (see
-    /// [`super::recipe::input_digest`]).
-    pub fn recipe(&self, input: String, config: &GenerateConfig) -> Recipe {
-        Recipe::new(input, self.hash.clone(), self.engine, config)
+    /// [`super::kept_key::input_digest`]).
+    pub fn recipe(&self, input: String, config: &GenerateConfig) -> KeptKey {
+        KeptKey::new(input, self.hash.clone(), self.engine, config)
     }
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).

@@ -13,7 +13,7 @@ use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
-use super::recipe::Recipe;
+use super::kept_key::KeptKey;
 use super::sheets;
 use crate::io::digest::sha256;
 use crate::io::{files, folders};
@@ -48,7 +48,7 @@ pub struct Store {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
     /// What it was made from.
-    pub recipe: Recipe,
+    pub recipe: KeptKey,
     /// The decoder's picture.
     pub raw: RawPrediction,
     /// What it took to make, seconds.
@@ -70,7 +70,7 @@ pub struct Usage {
 #[serde(deny_unknown_fields)]
 struct Header {
     format: String,
-    recipe: Recipe,
+    recipe: KeptKey,
     width: usize,
     height: usize,
     channels: usize,
@@ -119,7 +119,7 @@ impl Store {
     }
 
     /// The prediction of a recipe, now the most recently used.
-    pub fn get(&self, recipe: &Recipe) -> Option<Stored> {
+    pub fn get(&self, recipe: &KeptKey) -> Option<Stored> {
         let stored = self.read(&self.file(recipe))?;
         (stored.recipe == *recipe).then_some(stored)
     }
@@ -145,7 +145,7 @@ impl Store {
     ///
     /// # Errors
     /// Whatever the disk says. What was there stays as it was.
-    pub fn put(&self, recipe: &Recipe, raw: &RawPrediction, seconds: f64) -> io::Result<()> {
+    pub fn put(&self, recipe: &KeptKey, raw: &RawPrediction, seconds: f64) -> io::Result<()> {
         let Some(first) = raw.channels.first().filter(|_| self.budget > 0) else { return Ok(()) };
         let values: Vec<u8> =
             raw.channels.iter().flat_map(|plane| plane.as_slice()).flat_map(|v| v.to_le_bytes()).collect();
@@ -205,7 +205,7 @@ impl Store {
         Ok(usage)
     }
 
-    fn file(&self, recipe: &Recipe) -> PathBuf {
+    fn file(&self, recipe: &KeptKey) -> PathBuf {
         self.folder.join(format!("{}-{}{SUFFIX}", short(&recipe.input), short(&recipe.digest())))
     }
 
@@ -299,9 +299,9 @@ mod tests {
     use crate::infer::engine::EngineKind;
     use touch2touch_core::diffusion::GenerateConfig;
 
-    fn recipe(input: &str, seed: u64) -> Recipe {
+    fn recipe(input: &str, seed: u64) -> KeptKey {
         let config = GenerateConfig { seed, ..Default::default() };
-        Recipe::new(input.into(), "bundle".into(), EngineKind::Rten, &config)
+        KeptKey::new(input.into(), "bundle".into(), EngineKind::Rten, &config)
     }
 
     fn raw(value: f32) -> RawPrediction {
@@ -316,7 +316,7 @@ mod tests {
     }
 
     /// Makes a file look as if it had been used so many seconds ago.
-    fn age(store: &Store, recipe: &Recipe, seconds: u64) {
+    fn age(store: &Store, recipe: &KeptKey, seconds: u64) {
         let file = File::options().append(true).open(store.file(recipe)).unwrap();
         file.set_modified(SystemTime::now() - Duration::from_secs(seconds)).unwrap();
     }

@@ -5,24 +5,19 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use super::super::bundles::BundleInfo;
 use super::super::error::{Remark, TaskError};
-use super::super::imprint::{imprints_of, measured};
+use super::super::feel::{Touch, feel};
 use super::super::job::JobCx;
-use super::super::labels::{Deed, ImprintOf, ImprintSource, Labels, MaskPlace};
+use super::super::labels::{Deed, Labels, MaskPlace};
 use super::super::models::Models;
-use super::super::predict::Generating;
+use super::super::recipe::Stage;
 use super::super::tool::load_tool;
-use super::{ProposeSetup, Touch, WHAT, accepted, propose};
+use super::{ProposeSetup, WHAT, accepted, propose};
 use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::grid::DepthMap;
 use touch2touch_core::pose::ToolModel;
-use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
+use touch2touch_core::rig::PadId;
 use touch2touch_core::units::counted;
 
 /// Proposals for which pairs, and what becomes of them.
@@ -32,10 +27,6 @@ pub struct BatchSetup {
     pub propose: ProposeSetup,
     /// The pairs. Those marked "done", "flagged" or "skip" are left as they are: somebody has judged them.
     pub pairs: Vec<PairId>,
-    /// The generator and its choices, for predicted imprints.
-    pub generator: Option<(BundleInfo, GenerateConfig)>,
-    /// How its answer becomes meters.
-    pub shift: ShiftMode,
     /// Whether what was painted by hand is replaced as well.
     pub over_hand: bool,
     /// Who asked; else whom the system says.
@@ -152,13 +143,15 @@ impl Job<'_> {
             return Ok(());
         }
         let sample = dataset.load(pair).map_err(|err| TaskError::from_error(WHAT, &err))?;
-        let (imprints, of) = imprints(&sample, setup, models, cx)?;
+        let (recipe, drawn_before) = (&setup.propose.recipe, stored.clone());
+        let touch = Touch { dataset, pair, sample: &sample, tool, labels: &drawn_before };
+        let felt = feel(touch, recipe, Stage::Imprint, models, &cx.quiet())?;
+        let (imprints, of) = (&felt.imprints, recipe.imprint_of());
         let pads: Vec<PadId> = imprints.entries().map(|(pad, _)| pad).collect();
         if pads.is_empty() {
             return Err(TaskError::new(WHAT, "there is no such imprint"));
         }
-        let touch = Touch { dataset, all, pair, sample: &sample, tool, imprints: &imprints, of: &of, labels: &stored };
-        let proposals = propose(touch, &pads, &setup.propose, models)?;
+        let proposals = propose((touch, all), &felt, &pads, &setup.propose, models)?;
         let (mut new, mut how) = (0, Vec::new());
         for (pad, proposal) in proposals {
             let proposal = match proposal {
@@ -192,22 +185,4 @@ impl Job<'_> {
         }
         Ok(())
     }
-}
-
-/// The imprints of a pair that masks are proposed for, and what they are.
-fn imprints(
-    sample: &Sample,
-    setup: &BatchSetup,
-    models: &Models,
-    cx: &JobCx,
-) -> Result<(PerPad<DepthMap>, ImprintOf), TaskError> {
-    if setup.propose.imprint == ImprintSource::Measured {
-        return Ok((measured(sample), ImprintOf::Measured));
-    }
-    let generator = setup.generator.as_ref();
-    let (bundle, config) = generator.ok_or_else(|| TaskError::new(WHAT, "there is no generator to predict with"))?;
-    let generating = Generating { bundle, engine: setup.propose.engine, config };
-    let made = generating.pair(models, sample, &cx.quiet())?;
-    let imprints = imprints_of(&made, setup.shift, sample)?;
-    Ok((imprints, ImprintOf::predicted(&bundle.id, config, setup.shift)))
 }

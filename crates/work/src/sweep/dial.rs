@@ -4,6 +4,7 @@ use serde::{Serialize, Serializer};
 use strum::{EnumIter, EnumString, IntoEnumIterator as _, IntoStaticStr};
 
 use crate::mask::{MaskChoice, MaskRecipe, MaskSource};
+use crate::recipe::Recipe;
 use crate::subject::Mapping;
 use touch2touch_core::pose::{RegistrationChoice, Rejection};
 use touch2touch_core::postprocess::ShiftMode;
@@ -150,8 +151,8 @@ impl Dial {
     }
 
     /// Where the dial stands; `own` is the mask model's own probability.
-    pub(super) fn of(self, in_force: &InForce, recipe: &MaskRecipe, own: Option<f32>) -> Option<Setting> {
-        match (self, recipe) {
+    pub(super) fn of(self, in_force: &Recipe, made_by: &MaskRecipe, own: Option<f32>) -> Option<Setting> {
+        match (self, made_by) {
             (Self::Threshold, MaskRecipe::Threshold(depth_m)) => Some(Setting::Threshold(depth_m.get())),
             (Self::Probability, MaskRecipe::Unet(_, least)) => {
                 Some(Setting::Probability(least.map(|least| least.get()).or(own)?))
@@ -162,17 +163,6 @@ impl Dial {
             (Self::Shift, _) => Some(Setting::Shift(in_force.shift)),
         }
     }
-}
-
-/// What decides a pose besides models and pair.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct InForce {
-    /// Where masks come from that nobody drew.
-    pub mask: MaskChoice,
-    /// The registration.
-    pub registration: RegistrationChoice,
-    /// How predictions become meters.
-    pub shift: ShiftMode,
 }
 
 /// A dial at a value.
@@ -200,27 +190,28 @@ impl Setting {
         }
     }
 
-    /// What is in force with it.
+    /// The recipe with it.
     ///
     /// # Errors
     /// If the registration cannot do it.
-    pub fn put(self, mut in_force: InForce) -> Result<InForce, String> {
+    pub fn put(self, recipe: &Recipe) -> Result<Recipe, String> {
+        let mut recipe = recipe.clone();
         match self {
             Self::Threshold(threshold_m) => {
-                in_force.mask = MaskChoice { source: MaskSource::Threshold, threshold_m, ..in_force.mask };
+                recipe.mask = MaskChoice { source: MaskSource::Threshold, threshold_m, ..recipe.mask };
             }
             Self::Probability(least) => {
                 // Auto is the mask model, where there is one.
-                let auto = in_force.mask.source == MaskSource::Auto;
+                let auto = recipe.mask.source == MaskSource::Auto;
                 let source = if auto { MaskSource::Auto } else { MaskSource::Unet };
-                in_force.mask = MaskChoice { source, probability: Some(least), ..in_force.mask };
+                recipe.mask = MaskChoice { source, probability: Some(least), ..recipe.mask };
             }
             Self::Rejection(rejection) => {
-                in_force.registration = RegistrationChoice::new(in_force.registration.by, rejection)?;
+                recipe.registration = RegistrationChoice::new(recipe.registration.by, rejection)?;
             }
-            Self::Shift(shift) => in_force.shift = shift,
+            Self::Shift(shift) => recipe.shift = shift,
         }
-        Ok(in_force)
+        Ok(recipe)
     }
 
     /// Its number in the dial's unit; `None` for a shift.
@@ -301,23 +292,23 @@ mod tests {
             Dial::Gate
                 .parse("2")
                 .unwrap()
-                .put(InForce { registration: Registration::LabIcp.into(), ..InForce::default() })
+                .put(&Recipe { registration: Registration::LabIcp.into(), ..Recipe::default() })
                 .is_err()
         );
     }
 
     #[test]
     fn where_a_dial_stands_is_a_value_that_changes_nothing() {
-        let in_force = InForce::default();
+        let in_force = Recipe::default();
         let (threshold, unet) = (MaskRecipe::Threshold(0.005.into()), MaskRecipe::Unet("id".into(), None));
         assert_eq!(Dial::Threshold.of(&in_force, &threshold, None), Dial::Threshold.parse("5").ok());
         assert_eq!(Dial::Threshold.of(&in_force, &unet, None), None);
         assert_eq!(Dial::Probability.of(&in_force, &unet, Some(0.5)), Dial::Probability.parse("0.5").ok());
         assert_eq!(Dial::Gate.of(&in_force, &unet, None), Dial::Gate.parse("1").ok());
         assert_eq!(Dial::Trim.of(&in_force, &unet, None), None);
-        let by_threshold =
-            InForce { mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }, ..in_force };
-        assert_eq!(Dial::Threshold.parse("5").unwrap().put(by_threshold), Ok(by_threshold));
-        assert_ne!(Dial::Threshold.parse("5").unwrap().put(in_force), Ok(in_force));
+        let mask = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
+        let by_threshold = Recipe { mask, ..in_force.clone() };
+        assert_eq!(Dial::Threshold.parse("5").unwrap().put(&by_threshold), Ok(by_threshold));
+        assert_ne!(Dial::Threshold.parse("5").unwrap().put(&in_force), Ok(in_force));
     }
 }

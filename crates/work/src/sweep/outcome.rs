@@ -191,8 +191,8 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::infer::engine::EngineChoice;
-    use crate::sweep::{Dial, InForce};
+    use crate::recipe::Recipe;
+    use crate::sweep::Dial;
 
     fn outcome(truth: bool, error_deg: Option<f64>, points: usize) -> Outcome {
         let radians = error_deg.map(f64::to_radians);
@@ -211,11 +211,7 @@ mod tests {
         let setup = SweepSetup {
             values: Dial::Threshold.spread(2.0, 4.0, 3).unwrap(),
             pairs: Vec::new(),
-            in_force: InForce::default(),
-            mask_model: None,
-            generator: None,
-            hand: false,
-            engine: EngineChoice::default(),
+            recipe: Recipe { hand: false, ..Recipe::default() },
         };
         let rows = rows.into_iter().map(|mut row| {
             let base = row[0].angle_rad;

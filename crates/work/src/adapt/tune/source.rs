@@ -5,15 +5,16 @@ use std::collections::BTreeMap;
 use rayon::prelude::*;
 use touch2touch_tuning::{NoiseSchedule, Pair, Placement, Sampler, Start};
 
+use super::super::WHAT;
 use super::super::gather::on_grid;
-use super::super::{AdaptSetup, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::{Bundle, BundleFile, GeneratorInput, Role, ScheduleKind};
 use crate::infer::generator::prepare;
 use crate::io::dataset::ASSUMED_IMPRINT_RANGE_M;
 use crate::io::files;
+use crate::predict::Generating;
 use touch2touch_core::catalog;
-use touch2touch_core::diffusion;
+use touch2touch_core::diffusion::{self, GenerateConfig};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::postprocess::{Correction, CorrectionParts};
 use touch2touch_core::rig::{Rig, SensorId, lab};
@@ -34,11 +35,12 @@ pub(super) struct Source {
     /// `[width, height]` of the decoder's picture.
     size: [usize; 2],
     turned: bool,
+    config: GenerateConfig,
 }
 
 impl Source {
-    pub(super) fn open(setup: &AdaptSetup) -> Result<Self, TaskError> {
-        let bundle: Bundle = setup.bundle.open(WHAT)?;
+    pub(super) fn open(generating: Generating<'_>) -> Result<Self, TaskError> {
+        let bundle: Bundle = generating.bundle.open(WHAT)?;
         let spec = bundle.generator().ok_or_else(|| TaskError::new(WHAT, "the bundle is no generator"))?;
         let read = |file: &BundleFile| {
             file.read(files::MODEL).map(std::borrow::Cow::into_owned).map_err(|err| TaskError::new(WHAT, err))
@@ -52,6 +54,7 @@ impl Source {
         let graphs = bundle.files().map(|(role, file)| Ok((role, read(file)?))).collect::<Result<_, TaskError>>()?;
         let range = spec.output.range_m.ok_or_else(|| TaskError::new(WHAT, "it predicts no depth"))?;
         Ok(Self {
+            config: *generating.config,
             graphs,
             schedule: NoiseSchedule { steps: schedule.steps, beta_start, beta_end },
             mean: [0, 1, 2].map(|c| spec.input.mean.get(c).map_or(0.0, |&v| v as f32)),
@@ -67,9 +70,9 @@ impl Source {
         })
     }
 
-    pub(super) fn start(&self, setup: &AdaptSetup, placement: Placement) -> Start {
+    pub(super) fn start(&self, placement: Placement) -> Start {
         let graph = |role| self.graphs.get(&role).cloned().unwrap_or_default();
-        let config = &setup.config;
+        let config = &self.config;
         let eta = if config.sampler == diffusion::Sampler::Ddpm { 1.0 } else { config.eta };
         Start {
             encoder: graph(Role::ConditionEncoder),
@@ -97,7 +100,7 @@ impl Source {
     }
 
     /// Touches of the simulator, which lie where the model expects them; none for other rigs than the simulator's.
-    pub(super) fn simulated(&self, setup: &AdaptSetup, rig: &Rig) -> Result<Vec<Pair>, TaskError> {
+    pub(super) fn simulated(&self, rig: &Rig) -> Result<Vec<Pair>, TaskError> {
         if *rig != *Rig::lab() {
             return Ok(Vec::new());
         }
@@ -105,7 +108,7 @@ impl Source {
         let all: Vec<(usize, u64)> =
             (0..catalog::tools().len()).flat_map(|tool| (0..SIMULATED).map(move |grasp| (tool, grasp))).collect();
         let made = all.into_par_iter().map(|(tool, grasp)| {
-            let seed = setup.config.seed.wrapping_mul(1000).wrapping_add(grasp + SIMULATED * tool as u64);
+            let seed = self.config.seed.wrapping_mul(1000).wrapping_add(grasp + SIMULATED * tool as u64);
             let sample = sim::simulate(&catalog::tools()[tool], sim::random_grasp(seed), seed, &SimConfig::default());
             let touches = sample.pads.entries().filter_map(|(_, touch)| Some((touch.picture(input)?, touch.depth()?)));
             touches

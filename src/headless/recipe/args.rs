@@ -1,5 +1,6 @@
 //! Which models are used, and how they are run, as the command line says it.
 
+use std::cell::OnceCell;
 use std::path::PathBuf;
 
 use clap::{Args, ValueEnum};
@@ -8,7 +9,7 @@ use strum::IntoEnumIterator as _;
 use super::super::args::keyed;
 use touch2touch_core::diffusion::{GUIDANCE, Preset, Sampler};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
-use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::subject::{Mapping, Wish};
@@ -53,6 +54,9 @@ pub(in crate::headless) struct ModelArgs {
     /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     pub(super) no_cache: bool,
+    /// The bundles that are there, looked for when first needed.
+    #[arg(skip)]
+    pub(super) found: OnceCell<FoundBundles>,
 }
 
 impl ModelArgs {
@@ -61,7 +65,7 @@ impl ModelArgs {
     pub(in crate::headless) fn with(&self, wish: &Wish) -> Self {
         let mut args = self.clone();
         if let Some(name) = &wish.bundle {
-            let found = bundles::find(&[]);
+            let found = self.found.get_or_init(|| bundles::find(&[]));
             let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
             args.bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
         }

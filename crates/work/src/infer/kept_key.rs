@@ -1,4 +1,4 @@
-//! [`Recipe`]: everything a generated result depends on, as a key.
+//! [`KeptKey`]: everything a generated result depends on, as a key.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -11,7 +11,7 @@ use touch2touch_core::grid::RgbGrid;
 /// Same recipe, same result. The shift is not part of it: it is applied to the result.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Recipe {
+pub struct KeptKey {
     /// [`input_digest`] of the GelSlim difference: the content, so that neither a name nor a place can be mistaken for
     /// another's, and data that was moved is still known.
     pub input: String,
@@ -23,7 +23,7 @@ pub struct Recipe {
     pub seed: u64,
     /// Sampling steps.
     pub steps: u32,
-    /// The bits of eta, so that recipes can be compared and hashed; see [`Recipe::config`].
+    /// The bits of eta, so that recipes can be compared and hashed; see [`KeptKey::config`].
     eta_bits: u64,
     /// The update rule.
     pub sampler: Sampler,
@@ -33,7 +33,7 @@ pub struct Recipe {
     guidance_bits: u64,
 }
 
-impl Recipe {
+impl KeptKey {
     /// The recipe of one generation.
     pub fn new(input: String, bundle: String, engine: EngineKind, config: &GenerateConfig) -> Self {
         let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = *config;
@@ -83,9 +83,9 @@ mod tests {
     #[test]
     fn a_recipe_is_a_key_and_survives_a_file() {
         let config = GenerateConfig { eta: 0.25, ..Default::default() };
-        let recipe = |config: &GenerateConfig| Recipe::new("a1".into(), "00ff".into(), EngineKind::Rten, config);
+        let recipe = |config: &GenerateConfig| KeptKey::new("a1".into(), "00ff".into(), EngineKind::Rten, config);
         let text = serde_json::to_string(&recipe(&config)).unwrap();
-        let back: Recipe = serde_json::from_str(&text).unwrap();
+        let back: KeptKey = serde_json::from_str(&text).unwrap();
         assert_eq!((back.config(), &back), (config, &recipe(&config)));
         let others = [
             GenerateConfig { eta: 0.250_000_1, ..config },

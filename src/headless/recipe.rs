@@ -1,0 +1,128 @@
+//! The options that say what decides a result, as a [`Recipe`].
+
+mod args;
+
+use std::path::{Path, PathBuf};
+
+use super::contact_mask::MaskArgs;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::diffusion::{GenerateConfig, Spacing};
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::rig::Rig;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::imprint;
+use touch2touch_work::infer::engine::{EngineChoice, resolve};
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::mask::MaskSource;
+use touch2touch_work::models::Models;
+use touch2touch_work::recipe::{Model, Recipe};
+use touch2touch_work::tuning::unfinished_folder;
+
+use args::SpacingArg;
+pub(super) use args::{MappingArgs, ModelArgs, RuntimeArg};
+
+impl ModelArgs {
+    /// The models of one run of the program; none is loaded yet.
+    pub(super) fn models(&self) -> Models {
+        Models::new(if self.no_cache { None } else { super::cache::store() })
+    }
+
+    /// The engine that runs the models.
+    pub(super) fn engine(&self) -> EngineChoice {
+        self.runtime.choice()
+    }
+
+    /// The engine's name for people.
+    pub(super) fn engine_label(&self) -> anyhow::Result<&'static str> {
+        Ok(resolve(self.engine())?.label())
+    }
+
+    /// The folder where a run that is stopped is kept; none with `--no-cache`.
+    pub(super) fn unfinished(&self) -> Option<PathBuf> {
+        if self.no_cache { None } else { unfinished_folder() }
+    }
+
+    fn take(&self, kind: BundleKind, named: Option<&Path>, rig: &Rig) -> Result<BundleInfo, TaskError> {
+        self.found.get_or_init(|| bundles::find(&[])).take(kind, named, rig)
+    }
+
+    /// The recipe of imprints. A generator is looked for where they are predicted.
+    pub(super) fn recipe(&self, imprint: ImprintSource, rig: &Rig) -> anyhow::Result<Recipe> {
+        let recipe = Recipe { imprint, engine: self.engine(), ..Recipe::default() };
+        if imprint == ImprintSource::Measured {
+            // Without a generator nothing is read by it; what was asked for is still said.
+            return Ok(Recipe { shift: self.mapping.mode(None).unwrap_or_default(), ..recipe });
+        }
+        let bundle = self.take(BundleKind::Generator, self.bundle.as_deref(), rig)?;
+        bundle.ends(rig).transpose()?;
+        let shift = self.mapping.mode(Some((&bundle.name, &bundle.id)))?;
+        let config = self.config(&bundle)?;
+        Ok(Recipe { generator: Some((bundle.into(), config)), shift, ..recipe })
+    }
+
+    /// The same with masks and a registration. A mask model is looked for where one is taken.
+    pub(super) fn posed(
+        &self,
+        imprint: ImprintSource,
+        rig: &Rig,
+        mask: &MaskArgs,
+        registration: RegistrationChoice,
+    ) -> anyhow::Result<Recipe> {
+        let choice = mask.choice();
+        let takes = matches!(choice.source, MaskSource::Auto | MaskSource::Unet);
+        let mask_model = if takes { self.mask_model(choice.source == MaskSource::Auto, rig)? } else { None };
+        let recipe = self.recipe(imprint, rig)?;
+        Ok(Recipe { mask: choice, mask_model, hand: !mask.no_hand, registration, ..recipe })
+    }
+
+    /// The mask model; with `may_lack`, none where none is found and none was named.
+    pub(super) fn mask_model(&self, may_lack: bool, rig: &Rig) -> Result<Option<Model>, TaskError> {
+        match self.take(BundleKind::Mask, self.mask_bundle.as_deref(), rig) {
+            Err(_) if may_lack && self.mask_bundle.is_none() => Ok(None),
+            found => Ok(Some(found?.into())),
+        }
+    }
+
+    /// The bundle's defaults with what the command line says instead.
+    fn config(&self, bundle: &BundleInfo) -> anyhow::Result<GenerateConfig> {
+        let Some(info) = &bundle.generator else { anyhow::bail!("the bundle {} is no generator", bundle.name) };
+        let preset = self.preset.config(info.defaults, info.training_steps);
+        let spacing = self.spacing.map(|spacing| match spacing {
+            SpacingArg::Trailing => Spacing::Trailing,
+            SpacingArg::Lab => Spacing::Lab,
+        });
+        let config = GenerateConfig {
+            steps: self.steps.unwrap_or(preset.steps),
+            seed: self.seed.unwrap_or(preset.seed),
+            eta: self.eta.unwrap_or(preset.eta),
+            sampler: self.sampler.unwrap_or(preset.sampler),
+            spacing: spacing.unwrap_or(preset.spacing),
+            guidance: self.guidance.unwrap_or(preset.guidance),
+        };
+        // Said once, before the first pair, rather than for every pair.
+        bundle.check_guidance(config.guidance)?;
+        Ok(config)
+    }
+}
+
+/// That the generator of a recipe was fitted to other data than this sample.
+pub(super) fn misgiving(recipe: &Recipe, sample: &Sample) -> Option<Problem> {
+    let (bundle, _) = recipe.generator.as_ref()?;
+    Some(Problem {
+        what: bundle.misgiving(sample)?,
+        file: bundle.origin.path(),
+        hint: "name another bundle, or switch the fit off with --fit-parts none".into(),
+    })
+}
+
+/// Loads the models that a touch needs and runs them once; see [`Models::warm_up`].
+pub(super) fn warm_up(recipe: &Recipe, models: &Models) -> Result<(), TaskError> {
+    let generating = recipe.generating()?;
+    let made = models.warm_up(generating.bundle, generating.engine, generating.config)?;
+    if let Some(model) = &recipe.mask_model {
+        models.mask(model, recipe.engine, &imprint::imprint(&made, recipe.shift, [0, 0])?, None)?;
+    }
+    Ok(())
+}
