@@ -8,7 +8,6 @@ use serde_json::Value;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::Grid;
-use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::adapt::{AdaptSetup, Tuning, adapt};
 use touch2touch_work::bundles::{BundleKind, find};
 use touch2touch_work::error::TaskErrorKind;
@@ -16,7 +15,6 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::images;
 use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::mask::MaskChoice;
 use touch2touch_work::models::Models;
 use touch2touch_work::recipe::Recipe;
 

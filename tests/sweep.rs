@@ -10,7 +10,6 @@ use touch2touch_core::sim;
 use touch2touch_work::bundles::{self, BundleInfo};
 use touch2touch_work::evaluate::{Setup, evaluate};
 use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_work::job::{Cancel, JobCx, Progress};

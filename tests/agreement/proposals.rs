@@ -3,8 +3,6 @@
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{HandMask, Review};
 use touch2touch_core::label::{Paint, Provenance};
-use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::models::Models;
 use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};

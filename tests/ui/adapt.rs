@@ -50,7 +50,7 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.shoot("fit-used");
     // It is made again from what it was made from.
     let setup = rig.harness.state().state().adapt_setup().unwrap();
-    assert_eq!((setup.bundle.id, setup.pairs.len()), (shipped.id, 6));
+    assert_eq!((setup.recipe.generating().unwrap().bundle.id.clone(), setup.pairs.len()), (shipped.id, 6));
 }
 
 /// For the pictures only: minutes.
