@@ -43,6 +43,6 @@ if [ -z "${VK_DRIVER_FILES:-}" ]; then
   driver=$(find /usr/share/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1)
   [ -z "$driver" ] || export VK_DRIVER_FILES="$driver"
 fi
-cargo test --locked -p touch2touch -p touch2touch-work --features ui-test
+cargo test --locked -p touch2touch -p touch2touch-work -p touch2touch-bench --features ui-test
 
 step "all passed"

@@ -1,4 +1,4 @@
-"""Open3D and small_gicp on the contact points of `touch2touch bench registration`.
+"""Open3D and small_gicp on the contact points of `touch2touch-bench registration`.
 
 Called by the program as `python peers.py FOLDER`; FOLDER holds `request.json` (case and tool numbers) and
 `request.npz` (contact points of each case, grasp frame; surface points of each tool, object frame; metres).

@@ -6,7 +6,6 @@
 mod adapt;
 mod args;
 mod basin;
-mod bench;
 mod cache;
 mod case;
 mod compare;
@@ -42,9 +41,11 @@ use std::process::ExitCode;
 
 use clap::{Args, CommandFactory as _, Parser, Subcommand};
 
-use output::{PrintError, says};
+use output::PrintError;
 
-pub use output::Output;
+pub use args::{JsonArgs, LimitArgs, at_least_one};
+pub use output::{Output, says};
+pub use recipe::{ModelArgs, RuntimeArg};
 
 use touch2touch_core::rig::Rig;
 use touch2touch_work::io::dataset::ToolScale;
@@ -116,9 +117,6 @@ enum Verb {
     Unit(unit::UnitArgs),
     /// Say how a data set is read otherwise than it is stored, or set it for good: fingers swapped, pictures mirrored, ...
     ReadAs(read_as::ReadAsArgs),
-    /// Time and error of the registration engines and of the generator, side by side.
-    #[command(subcommand)]
-    Bench(bench::BenchVerb),
     /// A pair with everything that its results depend on, in one file.
     #[command(subcommand)]
     Case(case::CaseVerb),
@@ -149,16 +147,21 @@ struct ToolArgs {
 }
 
 /// What a verb hands back: whether everything asked for was done.
-type VerbResult = anyhow::Result<bool>;
+pub type VerbResult = anyhow::Result<bool>;
 
 /// What the shell makes of a program that writes into a pipe nobody reads any more.
 const PIPE_CLOSED: u8 = 141;
 
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
+    program(|| parse(std::env::args_os()).and_then(run))
+}
+
+/// A program of verbs: what it does, its exit code and what it says of errors.
+pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
     output::start_log();
     touch2touch_work::infer::trial::by_this_program();
-    match parse(std::env::args_os()).and_then(run) {
+    match run() {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
         Err(err) => match err.downcast_ref::<PrintError>() {
@@ -278,7 +281,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Unit(args)) => unit::run(&args),
         Some(Verb::ReadAs(args)) => read_as::run(&args),
-        Some(Verb::Bench(verb)) => bench::run(&verb),
         Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Cache(args)) => cache::run(&args),

@@ -138,50 +138,6 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
 }
 
 #[test]
-fn every_engine_is_measured_on_fresh_cases_and_drawn() {
-    let dir = tempfile::tempdir().unwrap();
-    let (folder, out) = (dir.path().join("cases"), dir.path().join("bench.json"));
-    let folder_text = folder.to_str().unwrap();
-    let made = run(&["bench", "cases", "--out", folder_text, "--count", "10", "--seed", "3", "--json"], dir.path());
-    assert!(made.status.success(), "{}", error_text(&made));
-    assert_eq!(json(&made)["cases"], 10);
-    let again = run(&["bench", "cases", "--out", folder_text, "--count", "2"], dir.path());
-    assert!(error_text(&again).contains("already holds cases"), "{}", error_text(&again));
-
-    // Without Python the peers are left out, and that is said.
-    let args = ["bench", "registration", "--cases", folder_text, "--json", out.to_str().unwrap(), "--limit", "3"];
-    let done = run(&[&args[..], &["--python", "/no/such/python"]].concat(), dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
-    let table = String::from_utf8_lossy(&done.stdout).into_owned();
-    assert!(table.contains("<- default") && table.contains("were not run"), "{table}");
-    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
-    let engines = report["engines"].as_array().unwrap();
-    assert!(engines.iter().any(|e| e["name"] == report["default"]), "{report}");
-    assert_eq!(engines.len(), <touch2touch_core::pose::Registration as strum::IntoEnumIterator>::iter().count());
-    for engine in engines {
-        for key in ["mean_deg", "median_deg", "success_5", "success_10", "gross_20", "median_ms", "p95_ms"] {
-            assert!(engine[key].is_number(), "{key} of {engine}");
-            assert!(engine["strata"]["nominal"][key].is_number(), "{key} of {engine}");
-        }
-        assert_eq!(engine["error_deg"].as_array().unwrap().len(), 3);
-    }
-    assert!(!report["front"].as_array().unwrap().is_empty());
-    let svg = std::fs::read_to_string(out.with_extension("svg")).unwrap();
-    assert!(engines.iter().all(|e| svg.contains(e["name"].as_str().unwrap())), "all names are in the picture");
-    let png = touch2touch_work::io::images::read_rgb(&out.with_extension("png")).unwrap();
-    assert_eq!(png.size(), [1500, 930]);
-
-    let whole =
-        run(&["bench", "dataset", "--pairs", "40", "--grasps", "1", "--json", out.to_str().unwrap()], dir.path());
-    assert!(whole.status.success(), "{}", error_text(&whole));
-    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
-    assert_eq!(report["points_to_pose"]["count"], 40);
-    assert!(report["depth_to_pose"]["seconds"].as_f64().unwrap() > 0.0);
-    // Spoilt masks on sound data: an ordinary pair is well within five degrees.
-    assert!(report["depth_to_pose"]["success_5"].as_f64().unwrap() > 90.0, "{report}");
-}
-
-#[test]
 fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");

@@ -77,7 +77,7 @@ impl DatasetArgs {
 
 /// Where the result goes as one JSON object.
 #[derive(Debug, Clone, Args)]
-pub(super) struct JsonArgs {
+pub struct JsonArgs {
     /// Print one JSON object on standard output, as every verb does; with `=FILE`, write it to a file and print the text
     /// for people.
     #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
@@ -86,24 +86,24 @@ pub(super) struct JsonArgs {
 
 impl JsonArgs {
     /// What standard output is for.
-    pub(super) fn common(&self) -> Common {
+    pub fn common(&self) -> Common {
         Common { json: matches!(self.json, Some(None)) }
     }
 
     /// The file to write.
-    pub(super) fn file(&self) -> Option<&Path> {
+    pub fn file(&self) -> Option<&Path> {
         self.json.as_ref()?.as_deref()
     }
 
     /// Writes the file, where one is named.
-    pub(super) fn write(&self, report: &impl Serialize) -> anyhow::Result<()> {
+    pub fn write(&self, report: &impl Serialize) -> anyhow::Result<()> {
         let Some(file) = self.file() else { return Ok(()) };
         atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
             .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))
     }
 
     /// Old command lines put a space before the file's name: `--json FILE.json`.
-    pub(super) fn with_equals(arguments: Vec<OsString>) -> Vec<OsString> {
+    pub fn with_equals(arguments: Vec<OsString>) -> Vec<OsString> {
         let mut out: Vec<OsString> = Vec::with_capacity(arguments.len());
         // `bench` takes no other word.
         let bench = arguments.get(1).is_some_and(|verb| verb == "bench");
@@ -155,7 +155,7 @@ impl TypedValueParser for RegistrationParser {
 
 /// How much of a data set is taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub(super) struct LimitArgs {
+pub struct LimitArgs {
     /// Take only this many, spread evenly over the data set.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     limit: Option<usize>,
@@ -163,12 +163,12 @@ pub(super) struct LimitArgs {
 
 impl LimitArgs {
     /// The positions that are taken of `len`.
-    pub(super) fn spread(self, len: usize) -> Vec<usize> {
+    pub fn spread(self, len: usize) -> Vec<usize> {
         pairs::spread(len, self.limit).collect()
     }
 
     /// The position of the pair that is named, else those that are taken of all.
-    pub(super) fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
+    pub fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
         match pair {
             Some(name) => Ok(vec![super::find_pair(dataset, name)?.0 as usize]),
             None => Ok(self.spread(dataset.index.pairs.len())),
@@ -177,7 +177,7 @@ impl LimitArgs {
 }
 
 /// Reads a number of things to do: none is a mistake, and said as one.
-pub(super) fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T, String> {
+pub fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T, String> {
     match text.parse::<T>() {
         Ok(number) if number >= T::from(1) => Ok(number),
         Ok(_) => Err("that leaves nothing to do; give 1 or more, or leave the option out".to_owned()),

@@ -47,7 +47,7 @@ impl Output {
     }
 
     /// A job whose progress moves the bar.
-    pub(super) fn job(&self) -> JobCx {
+    pub fn job(&self) -> JobCx {
         let bar = self.bar.clone();
         let show = move |p: Progress| {
             bar.set_length(p.total);
@@ -107,7 +107,7 @@ pub(super) fn note(text: &str) {
 }
 
 /// An error with its causes, each said once.
-pub(super) fn says(err: &anyhow::Error) -> String {
+pub fn says(err: &anyhow::Error) -> String {
     touch2touch_work::error::says(err.as_ref())
 }
 

@@ -20,27 +20,28 @@ use touch2touch_work::models::Models;
 use touch2touch_work::recipe::{Model, Recipe};
 use touch2touch_work::tuning::unfinished_folder;
 
+pub(super) use args::MappingArgs;
 use args::SpacingArg;
-pub(super) use args::{MappingArgs, ModelArgs, RuntimeArg};
+pub use args::{ModelArgs, RuntimeArg};
 
 impl ModelArgs {
     /// The models of one run of the program; none is loaded yet.
-    pub(super) fn models(&self) -> Models {
+    pub fn models(&self) -> Models {
         Models::new(if self.no_cache { None } else { super::cache::store() })
     }
 
     /// The engine that runs the models.
-    pub(super) fn engine(&self) -> EngineChoice {
+    pub fn engine(&self) -> EngineChoice {
         self.runtime.choice()
     }
 
     /// The engine's name for people.
-    pub(super) fn engine_label(&self) -> anyhow::Result<&'static str> {
+    pub fn engine_label(&self) -> anyhow::Result<&'static str> {
         Ok(resolve(self.engine())?.label())
     }
 
     /// The folder where a run that is stopped is kept; none with `--no-cache`.
-    pub(super) fn unfinished(&self) -> Option<PathBuf> {
+    pub fn unfinished(&self) -> Option<PathBuf> {
         if self.no_cache { None } else { unfinished_folder() }
     }
 
@@ -49,7 +50,7 @@ impl ModelArgs {
     }
 
     /// The recipe of imprints. A generator is looked for where they are predicted.
-    pub(super) fn recipe(&self, imprint: ImprintSource, rig: &Rig) -> anyhow::Result<Recipe> {
+    pub fn recipe(&self, imprint: ImprintSource, rig: &Rig) -> anyhow::Result<Recipe> {
         let recipe = Recipe { imprint, engine: self.engine(), ..Recipe::default() };
         if imprint == ImprintSource::Measured {
             // Without a generator nothing is read by it; what was asked for is still said.
@@ -78,7 +79,7 @@ impl ModelArgs {
     }
 
     /// The mask model; with `may_lack`, none where none is found and none was named.
-    pub(super) fn mask_model(&self, may_lack: bool, rig: &Rig) -> Result<Option<Model>, TaskError> {
+    pub fn mask_model(&self, may_lack: bool, rig: &Rig) -> Result<Option<Model>, TaskError> {
         match self.take(BundleKind::Mask, self.mask_bundle.as_deref(), rig) {
             Err(_) if may_lack && self.mask_bundle.is_none() => Ok(None),
             found => Ok(Some(found?.into())),

@@ -113,7 +113,7 @@ impl PoseFan {
     pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
         let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
-        if let Some(picture) = super::bench::fan::picture(name, fan, self.truth_rad)? {
+        if let Some(picture) = fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;
         }
         Ok(())

@@ -87,15 +87,8 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch masks queue", How::Run(&[], "", &[0])),
     ("touch2touch masks stats", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),
-    ("touch2touch bench registration", How::Run(&[], "--limit 2 --no-peers", &[0])),
-    ("touch2touch bench generator", How::Run(&[], "--grasps 1 --steps 1 --engine rten --bundle SMALL", &[0])),
-    ("touch2touch bench generator --grasps", How::Run(&[("24", "1")], "--steps 1 --engine rten --bundle SMALL", &[0])),
-    ("touch2touch bench labelling", How::Run(&[("20", "1")], "--steps 1 --bundle SMALL", &[0])),
-    ("touch2touch bench cases", How::Run(&[("200", "4")], "", &[0])),
-    ("touch2touch bench dataset", How::Run(&[], "--pairs 20 --grasps 1", &[0])),
     ("touch2touch cache", How::Run(&[], "", &[0])),
     ("touch2touch read-as", How::Run(&[], "", &[0])),
-    ("touch2touch bench doctor", How::Run(&[], "--sets 1 --sound 1 --pairs 1 --only theta --no-generator", &[0])),
     ("touch2touch unit", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
@@ -124,9 +117,6 @@ impl Stage {
             &["simulate", "--out", set.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "1", "--seed", "3"],
             dir.path(),
         );
-        assert!(done.status.success(), "{}", error_text(&done));
-        let cases = dir.path().join("known");
-        let done = run(&["bench", "cases", "--out", cases.to_str().unwrap(), "--count", "4"], dir.path());
         assert!(done.status.success(), "{}", error_text(&done));
         let dataset = Dataset::open(&set).unwrap();
         let name = dataset.index.pairs[0].name.clone();
@@ -169,10 +159,8 @@ impl Stage {
                 ("MASKS", _) => at("masks"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
                 ("DIR", "--out" | "--influence") => at(&format!("out {number}")),
-                ("DIR", "--cases") => at("known"),
                 ("DIR", "watch") => at("robot"),
                 ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),
-                ("CASES", _) => at("cases"),
                 ("FITTED", "--out") => at(&format!("fitted {number}")),
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
                 ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.md", _) => at(&format!("{number} {word}")),

@@ -1,5 +1,7 @@
 //! Several seeds of one touch: its predictions around their mean ([`seeds_of`]) and the fan of their poses ([`fan`]).
 
+mod picture;
+
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -17,6 +19,8 @@ use touch2touch_core::ensemble::{AngleFan, seeds};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
+
+pub use picture::picture;
 
 /// The predictions of one finger with several seeds.
 #[derive(Clone, Debug)]

@@ -1,16 +1,17 @@
 //! [`Labels`]: what people said about the pairs of a data set (masks drawn by hand, review states, accepted poses), as
 //! it lies on the disk. The studio and every verb read and write it here.
 
+mod accepted;
 mod journal;
 mod record;
 mod recovery;
 mod stored;
 
+pub(crate) use accepted::{by_imprint, of_imprints};
 pub use journal::{Act, Change, Deed, Past, Told};
 pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
 pub use recovery::{Recovered, Unsaved, recover, take_in};
 pub use stored::Labels;
-pub(crate) use stored::{by_imprint, of_imprints};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

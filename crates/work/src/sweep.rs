@@ -12,7 +12,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 use super::error::{Remark, TaskError};
 use super::feel::{Felt, Touch};
@@ -64,6 +64,7 @@ pub struct Sweep {
     /// What the dial stands at without turning it; `None` where something else decides.
     pub at: Option<Setting>,
     /// The recipe besides.
+    #[serde(serialize_with = "what_decides")]
     pub in_force: Recipe,
     /// The measured imprints and the predicted ones, as far as they are there.
     pub series: Vec<Series>,
@@ -77,6 +78,12 @@ pub struct Sweep {
     pub complete: bool,
     /// Time it took, seconds.
     pub seconds: f64,
+}
+
+/// A recipe of both imprints without what decides nothing.
+fn what_decides<S: Serializer>(recipe: &Recipe, to: S) -> Result<S::Ok, S::Error> {
+    let imprint = recipe.generator.as_ref().map_or(ImprintSource::Measured, |_| ImprintSource::Predicted);
+    recipe.of(imprint).until(Stage::Pose).serialize(to)
 }
 
 /// A pair that is read.

@@ -16,7 +16,7 @@ use touch2touch_work::subject::{Mapping, Wish};
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
-pub(in crate::headless) struct ModelArgs {
+pub struct ModelArgs {
     /// The generator's bundle (default: the shipped one).
     #[arg(long)]
     pub(super) bundle: Option<PathBuf>,
@@ -169,8 +169,9 @@ impl MappingArgs {
     }
 }
 
+/// The engine that runs the models, as the command line says it.
 #[derive(Debug, Clone, Copy, ValueEnum)]
-pub(in crate::headless) enum RuntimeArg {
+pub enum RuntimeArg {
     /// ONNX Runtime where its library is found, else the built-in engine.
     Auto,
     /// The built-in engine.
@@ -181,7 +182,7 @@ pub(in crate::headless) enum RuntimeArg {
 
 impl RuntimeArg {
     /// The choice for the engines.
-    pub(in crate::headless) fn choice(self) -> EngineChoice {
+    pub fn choice(self) -> EngineChoice {
         match self {
             RuntimeArg::Auto => EngineChoice::Auto,
             RuntimeArg::Rten => EngineChoice::Rten,

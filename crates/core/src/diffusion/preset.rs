@@ -29,7 +29,7 @@ pub enum Preset {
     #[default]
     Default,
     /// As many steps as still change anything: the sharpest picture. Whether it is also the one with the smallest
-    /// error depends on the bundle: `touch2touch bench generator` tells.
+    /// error depends on the bundle: `touch2touch-bench generator` tells.
     Sharp,
 }
 

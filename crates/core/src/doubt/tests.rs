@@ -1,4 +1,4 @@
-//! Sets of simulated pairs, sound ones and such that were stored wrongly. `touch2touch bench doctor` measures all kinds.
+//! Sets of simulated pairs, sound ones and such that were stored wrongly. `touch2touch-bench doctor` measures all kinds.
 
 use strum::IntoEnumIterator as _;
 

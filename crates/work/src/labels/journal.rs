@@ -2,7 +2,7 @@
 //! also when the program was closed or killed in between.
 
 use super::super::io::masks::ByImprint;
-use super::stored::{by_imprint, of_imprints};
+use super::accepted::{by_imprint, of_imprints};
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 

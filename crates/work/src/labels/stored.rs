@@ -1,11 +1,10 @@
 //! [`Labels`]: the labels of a data set as they lie on the disk.
 
-use super::super::io::masks::ByImprint;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use touch2touch_core::predicted_id::PredictedId;
 
+use super::accepted::{by_imprint, of_imprints};
 use super::{
     Change, Deed, HandMask, ImprintOf, MaskPlace, PairLabels, Record, Review, Reviews, Revision, Told, journal, note,
     record,
@@ -287,24 +286,4 @@ impl Signed {
 pub(super) fn stored_review(labels: &PairLabels) -> StoredReview {
     let accepted = by_imprint(&labels.accepted);
     StoredReview { review: labels.review.stored().into(), accepted, note: labels.note.clone() }
-}
-
-/// Values by imprint, as files hold them.
-pub(crate) fn by_imprint<T: Clone>(values: &BTreeMap<ImprintOf, T>) -> ByImprint<T> {
-    let mut out = ByImprint::default();
-    for (of, value) in values {
-        match of {
-            ImprintOf::Measured => out.accepted[0] = Some(value.clone()),
-            ImprintOf::Predicted(id) if *id == PredictedId::unknown() => out.accepted[1] = Some(value.clone()),
-            ImprintOf::Predicted(id) => drop(out.accepted_predicted.insert(id.clone(), value.clone())),
-        }
-    }
-    out
-}
-
-/// Values that files hold, by imprint.
-pub(crate) fn of_imprints<T>(stored: ByImprint<T>) -> BTreeMap<ImprintOf, T> {
-    let unnamed = [ImprintOf::Measured, ImprintOf::unknown()].into_iter().zip(stored.accepted);
-    let named = stored.accepted_predicted.into_iter().map(|(id, value)| (ImprintOf::Predicted(id), value));
-    unnamed.filter_map(|(of, value)| Some((of, value?))).chain(named).collect()
 }

@@ -1,4 +1,4 @@
-//! `touch2touch bench cases`: fresh known grasps from the built-in simulator.
+//! `touch2touch-bench cases`: fresh known grasps from the built-in simulator.
 
 use std::path::PathBuf;
 
@@ -6,13 +6,13 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::headless::{Common, Output, VerbResult};
+use touch2touch::headless::{Common, Output, VerbResult};
 use touch2touch_work::io::cases;
 use touch2touch_work::io::stl;
 
 /// Arguments of `bench cases`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct CasesArgs {
+pub(super) struct CasesArgs {
     /// New folder for `case_NNN.npz` and `tool_KK.stl`.
     #[arg(long)]
     out: PathBuf,

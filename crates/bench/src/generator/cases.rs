@@ -16,11 +16,11 @@ use touch2touch_work::compare::LAB_PEAK_M;
 use touch2touch_work::infer::mask::MaskModel;
 
 /// A grasp of a simulated tool.
-pub(in crate::headless::bench) struct Case {
-    pub(in crate::headless::bench) name: String,
-    pub(in crate::headless::bench) sample: Sample,
-    pub(in crate::headless::bench) tool: std::sync::Arc<ToolModel>,
-    pub(in crate::headless::bench) truth: PlanarPose,
+pub(crate) struct Case {
+    pub(crate) name: String,
+    pub(crate) sample: Sample,
+    pub(crate) tool: std::sync::Arc<ToolModel>,
+    pub(crate) truth: PlanarPose,
 }
 
 /// What a prediction is worth.
@@ -37,11 +37,7 @@ pub(super) struct Score {
 ///
 /// # Errors
 /// If no tool is wanted, or a CAD model cannot be used.
-pub(in crate::headless::bench) fn simulate(
-    count: usize,
-    seed: u64,
-    wanted: impl Fn(bool) -> bool,
-) -> anyhow::Result<Vec<Case>> {
+pub(crate) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
     let specs: Vec<_> = catalog::tools().iter().filter(|tool| wanted(tool.seen)).collect();
     anyhow::ensure!(!specs.is_empty(), "there are no such tools");
     let models = specs

@@ -1,4 +1,4 @@
-//! `touch2touch bench labelling`: what proposed masks are worth on known grasps, what a stroke costs, and what a mask takes
+//! `touch2touch-bench labelling`: what proposed masks are worth on known grasps, what a stroke costs, and what a mask takes
 //! a person.
 
 mod actions;
@@ -11,9 +11,9 @@ use serde::Serialize;
 use super::Machine;
 use super::figures::quantile;
 use super::generator::cases::{Case, simulate};
-use crate::headless::args::JsonArgs;
-use crate::headless::recipe::ModelArgs;
-use crate::headless::{Output, VerbResult};
+use touch2touch::headless::JsonArgs;
+use touch2touch::headless::ModelArgs;
+use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -38,7 +38,7 @@ const STROKES: usize = 20;
 
 /// Arguments of `bench labelling`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct LabellingArgs {
+pub(super) struct LabellingArgs {
     /// Grasps of the unseen tools, simulated.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     grasps: u32,

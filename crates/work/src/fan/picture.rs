@@ -3,10 +3,10 @@
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
+use crate::canvas::{Drawing, Drawn, Paper, pixels};
 use touch2touch_core::ensemble::{AngleFan, Dial};
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::units;
-use touch2touch_work::canvas::{Drawing, Drawn, Paper, pixels};
 
 const SEED: RGBColor = RGBColor(0xc2, 0x54, 0x00);
 const TRUTH: RGBColor = RGBColor(0x1c, 0x84, 0x47);
@@ -59,11 +59,7 @@ impl Drawing for Picture<'_> {
 }
 
 /// Draws a fan with the true angle, where known; `None` for a fan without a mean.
-pub(in crate::headless) fn picture(
-    title: &str,
-    fan: &AngleFan,
-    truth_rad: Option<f64>,
-) -> anyhow::Result<Option<RgbGrid>> {
+pub fn picture(title: &str, fan: &AngleFan, truth_rad: Option<f64>) -> anyhow::Result<Option<RgbGrid>> {
     let others: Vec<f64> = truth_rad.into_iter().collect();
     Dial::of(fan, &others).map(|dial| pixels(&Picture { title, fan, dial, truth_rad }, 2.0)).transpose()
 }

@@ -1,4 +1,4 @@
-//! `touch2touch bench generator`: error against time of sampler, steps and engine, on simulated grasps.
+//! `touch2touch-bench generator`: error against time of sampler, steps and engine, on simulated grasps.
 
 pub(super) mod cases;
 mod timing;
@@ -15,8 +15,8 @@ use self::timing::{First, Overhead, timed_run};
 use super::Machine;
 use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint, Picture};
-use crate::headless::args::JsonArgs;
-use crate::headless::{Output, VerbResult};
+use touch2touch::headless::JsonArgs;
+use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::Rig;
@@ -35,7 +35,7 @@ const SHARE: f64 = 0.1;
 
 /// Arguments of `bench generator`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct GeneratorArgs {
+pub(super) struct GeneratorArgs {
     /// The generator's bundle (default: the shipped one).
     #[arg(long)]
     bundle: Option<PathBuf>,

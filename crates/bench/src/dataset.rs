@@ -1,4 +1,4 @@
-//! `touch2touch bench dataset`: how long a whole data set takes on all cores.
+//! `touch2touch-bench dataset`: how long a whole data set takes on all cores.
 
 use std::time::Instant;
 
@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::{Machine, contact_points};
-use crate::headless::args::JsonArgs;
-use crate::headless::{Output, VerbResult};
+use touch2touch::headless::JsonArgs;
+use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::catalog;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -31,7 +31,7 @@ const JITTER_M: f64 = 1e-3;
 
 /// Arguments of `bench dataset`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct DatasetArgs {
+pub(super) struct DatasetArgs {
     /// Pairs in all; the lab's data set has 12 tools with 2688 grasps each.
     #[arg(long, default_value_t = 32_256, value_parser = clap::value_parser!(u32).range(1..=10_000_000))]
     pairs: u32,

@@ -1,4 +1,4 @@
-//! `touch2touch bench doctor`: how surely a data set that is stored wrongly is told from a sound one, and what is wrong with
+//! `touch2touch-bench doctor`: how surely a data set that is stored wrongly is told from a sound one, and what is wrong with
 //! it.
 
 mod kinds;
@@ -10,9 +10,9 @@ use strum::IntoEnumIterator as _;
 
 use self::kinds::{Kind, Set, kinds};
 use super::Machine;
-use crate::headless::args::JsonArgs;
-use crate::headless::recipe::RuntimeArg;
-use crate::headless::{Output, VerbResult};
+use touch2touch::headless::JsonArgs;
+use touch2touch::headless::RuntimeArg;
+use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::catalog::{ToolSpec, tools};
 use touch2touch_core::doubt::{Doubt, Felt, judge};
 use touch2touch_core::rig::Rig;
@@ -25,7 +25,7 @@ use touch2touch_work::predict::Generating;
 
 /// Arguments of `bench doctor`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct DoctorArgs {
+pub(super) struct DoctorArgs {
     /// Pairs in a data set.
     #[arg(long, default_value_t = PAIRS as u32, value_parser = clap::value_parser!(u32).range(1..=200))]
     pairs: u32,
@@ -81,7 +81,7 @@ struct Report {
     false_alarms: usize,
 }
 
-pub(in crate::headless) fn run(args: &DoctorArgs) -> VerbResult {
+pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     let machine = Machine::now();
     let kinds: Vec<Kind> =
         kinds().into_iter().filter(|kind| args.only.as_ref().is_none_or(|text| kind.name.contains(text))).collect();

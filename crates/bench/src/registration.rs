@@ -1,4 +1,4 @@
-//! `touch2touch bench registration`: every engine on every case, one thread, one table.
+//! `touch2touch-bench registration`: every engine on every case, one thread, one table.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -14,9 +14,9 @@ use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
-use crate::headless::args::{JsonArgs, LimitArgs, at_least_one};
-use crate::headless::output::says;
-use crate::headless::{Output, VerbResult};
+use touch2touch::headless::says;
+use touch2touch::headless::{JsonArgs, LimitArgs, at_least_one};
+use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::align::{AlignError, AlignReport, icp};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
@@ -34,8 +34,8 @@ const MAX_REPETITIONS: usize = 15;
 
 /// Arguments of `bench registration`.
 #[derive(Debug, Args)]
-pub(in crate::headless) struct RegistrationArgs {
-    /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch bench cases` writes one).
+pub(super) struct RegistrationArgs {
+    /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch-bench cases` writes one).
     #[arg(long)]
     cases: PathBuf,
     #[command(flatten)]

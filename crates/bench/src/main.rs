@@ -1,9 +1,9 @@
-//! `touch2touch bench`: time and error of the registration engines and of the generator, on known grasps, side by side.
+//! `touch2touch-bench`: time and error of the registration engines and of the generator, on known grasps, side by side; what
+//! masks cost a person, and what the doctor finds. None of it ships with the studio.
 
 mod cases;
 mod dataset;
 mod doctor;
-pub(super) mod fan;
 mod figures;
 mod front;
 mod generator;
@@ -12,23 +12,30 @@ mod peers;
 mod registration;
 mod rows;
 
-use clap::Subcommand;
+use std::process::ExitCode;
+
+use clap::Parser;
 use glam::DVec3;
 use serde::Serialize;
-
-use super::VerbResult;
+use touch2touch::headless::{JsonArgs, VerbResult, program};
 use touch2touch_core::cloud::{CloudError, lift};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::sample::DepthCamera;
 
 /// What is measured.
-#[derive(Debug, Subcommand)]
-pub(super) enum BenchVerb {
+#[derive(Debug, Parser)]
+#[command(
+    name = "touch2touch-bench",
+    version,
+    about = "Benchmarks of Touch2Touch Studio",
+    disable_help_subcommand = true
+)]
+enum Benchmark {
     /// Every registration engine, and Open3D and small_gicp where Python has them, on a folder of known grasps.
     Registration(registration::RegistrationArgs),
     /// Error against time of sampler, steps and engine of a generator, on simulated grasps.
     Generator(generator::GeneratorArgs),
-    /// Write fresh known grasps of the built-in simulator, for `bench registration`.
+    /// Write fresh known grasps of the built-in simulator, for `touch2touch-bench registration`.
     Cases(cases::CasesArgs),
     /// What proposed contact masks are worth on simulated grasps, what a stroke costs, and what a mask takes a person.
     Labelling(labelling::LabellingArgs),
@@ -38,14 +45,22 @@ pub(super) enum BenchVerb {
     Dataset(dataset::DatasetArgs),
 }
 
-pub(super) fn run(verb: &BenchVerb) -> VerbResult {
-    match verb {
-        BenchVerb::Registration(args) => registration::run(args),
-        BenchVerb::Generator(args) => generator::run(args),
-        BenchVerb::Cases(args) => cases::run(args),
-        BenchVerb::Labelling(args) => labelling::run(args),
-        BenchVerb::Doctor(args) => doctor::run(args),
-        BenchVerb::Dataset(args) => dataset::run(args),
+fn main() -> ExitCode {
+    // A bundle that does not ship is tried in a process of its own, which is this program again with the studio's verb.
+    if std::env::args_os().nth(1).is_some_and(|word| word == "bundle") {
+        return touch2touch::headless::main();
+    }
+    program(|| run(&Benchmark::parse_from(JsonArgs::with_equals(std::env::args_os().collect()))))
+}
+
+fn run(benchmark: &Benchmark) -> VerbResult {
+    match benchmark {
+        Benchmark::Registration(args) => registration::run(args),
+        Benchmark::Generator(args) => generator::run(args),
+        Benchmark::Cases(args) => cases::run(args),
+        Benchmark::Labelling(args) => labelling::run(args),
+        Benchmark::Doctor(args) => doctor::run(args),
+        Benchmark::Dataset(args) => dataset::run(args),
     }
 }
 

@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::cases::Case;
-use crate::headless::bench::figures::quantile;
+use crate::figures::quantile;
 use touch2touch_core::diffusion::{GaussianNoise, GenerateConfig, Progress, Tensor};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::{RawPrediction, ShiftMode};

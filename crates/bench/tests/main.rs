@@ -1,0 +1,108 @@
+//! The benchmarks run, and say what their pages say.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use serde_json::Value;
+
+fn run(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_touch2touch-bench")).args(arguments).output().unwrap()
+}
+
+fn json(output: &Output) -> Value {
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+fn error_text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+#[test]
+fn every_engine_is_measured_on_fresh_cases_and_drawn() {
+    let dir = tempfile::tempdir().unwrap();
+    let (folder, out) = (dir.path().join("cases"), dir.path().join("bench.json"));
+    let folder_text = folder.to_str().unwrap();
+    let made = run(&["cases", "--out", folder_text, "--count", "10", "--seed", "3", "--json"]);
+    assert!(made.status.success(), "{}", error_text(&made));
+    assert_eq!(json(&made)["cases"], 10);
+    let again = run(&["cases", "--out", folder_text, "--count", "2"]);
+    assert!(error_text(&again).contains("already holds cases"), "{}", error_text(&again));
+
+    // Without Python the peers are left out, and that is said.
+    let args = ["registration", "--cases", folder_text, "--json", out.to_str().unwrap(), "--limit", "3"];
+    let done = run(&[&args[..], &["--python", "/no/such/python"]].concat());
+    assert!(done.status.success(), "{}", error_text(&done));
+    let table = String::from_utf8_lossy(&done.stdout).into_owned();
+    assert!(table.contains("<- default") && table.contains("were not run"), "{table}");
+    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    let engines = report["engines"].as_array().unwrap();
+    assert!(engines.iter().any(|e| e["name"] == report["default"]), "{report}");
+    assert_eq!(engines.len(), <touch2touch_core::pose::Registration as strum::IntoEnumIterator>::iter().count());
+    for engine in engines {
+        for key in ["mean_deg", "median_deg", "success_5", "success_10", "gross_20", "median_ms", "p95_ms"] {
+            assert!(engine[key].is_number(), "{key} of {engine}");
+            assert!(engine["strata"]["nominal"][key].is_number(), "{key} of {engine}");
+        }
+        assert_eq!(engine["error_deg"].as_array().unwrap().len(), 3);
+    }
+    assert!(!report["front"].as_array().unwrap().is_empty());
+    let svg = std::fs::read_to_string(out.with_extension("svg")).unwrap();
+    assert!(engines.iter().all(|e| svg.contains(e["name"].as_str().unwrap())), "all names are in the picture");
+    let png = touch2touch_work::io::images::read_rgb(&out.with_extension("png")).unwrap();
+    assert_eq!(png.size(), [1500, 930]);
+
+    let whole = run(&["dataset", "--pairs", "40", "--grasps", "1", "--json", out.to_str().unwrap()]);
+    assert!(whole.status.success(), "{}", error_text(&whole));
+    let report: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
+    assert_eq!(report["points_to_pose"]["count"], 40);
+    assert!(report["depth_to_pose"]["seconds"].as_f64().unwrap() > 0.0);
+    // Spoilt masks on sound data: an ordinary pair is well within five degrees.
+    assert!(report["depth_to_pose"]["success_5"].as_f64().unwrap() > 90.0, "{report}");
+}
+
+#[test]
+fn the_other_benchmarks_run() {
+    let (dir, from) =
+        (tempfile::tempdir().unwrap(), Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/data/bundles"));
+    for entry in std::fs::read_dir(from.join("generator")).unwrap() {
+        let path = entry.unwrap().path();
+        std::fs::copy(&path, dir.path().join(path.file_name().unwrap())).unwrap();
+    }
+    // Its pictures are small; as large as the imprints they are compared with.
+    let manifest = dir.path().join("manifest.json");
+    let mut value: Value = serde_json::from_slice(&std::fs::read(&manifest).unwrap()).unwrap();
+    value["output"]["imprint_size"] = serde_json::json!([175, 140]);
+    std::fs::write(manifest, value.to_string()).unwrap();
+    let bundle = dir.path();
+    let bundle = ["--runtime", "rten", "--steps", "1", "--bundle", bundle.to_str().unwrap(), "--json"];
+    let generator = ["generator", "--grasps", "1", "--engine", "rten", "--steps", "1", "--bundle", bundle[5], "--json"];
+    let labelling = [&["labelling", "--grasps", "1"][..], &bundle].concat();
+    let doctor =
+        ["doctor", "--sets", "1", "--sound", "1", "--pairs", "1", "--only", "theta", "--no-generator", "--json"];
+    for arguments in [&generator[..], &labelling, &doctor] {
+        let done = run(arguments);
+        assert!(done.status.success(), "{arguments:?}: {}", error_text(&done));
+        assert!(json(&done).is_object(), "{arguments:?}");
+    }
+}
+
+#[test]
+fn what_pages_say_of_a_benchmark_it_has() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut said = 0;
+    for page in ["README.md", "docs/benchmarks.md", "docs/generator.md", "docs/labeling.md"] {
+        let text = std::fs::read_to_string(root.join(page)).unwrap();
+        for command in text.split("touch2touch-bench").skip(1) {
+            let command = command.split(['\n', '`', '#']).next().unwrap_or_default().trim_start_matches(" --");
+            let mut words = command.split_whitespace();
+            let Some(name) = words.next().filter(|word| word.chars().all(char::is_alphabetic)) else { continue };
+            let help = String::from_utf8(run(&[name, "--help"]).stdout).unwrap();
+            for option in words.filter(|word| word.starts_with("--")) {
+                let option = option.split('=').next().unwrap_or_default();
+                assert!(help.contains(option), "{page}: {name} has no {option}\n{help}");
+                said += 1;
+            }
+        }
+    }
+    assert!(said >= 10, "{said}");
+}
