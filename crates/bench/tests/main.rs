@@ -1,5 +1,7 @@
 //! The benchmarks run, and say what their pages say.
 
+#![allow(clippy::unwrap_used, reason = "in a test an unexpected error is a failure")]
+
 use std::path::Path;
 use std::process::{Command, Output};
 

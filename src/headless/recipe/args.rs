@@ -2,6 +2,7 @@
 
 use std::cell::OnceCell;
 use std::path::PathBuf;
+use std::rc::Rc;
 
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
@@ -56,7 +57,7 @@ pub struct ModelArgs {
     pub(super) no_cache: bool,
     /// The bundles that are there, looked for when first needed.
     #[arg(skip)]
-    pub(super) found: OnceCell<FoundBundles>,
+    pub(super) found: Rc<OnceCell<FoundBundles>>,
 }
 
 impl ModelArgs {
