@@ -283,6 +283,19 @@ fn lab_folder(home: &Path) -> PathBuf {
     folder
 }
 
+/// A folder of two picture pairs.
+fn pictures_folder(home: &Path) -> PathBuf {
+    let folder = home.join("pictures");
+    std::fs::create_dir_all(&folder).unwrap();
+    for (name, at) in [("a", 30), ("b", 70)] {
+        let gelslim = Grid::from_fn(128, 128, |x, y| [(x % 90) as f32 + 80.0, ((y + at) % 70) as f32 + 90.0, 120.0]);
+        images::write_rgb8(&folder.join(format!("{name}_gelslim.png")), &gelslim).unwrap();
+        let bubble = Grid::from_fn(128, 128, |x, y| 220 - 2 * x.abs_diff(at).max(y.abs_diff(60)).min(100) as u8);
+        images::write_gray8(&folder.join(format!("{name}_bubble.png")), &bubble).unwrap();
+    }
+    folder
+}
+
 fn name_of(report: &Value, pair: usize) -> String {
     report["cases"][pair]["name"].as_str().unwrap().to_owned()
 }
@@ -427,14 +440,7 @@ fn the_most_uncertain_masks_are_in_one_order_in_both() {
 #[test]
 fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
     let home = tempfile::tempdir().unwrap();
-    let folder = home.path().join("pictures");
-    std::fs::create_dir_all(&folder).unwrap();
-    for (name, at) in [("a", 30), ("b", 70)] {
-        let gelslim = Grid::from_fn(128, 128, |x, y| [(x % 90) as f32 + 80.0, ((y + at) % 70) as f32 + 90.0, 120.0]);
-        images::write_rgb8(&folder.join(format!("{name}_gelslim.png")), &gelslim).unwrap();
-        let bubble = Grid::from_fn(128, 128, |x, y| 220 - 2 * x.abs_diff(at).max(y.abs_diff(60)).min(100) as u8);
-        images::write_gray8(&folder.join(format!("{name}_bubble.png")), &bubble).unwrap();
-    }
+    let folder = pictures_folder(home.path());
     let found = assert_same(Place::Path(folder.clone()), folder.to_str().unwrap(), home.path(), 2);
     assert_eq!(found["comparison"], 2, "{found:?}");
 }

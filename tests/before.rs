@@ -8,13 +8,20 @@ use touch2touch::app::command::{Command, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
+use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::settings::{GenerateSettings, Settings};
+use touch2touch::app::settings::{GenerateSettings, MaskSource, Settings};
 use touch2touch::app::state::State;
-use touch2touch_core::diffusion::Sampler;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::{GenerateConfig, Sampler};
+use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
-use touch2touch_work::bundles;
-use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind};
+use touch2touch_work::infer::kept_key::KeptKey;
+use touch2touch_work::infer::store::{DEFAULT_BUDGET, Store};
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::labels::ImprintOf;
+use touch2touch_work::{bundles, case};
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::run;
@@ -133,4 +140,71 @@ fn an_accepted_pose_is_of_one_prediction() {
     let refused = run(&[&withdraw[..], &["--bundle", bundle, "--steps", "2", "--seed", "9"]].concat(), dir.path());
     let why = String::from_utf8_lossy(&refused.stderr);
     assert!(!refused.status.success() && why.contains("seed 9") && why.contains("seed 7"), "{why}");
+}
+
+/// A fixture that an earlier build wrote, copied, so that nothing writes into it.
+fn fixture(name: &str, dir: &Path) -> PathBuf {
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/before").join(name);
+    let to = dir.join(name);
+    if from.is_file() {
+        std::fs::copy(from, &to).unwrap();
+        return to;
+    }
+    std::fs::create_dir(&to).unwrap();
+    for entry in std::fs::read_dir(from).unwrap() {
+        let file = entry.unwrap().path();
+        std::fs::copy(&file, to.join(file.file_name().unwrap())).unwrap();
+    }
+    to
+}
+
+#[test]
+fn preferences_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    fixture("settings.json", dir.path());
+    let (settings, problem) = LiveServices::with_config_folder(Some(dir.path().to_owned())).load_settings();
+    assert_eq!(problem, None);
+    let GenerateSettings { bundle, preset, steps, seed, eta, .. } = settings.generate;
+    assert_eq!((bundle.as_deref(), preset, steps, seed, eta), (Some("my generator"), None, 7, u64::MAX, 0.1));
+    assert_eq!((settings.runtime, settings.shift), (EngineChoice::Rten, ShiftMode::PaperShift));
+    assert_eq!((settings.mask.choice.source, settings.mask.choice.cad_distance_m), (MaskSource::Cad, 0.0015));
+}
+
+#[test]
+fn a_case_is_opened_and_its_results_are_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = fixture("measured.t2tcase", dir.path());
+    let opened = case::open(&file, dir.path()).unwrap();
+    let recipe = &opened.case.recipe;
+    assert!(recipe.hand && recipe.generator.is_none() && recipe.imprint == ImprintSource::Measured);
+    assert_eq!((recipe.mask.source, recipe.mask.threshold_m), (MaskSource::Threshold, 0.0045));
+    assert_eq!(
+        (recipe.registration.to_string(), recipe.engine),
+        ("distance_field:gate=1.5".into(), EngineChoice::Rten)
+    );
+    let accepted = opened.labels.accepted(&ImprintOf::Measured).unwrap().pose.planar;
+    assert_eq!((accepted.theta_rad, opened.labels.note.as_str()), (0.1, "by an earlier build"));
+    let checked = run(&["case", "check", file.to_str().unwrap()], dir.path());
+    assert!(checked.status.success(), "{}", String::from_utf8_lossy(&checked.stdout));
+}
+
+#[test]
+fn a_kept_prediction_is_found() {
+    let dir = tempfile::tempdir().unwrap();
+    let store = Store::new(fixture("predictions", dir.path()), DEFAULT_BUDGET);
+    let config = GenerateConfig { steps: 2, eta: 0.1, ..GenerateConfig::default() };
+    let key = |config| KeptKey::new("ab".repeat(32), "cd".repeat(32), EngineKind::Rten, config);
+    let found = store.get(&key(&config)).expect("it is found by all that decides it");
+    assert_eq!((found.raw.channels.len(), found.raw.channels[2][(3, 1)], found.seconds), (3, 213.0 / 7.0, 0.5));
+    assert!(store.get(&key(&GenerateConfig { eta: 0.2, ..config })).is_none());
+}
+
+#[test]
+fn a_fit_is_applied() {
+    let dir = tempfile::tempdir().unwrap();
+    let bundle = bundles::open("test", fixture("fitted", dir.path()).as_path()).unwrap();
+    let fit = bundle.open("test").unwrap().fit().cloned().expect("it was fitted");
+    let sample = Dataset::demo().load(PairId(0)).unwrap();
+    let correction = fit.correction(&sample, lab::RIGHT).expect("to the right finger as well");
+    assert!((correction.line[0] - 1.177).abs() < 1e-3, "{:?}", correction.line);
 }

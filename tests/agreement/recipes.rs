@@ -4,7 +4,14 @@
 use std::path::Path;
 
 use proptest::prelude::*;
+use proptest::strategy::ValueTree as _;
+use proptest::test_runner::TestRunner;
+use serde_json::Value;
 use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{Pane, SettingsCommand};
+use touch2touch::app::library::Place;
+use touch2touch::app::settings::{GenerateSettings, MaskSettings};
+use touch2touch::app::state::{Lookup, State};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::{Registration, RegistrationChoice, Rejection};
@@ -15,6 +22,8 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::recipe::{Model, Recipe, Stage};
+
+use super::{Studio, json, lab_folder, number, optional, pictures_folder};
 
 fn model(name: &str) -> Model {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name);
@@ -101,6 +110,96 @@ proptest! {
         let later = Recipe { mask: b.mask, hand: b.hand, ..later };
         prop_assert_eq!(later.id(Stage::Imprint), a.id(Stage::Imprint));
     }
+}
+
+/// Puts a recipe in force in the studio.
+fn put(studio: &mut Studio, recipe: &Recipe) {
+    let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = recipe.generator.as_ref().unwrap().1;
+    let before = studio.state.settings.clone();
+    let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, guidance, ..before.generate };
+    studio.send(SettingsCommand::SetRuntime(EngineChoice::Rten).into());
+    studio.send(SettingsCommand::SetGenerate(generate).into());
+    studio.send(SettingsCommand::SetShift(recipe.shift).into());
+    studio.send(SettingsCommand::SetMask(MaskSettings { choice: recipe.mask, ..before.mask }).into());
+    studio.send(SettingsCommand::SetPoseEngine(recipe.registration).into());
+}
+
+/// What the studio shows of the selected pair, and what the verbs say of it with the words that the studio gives for it.
+/// How many numbers there were.
+fn same(studio: &Studio, path: &str, home: &Path) -> usize {
+    let (state, mut compared) = (&studio.state, 0);
+    let said = |pane| {
+        let words = state.equivalent_words(pane, 0.004).unwrap();
+        json(&words[1..].iter().map(String::as_str).collect::<Vec<_>>(), home)
+    };
+    let (poses, name) = (said(Pane::Metrics), state.pair_name());
+    let made = {
+        let words = state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let case = home.join(format!("{}.t2tcase", file_name(state)));
+        let begin = ["case", "make", path, "--pair", name, "--out", case.to_str().unwrap()];
+        json(&begin.into_iter().chain(words.iter().map(String::as_str)).collect::<Vec<_>>(), home)
+    };
+    let cases: &[Value] = poses["cases"].as_array().map_or(&[], Vec::as_slice);
+    for source in ImprintSource::iter() {
+        let case = cases.iter().find(|case| case["imprint"] == source.key());
+        let angle = case.map_or(&Value::Null, |case| &case["angle_deg"]);
+        let shown = state.pose(source).ready();
+        assert_eq!(*angle, optional(shown.map(|pose| pose.angle_rad.to_degrees())), "{name} {source:?}: {case:?}");
+        let in_case = made["angles_deg"].as_array().unwrap().iter().find(|of| of[0] == source.key());
+        assert_eq!(in_case.map_or(&Value::Null, |of| &of[1]), angle, "{name} {source:?} in a case");
+        if let (Some(pose), Some(case)) = (shown, case) {
+            let place = pose.object_from_grasp();
+            assert_eq!([&case["y_m"], &case["z_m"]], [&number(place.y_m), &number(place.z_m)], "{name} {source:?}");
+            assert_eq!(case["error_deg"], optional(pose.error_rad.map(f64::to_degrees)), "{name} {source:?}");
+            compared += 4;
+        }
+    }
+    let generated = said(Pane::Generate);
+    for finger in state.rig().pads() {
+        let Lookup::Ready(found) = state.comparison(finger) else { continue };
+        let key = state.finger_name(finger).to_string();
+        let rows = generated["pairs"].as_array().unwrap();
+        let row = rows.iter().find(|row| row["finger"] == key.as_str()).unwrap();
+        assert_eq!([&row["psnr_db"], &row["ssim"]], [&optional(found.psnr_db), &optional(found.ssim)], "{name} {key}");
+        compared += 2;
+    }
+    compared
+}
+
+/// A name of the pair that is one of a file.
+fn file_name(state: &State) -> String {
+    state.pair_name().replace('/', "-")
+}
+
+#[test]
+fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
+    let mut runner = TestRunner::deterministic();
+    let mut draw = || {
+        let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
+        let (model, config) =
+            recipe.generator.take().unwrap_or_else(|| (model("generator"), GenerateConfig::default()));
+        recipe.generator = Some((model, GenerateConfig { steps: 1 + config.steps % 2, ..config }));
+        recipe
+    };
+    let home = tempfile::tempdir().unwrap();
+    let lab = lab_folder(home.path());
+    let pictures = pictures_folder(home.path());
+    let mut compared = Vec::new();
+    for (place, path, pairs) in [
+        (Place::Demo, "demo", 96),
+        (Place::Path(lab.clone()), lab.to_str().unwrap(), 3),
+        (Place::Path(pictures.clone()), pictures.to_str().unwrap(), 2),
+    ] {
+        let mut studio = Studio::open(place, home.path());
+        let mut count = 0;
+        for at in 0..3 {
+            put(&mut studio, &draw());
+            studio.predict((at * 31) % pairs);
+            count += same(&studio, path, home.path());
+        }
+        compared.push(count);
+    }
+    assert!(compared.iter().all(|count| *count >= 6), "{compared:?}");
 }
 
 /// Part of the format: kept results are found by it.
