@@ -173,7 +173,6 @@ fn every_verb_takes_the_dataset_as_a_path_or_as_input_and_no_number_of_nothing()
         "stats demo --out x --limit 0",
         "pose demo --limit 0",
         "masks export demo --out x --limit 0",
-        "bench registration --cases x --limit 0",
         "simulate --out x --grasps 0",
         "evaluate demo --grasps 0",
     ] {

@@ -21,7 +21,7 @@ use touch2touch_core::align::{Ask, Register};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::pose::ToolModel;
-use touch2touch_core::rig::PerPad;
+use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 
 /// A pair with what is known of it.
@@ -40,7 +40,7 @@ pub struct Touch<'a> {
 }
 
 /// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
-type Probability = Arc<(Grid<f32>, f32)>;
+pub(crate) type Probability = Arc<(Grid<f32>, f32)>;
 
 /// What came of a touch by a recipe, as far as it was asked for. It is cheap to copy.
 #[derive(Clone, Debug, Default)]
@@ -76,10 +76,14 @@ impl Felt {
         Self { predictions: Arc::new(made), reached: Some(Stage::Prediction), ..Self::new(recipe) }
     }
 
+    /// Imprints of a recipe that were made together with others.
+    pub fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+        Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(recipe) }
+    }
+
     /// Imprints that no recipe makes, such as the mean of several. Nobody can have drawn on them.
     pub fn of_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
-        let recipe = Recipe { hand: false, ..recipe.clone() };
-        Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(&recipe) }
+        Self::with_imprints(&Recipe { hand: false, ..recipe.clone() }, imprints)
     }
 
     /// The part of it that another recipe makes just so.
@@ -190,6 +194,26 @@ impl Felt {
         pose(points, tool, registration, ask, touch.sample.grasp_from_object)
     }
 
+    /// What the mask model says of the imprint of a pad, asked once, and from which probability on that is contact by the
+    /// recipe.
+    ///
+    /// # Errors
+    /// If there is no mask model or no such imprint, or the model cannot be loaded or run.
+    pub(crate) fn probability(&mut self, pad: PadId, models: &Models) -> Result<(Probability, f32), TaskError> {
+        let found = match &self.probabilities[pad] {
+            Some(known) => known.clone(),
+            None => {
+                let imprint = self.imprints[pad].as_ref();
+                let imprint = imprint.ok_or_else(|| TaskError::new("Contact mask", "there is no imprint"))?;
+                let model = self.recipe.mask_model.as_ref().ok_or_else(no_mask_model)?;
+                let found = Arc::new(models.probability(model, self.recipe.engine, imprint)?);
+                self.probabilities[pad].insert(found).clone()
+            }
+        };
+        let least = self.recipe.mask.probability.unwrap_or(found.1);
+        Ok((found, least))
+    }
+
     fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
         let made_by = self.recipe.mask_recipe()?;
         let of: ImprintOf = self.recipe.imprint_of();
@@ -198,17 +222,8 @@ impl Felt {
         let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
         for (pad, imprint) in imprints.entries() {
             let unet = |imprint: &DepthMap| {
-                let known = &mut self.probabilities[pad];
-                let found = match known {
-                    Some(found) => found.clone(),
-                    None => {
-                        let model = self.recipe.mask_model.as_ref().ok_or_else(no_mask_model)?;
-                        let found = models.probability(model, self.recipe.engine, imprint)?;
-                        known.insert(Arc::new(found)).clone()
-                    }
-                };
-                let (map, own) = &*found;
-                Ok(contact_of(map, imprint, self.recipe.mask.probability.unwrap_or(*own)))
+                let (found, least) = self.probability(pad, models)?;
+                Ok(contact_of(&found.0, imprint, least))
             };
             let finger = || touch.sample.rig.pad_key(pad);
             let found = contact_mask(&made_by, imprint, pad, inputs, unet);

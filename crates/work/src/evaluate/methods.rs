@@ -12,10 +12,11 @@ use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::job::JobCx;
-use crate::labels::ImprintOf;
+use crate::labels::ImprintSource;
 use crate::mask::{MaskRecipe, MaskSource};
 use crate::models;
 use crate::predict::Generating;
+use crate::recipe::{Model, Recipe};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Scores;
@@ -246,12 +247,21 @@ impl Method {
         }
     }
 
-    /// What its imprints are, for masks that were drawn on them.
-    pub(super) fn of(&self, setup: &Setup) -> Option<ImprintOf> {
-        match self {
-            Self::Measured => Some(ImprintOf::Measured),
-            Self::Stored => None,
-            Self::Generator(method) => Some(ImprintOf::predicted(&method.bundle.id, &method.config, setup.shift)),
+    /// The recipe of its poses. Nobody can have drawn on a stored prediction.
+    pub(super) fn posed(&self, setup: &Setup, mask_model: Option<&BundleInfo>) -> Recipe {
+        let generator = match self {
+            Self::Generator(method) => Some((method.bundle.clone().into(), method.config)),
+            Self::Measured | Self::Stored => None,
+        };
+        Recipe {
+            imprint: if generator.is_some() { ImprintSource::Predicted } else { ImprintSource::Measured },
+            generator,
+            shift: setup.shift,
+            mask: setup.mask,
+            mask_model: mask_model.cloned().map(Model::from),
+            hand: setup.hand && !matches!(self, Self::Stored),
+            registration: setup.engine,
+            engine: setup.runtime,
         }
     }
 

@@ -5,33 +5,32 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use rayon::prelude::*;
 
-use super::doubt::Seen;
+use super::doubt::doubt;
 use super::kept::{Entry, Kept};
 use super::load::{Case, Labeled, load};
 use super::methods::{Made, Method, Models};
 use super::{Setup, Skipped, ToolWork, apart};
-use crate::cloud::contact_points;
 use crate::compare::as_tile;
 use crate::error::TaskError;
+use crate::feel::{Felt, Touch};
 use crate::infer::classifier::Verdict;
 use crate::io::caught::caught;
 use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::job::JobCx;
-use crate::mask::MaskInputs;
-use crate::models::Masking;
-use crate::pose;
+use crate::labels::PairLabels;
+use crate::models;
+use crate::recipe::Stage;
 use crate::tool::load_tool;
-use touch2touch_core::align::Ask;
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
-use touch2touch_core::grid::{DepthMap, Grid, Mask, RgbGrid};
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::label::Doubt;
 use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
 use touch2touch_core::pose::ToolModel;
-use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::{Sample, Scale};
+use touch2touch_core::rig::PadId;
+use touch2touch_core::sample::Scale;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -53,12 +52,21 @@ struct Pending {
     failed: bool,
 }
 
-/// A grasp with what a method made of it, its masks, why some are not of the source that was asked, and how sure the mask
-/// model is of them.
-type Masked<'a> = (&'a Case, Made, PerPad<Mask>, Vec<(String, usize)>, Doubt);
+/// A grasp with what a method made of it.
+struct Masked<'a> {
+    case: &'a Case,
+    made: Made,
+    /// Up to its masks, where they can be made.
+    felt: Option<Felt>,
+    /// Why some masks are not of the source that was asked.
+    otherwise: Vec<(String, usize)>,
+    /// How sure the mask model is of the imprints.
+    doubt: Doubt,
+}
 
 /// The grasps of one tool, by method.
 pub(super) struct Tool<'a> {
+    dataset: &'a Dataset,
     /// What is known of them.
     book: &'a Kept,
     /// Its pattern's name.
@@ -72,7 +80,7 @@ pub(super) struct Tool<'a> {
 
 impl<'a> Tool<'a> {
     /// Reads the CAD model, if there is anything to score.
-    pub(super) fn new(dataset: &Dataset, work: &ToolWork, book: &'a Kept, skipped: &mut Vec<Skipped>) -> Self {
+    pub(super) fn new(dataset: &'a Dataset, work: &ToolWork, book: &'a Kept, skipped: &mut Vec<Skipped>) -> Self {
         let tool = &work.tool;
         let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
             let skip = |err: TaskError| {
@@ -83,7 +91,7 @@ impl<'a> Tool<'a> {
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
-        Self { book, pattern, broken, model, class: None, pending: BTreeMap::new() }
+        Self { dataset, book, pattern, broken, model, class: None, pending: BTreeMap::new() }
     }
 
     /// Takes some of its grasps through every method that they are not known by. `say` is told which.
@@ -97,13 +105,12 @@ impl<'a> Tool<'a> {
         say: &mut dyn FnMut(&str),
     ) {
         let Models { methods, masks: by_models, mask_bundle, classifier, .. } = models;
-        let by = Masking { choice: setup.mask, model: mask_bundle.as_ref(), engine: setup.runtime };
-        let with_masks = by.recipe().is_ok();
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
-            let of = method.of(setup);
+            let recipe = method.posed(setup, mask_bundle.as_ref());
+            let with_masks = recipe.mask_recipe().is_ok();
             let cases: Vec<&Case> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
             let Some(made) = method.make(&cases, setup, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
@@ -111,6 +118,7 @@ impl<'a> Tool<'a> {
                 failed.insert(case.id);
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
+            let labels = (PairLabels::default(), TaskError::new("Evaluate", "there is no CAD model"));
             let mut kept: Vec<Masked<'_>> = Vec::new();
             for (case, made) in cases.into_iter().zip(made) {
                 let made = match made {
@@ -120,22 +128,21 @@ impl<'a> Tool<'a> {
                         continue;
                     }
                 };
-                let mut otherwise: Vec<(String, usize)> = Vec::new();
-                let mut seen = Seen::new(by, by_models);
-                let masks = case.sample.rig.pads().map(|f| {
-                    if self.model.is_none() || case.sample.grasp_from_object.is_none() {
-                        return None;
+                let (mut otherwise, touch) = (Vec::<(String, usize)>::new(), self.touch(case, &labels));
+                let mut felt = Felt::with_imprints(&recipe, made.imprints.clone());
+                let posed = with_masks && self.model.is_some() && case.sample.grasp_from_object.is_some();
+                if posed {
+                    let reach =
+                        || felt.clone().reach(touch, Stage::Mask, by_models, &cx.quiet()).map_err(|err| err.why);
+                    match guarded(reach) {
+                        Ok(masked) => felt = masked,
+                        Err(why) => skip(case, format!("contact mask: {why}")),
                     }
-                    let imprint = made.imprints[f].as_ref().filter(|_| with_masks)?;
-                    let tool = self.model.as_ref();
-                    let (labels, of) = (case.labels.as_ref(), of.as_ref());
-                    let inputs = MaskInputs { sample: &case.sample, tool, labels, of };
-                    let found = guarded(|| seen.contact_mask(imprint, f, inputs).map_err(|err| err.why));
-                    let finger = || case.sample.rig.pad_key(f);
-                    let found = found.map_err(|why| skip(case, format!("{} finger: contact mask: {why}", finger())));
-                    let ContactMask { mask, basis, .. } = found.ok()?;
+                }
+                let masks = felt.has(Stage::Mask).then(|| felt.contact().masks.clone()).unwrap_or_default();
+                for ContactMask { basis, .. } in masks.iter().flatten() {
                     let why = match basis {
-                        MaskBasis::Source => return Some(mask),
+                        MaskBasis::Source => continue,
                         MaskBasis::Hand => "were drawn by hand",
                         MaskBasis::Flat => "are empty: the imprints are flat",
                         MaskBasis::Depth(_) => {
@@ -146,26 +153,25 @@ impl<'a> Tool<'a> {
                         Some((_, count)) => *count += 1,
                         None => otherwise.push((why.to_owned(), 1)),
                     }
-                    Some(mask)
-                });
-                let masks = masks.collect();
+                }
                 let doubt = match upper && case.sample.scale == Scale::Measured {
-                    true => guarded(|| seen.doubt(&made.imprints, case.labels.as_ref()).map_err(|err| err.why)),
+                    true => guarded(|| doubt(&mut felt, touch.labels, by_models).map_err(|err| err.why)),
                     false => Ok(Doubt::default()),
                 };
                 let doubt = doubt.map_err(|why| skip(case, format!("mask model: {why}"))).unwrap_or_default();
-                kept.push((case, made, masks, otherwise, doubt));
+                let felt = Some(felt).filter(|felt| felt.has(Stage::Mask));
+                kept.push(Masked { case, made, felt, otherwise, doubt });
             }
             // Poses on all cores; the models run one by one.
             let angles: Vec<Result<Option<f64>, String>> = kept
                 .par_iter()
-                .map(|(case, made, masks, ..)| {
+                .map(|Masked { case, made, felt, .. }| {
                     // A color picture has no depth, so there is nothing that could fail.
-                    let posed = with_masks && made.colors.is_empty();
-                    guarded(|| Ok(posed.then(|| self.angle(setup, &case.sample, made, masks)).flatten()))
+                    let Some(felt) = felt.clone().filter(|_| made.colors.is_empty()) else { return Ok(None) };
+                    guarded(|| self.angle(felt, self.touch(case, &labels), by_models, cx))
                 })
                 .collect();
-            for ((case, made, _, otherwise, doubt), angle) in kept.into_iter().zip(angles) {
+            for (Masked { case, made, otherwise, doubt, .. }, angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
                 let (angle_error_rad, mut images) = match scored {
                     Ok(scored) => scored,
@@ -206,15 +212,23 @@ impl<'a> Tool<'a> {
         }
     }
 
-    /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
-    fn angle(&self, setup: &Setup, sample: &Sample, made: &Made, masks: &PerPad<Mask>) -> Option<f64> {
-        let (model, truth) = (self.model.as_ref()?, sample.grasp_from_object?);
-        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
-            return None;
+    fn touch<'t>(&'t self, case: &'t Case, nothing: &'t (PairLabels, TaskError)) -> Touch<'t> {
+        Touch {
+            dataset: self.dataset,
+            pair: case.id,
+            sample: &case.sample,
+            tool: self.model.as_ref().ok_or(&nothing.1),
+            labels: case.labels.as_ref().unwrap_or(&nothing.0),
         }
-        let found = contact_points(sample, &made.imprints.as_ref(), &masks.as_ref())
-            .and_then(|points| pose::pose(&points, model, &*setup.engine.method(), Ask::default(), Some(truth)));
-        Some(found.ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN))
+    }
+
+    /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
+    fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Option<f64>, String> {
+        if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
+            return Ok(None);
+        }
+        let felt = felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why)?;
+        Ok(Some(felt.pose().ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN)))
     }
 
     /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
