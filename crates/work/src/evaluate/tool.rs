@@ -139,8 +139,8 @@ impl<'a> Tool<'a> {
                         Err(why) => skip(case, format!("contact mask: {why}")),
                     }
                 }
-                let masks = felt.has(Stage::Mask).then(|| felt.contact().masks.clone()).unwrap_or_default();
-                for ContactMask { basis, .. } in masks.iter().flatten() {
+                let masked = felt.has(Stage::Mask).then(|| felt.contact());
+                for ContactMask { basis, .. } in masked.iter().flat_map(|contact| contact.masks.iter().flatten()) {
                     let why = match basis {
                         MaskBasis::Source => continue,
                         MaskBasis::Hand => "were drawn by hand",
