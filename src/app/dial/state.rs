@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::super::state::State;
-use super::super::tasks::state::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::pairs;
@@ -47,8 +46,6 @@ pub struct DialState {
     pub pairs: DialPairs,
     /// Whether predictions are posed as well.
     pub predictions: bool,
-    /// The turn under way.
-    pub running: Option<Ticket>,
     /// What the last turn over the open data set did.
     pub result: Option<Arc<Sweep>>,
 }
@@ -57,15 +54,7 @@ impl Default for DialState {
     fn default() -> Self {
         let dial = Dial::default();
         let (first, last, count) = dial.usual();
-        Self {
-            dial,
-            range: [first, last],
-            count,
-            pairs: DialPairs::Spread(24),
-            predictions: true,
-            running: None,
-            result: None,
-        }
+        Self { dial, range: [first, last], count, pairs: DialPairs::Spread(24), predictions: true, result: None }
     }
 }
 
@@ -119,12 +108,6 @@ impl State {
             hand: true,
             engine: self.settings.runtime,
         })
-    }
-
-    /// The turn under way.
-    pub fn turning(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.dial.running?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
     }
 
     /// Whether a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.
