@@ -17,6 +17,7 @@ use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
 use super::settings::state::versus::{Versus, VersusMode};
 use super::settings::state::{ColorRange, MaskSettings, MaskTool, Theme, Workspace};
 use super::state::{Absent, State};
+use super::tasks::state::TaskKind;
 use super::workbench::state::{Layer, SceneTool, Section};
 use touch2touch_core::hand::HandAxis;
 use touch2touch_core::label::{CleanKind, Paint};
@@ -79,23 +80,25 @@ impl Action {
 
             Self::Generate => when(state.can_generate().is_ok(), PredictCommand::Generate),
             Self::GenerateNewSeed => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed),
-            Self::TurnDial => when(state.turning().is_none() && state.sweep_setup().is_ok(), DialCommand::Start),
+            Self::TurnDial => {
+                when(state.running(TaskKind::Dial).is_none() && state.sweep_setup().is_ok(), DialCommand::Start)
+            }
             Self::FitPairs => {
-                let ready = state.can_adapt() && state.adapting().is_none();
+                let ready = state.can_adapt() && state.running(TaskKind::Fit).is_none();
                 when(ready, AdaptCommand::Start)
             }
             Self::TrainMasks => ui(UiRequest::ShowPane(Pane::Train)),
             Self::StartTraining => {
-                when(state.train_setup().is_some() && state.training().is_none(), TrainCommand::Start)
+                when(state.train_setup().is_some() && state.running(TaskKind::Train).is_none(), TrainCommand::Start)
             }
             Self::UseTrained => when(state.trained().is_some() && !state.uses_trained(), TrainCommand::Use),
             Self::UseFit => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use),
             Self::EvaluateDataset => {
-                let ready = state.evaluation_setup().is_some() && state.evaluating().is_none();
+                let ready = state.evaluation_setup().is_some() && state.running(TaskKind::Evaluate).is_none();
                 when(ready, EvaluateCommand::Start)
             }
             Self::PredictAll => {
-                let ready = state.scores_key().is_some() && state.evaluating().is_none();
+                let ready = state.scores_key().is_some() && state.running(TaskKind::Evaluate).is_none();
                 when(ready, EvaluateCommand::All)
             }
             Self::RankMasks => when(can_rank(state), EvaluateCommand::Rank),
@@ -325,7 +328,7 @@ fn when(possible: bool, command: impl Into<Command>) -> Option<Command> {
 
 /// Whether the measured imprints of all pairs can be scored now.
 fn can_rank(state: &State) -> bool {
-    state.scores_key().is_some() && state.evaluating().is_none()
+    state.scores_key().is_some() && state.running(TaskKind::Evaluate).is_none()
 }
 
 /// Whether the pose tool is in hand and there is a tool to be moved.

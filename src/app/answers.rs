@@ -3,38 +3,25 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::{Effect, NotSaved};
+use super::effect::{Effect, Ended, NotSaved};
+use super::jobs::Lane;
 use super::keys::{DatasetSeq, Revision};
 use super::labels::state::Merged;
-use super::library::state::Place;
-use super::results::prediction::Keyed;
 use super::results::{Computed, Preview, Request};
-use super::services::{Followed, Opened};
+use super::services::Followed;
 use super::settings::state::Settings;
 use super::state::State;
-use super::tasks::state::{Level, Ticket};
-use super::{adapt, dial, evaluate, export, follow, labels, library, predict, settings, tasks, train, workbench};
-use touch2touch_work::adapt::Adapted;
+use super::tasks::state::{Level, TaskKind, Ticket};
+use super::{evaluate, export, follow, labels, library, settings, tasks, workbench};
 use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
-use touch2touch_work::evaluate::Evaluation;
-use touch2touch_work::import::Import;
-use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::Progress;
-use touch2touch_work::propose::Batch;
-use touch2touch_work::sweep::Sweep;
-use touch2touch_work::tool::UnitSet;
-use touch2touch_work::train::Trained;
 
 /// What the runtime answers.
 #[derive(Clone, Debug)]
 pub enum Answer {
     /// A touch arrived in the followed folder.
     Followed(DatasetSeq, Followed),
-    /// A data set was opened.
-    Opened(Ticket, DatasetSeq, Place, Opened),
-    /// A tool's CAD file is read in another unit, of an opening.
-    UnitSet(Ticket, DatasetSeq, UnitSet),
     /// Bundles were looked for.
     Bundles(Vec<BundleInfo>, Vec<TaskError>),
     /// The settings file was read.
@@ -43,21 +30,15 @@ pub enum Answer {
     Demanded(Vec<Request>),
     /// A result that a pane asked for, of an opening.
     Computed(DatasetSeq, Computed),
-    /// Predictions are there.
-    Generated(Ticket, Keyed),
     /// A prediction as it looks on the way.
     Previewed(Ticket, Arc<Preview>),
-    /// Shift statistics are there.
-    Refitted(Ticket, Box<ShiftStatistics>, Option<String>),
     /// A job is under way.
     Progressed(Ticket, Progress),
-    /// A job without a result is done, with a line for the log.
-    Finished(Ticket, Option<String>),
-    /// A job is done that wrote something there, with a line for the log.
-    Saved(Ticket, String, PathBuf),
+    /// What a person started is done.
+    Ended(Ticket, Ended),
     /// The system was asked to show a place.
     Revealed,
-    /// A job ended without a result.
+    /// It ended without a result.
     TaskFailed(Ticket, TaskError),
     /// A result that a pane asked for could not be made.
     RequestFailed(DatasetSeq, Box<Request>, TaskError),
@@ -71,39 +52,13 @@ pub enum Answer {
     SettingsSaved,
     /// A job failed that is neither of a ticket nor of a request.
     JobFailed(TaskError),
-    /// The results table is there.
-    Evaluated(Ticket, Arc<Evaluation>),
-    /// The dial was turned.
-    Swept(Ticket, Arc<Sweep>),
-    /// Masks were proposed for many pairs.
-    ProposedAll(Ticket, Box<Batch>),
-    /// Masks were taken over.
-    Imported(Ticket, Box<Import>),
-    /// A generator was fitted, and is this bundle where one was written.
-    Adapted(Ticket, Arc<Adapted>, Option<Box<BundleInfo>>),
-    /// A mask model was trained, and is this bundle.
-    Trained(Ticket, Arc<Trained>, Box<BundleInfo>),
 }
 
 pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>) {
     match answer {
-        Answer::Opened(ticket, seq, place, opened) => {
-            state.tasks.running.remove(&ticket);
-            // A later opening was started meanwhile: this one is not wanted any more.
-            if seq == state.library.last_seq {
-                let again = library::show(state, seq, place, opened, effects);
-                follow::opened(state, again, effects);
-                export::opened(state, effects);
-            }
-        }
         Answer::Followed(seq, followed) => {
-            let current = is_open(state, seq);
+            let current = state.library.is_open(seq);
             follow::arrived(state, followed, current, effects);
-        }
-        Answer::UnitSet(ticket, seq, set) => {
-            tasks::forget(state, ticket);
-            let current = is_open(state, seq);
-            library::unit_set(state, set, current);
         }
         Answer::Bundles(bundles, problems) => {
             library::found(state, bundles, problems);
@@ -117,43 +72,26 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             effects.push(Effect::FindBundles(state.settings.bundle_folders.clone()));
         }
         Answer::Demanded(list) => state.tasks.demanded = list,
-        Answer::Computed(seq, computed) if is_open(state, seq) => {
+        Answer::Computed(seq, computed) if state.library.is_open(seq) => {
             let request = computed.request();
             computed.keep(state);
             react(state, &request);
-        }
-        Answer::Generated(ticket, predictions) => {
-            tasks::forget(state, ticket);
-            for (key, prediction) in predictions {
-                state.keep_prediction(key, prediction, true);
-            }
         }
         // One that comes after its result, or after Cancel, is too late.
         Answer::Previewed(ticket, preview) if state.tasks.running.get(&ticket).is_some_and(|task| !task.cancelling) => {
             state.results.previews.insert(preview.recipe.touch, preview);
         }
-        Answer::Refitted(ticket, statistics, saved) => {
-            state.tasks.running.remove(&ticket);
-            predict::refit::arrived(state, &statistics, saved, effects);
-        }
         Answer::Progressed(ticket, progress) => {
-            evaluate::progressed(state, ticket, &progress);
+            if state.running(TaskKind::Evaluate).is_some_and(|(running, _)| running == ticket) {
+                evaluate::progressed(state, &progress);
+            }
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
                 task.progress = progress;
             }
         }
-        Answer::Finished(ticket, line) => {
-            state.tasks.running.remove(&ticket);
-            if let Some(line) = line {
-                state.log.info(line);
-            }
-        }
-        Answer::Saved(ticket, line, place) => {
-            state.tasks.running.remove(&ticket);
-            state.log.saved(line, place);
-        }
+        Answer::Ended(ticket, end) => ended(state, ticket, &end, effects),
         Answer::TaskFailed(ticket, err) => failed_task(state, ticket, &err),
-        Answer::RequestFailed(seq, request, err) if is_open(state, seq) => failed_request(state, *request, err),
+        Answer::RequestFailed(seq, request, err) if state.library.is_open(seq) => failed_request(state, *request, err),
         Answer::LabelsSaved(name, revision, merged) => {
             // An answer to anything but the last request: what was changed since is not on the disk yet.
             if state.document.asked.get(&name) == Some(&revision) {
@@ -167,32 +105,6 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::LabelsFailed(not) => labels::unsaved::failed(state, *not, effects),
         Answer::LabelsKept(revisions, folder) => labels::unsaved::kept(state, revisions, folder, effects),
         Answer::JobFailed(err) => state.log.error(&err),
-        Answer::Evaluated(ticket, evaluation) => {
-            state.tasks.running.remove(&ticket);
-            evaluate::arrived(state, ticket, evaluation);
-        }
-        Answer::Swept(ticket, sweep) => {
-            state.tasks.running.remove(&ticket);
-            dial::arrived(state, ticket, sweep);
-        }
-        Answer::ProposedAll(ticket, batch) => {
-            state.tasks.running.remove(&ticket);
-            labels::proposed(state, ticket, &batch);
-        }
-        Answer::Imported(ticket, import) => {
-            state.tasks.running.remove(&ticket);
-            if state.export.import.take_if(|under_way| *under_way == ticket).is_some() {
-                labels::imported(state, &import);
-            }
-        }
-        Answer::Adapted(ticket, adapted, bundle) => {
-            state.tasks.running.remove(&ticket);
-            adapt::arrived(state, ticket, adapted, bundle.map(|bundle| *bundle));
-        }
-        Answer::Trained(ticket, trained, bundle) => {
-            state.tasks.running.remove(&ticket);
-            train::arrived(state, ticket, trained, *bundle, effects);
-        }
         // What came too late, or needs nothing.
         Answer::Computed(..)
         | Answer::RequestFailed(..)
@@ -202,9 +114,22 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
     }
 }
 
-/// Whether a data set is the one that is open: what is of an earlier opening comes too late.
-fn is_open(state: &State, seq: DatasetSeq) -> bool {
-    state.library.open.as_ref().is_some_and(|open| open.seq == seq)
+/// Lets follow what follows from the end of what a person started.
+fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effect>) {
+    let task = tasks::forget(state, ticket);
+    // What took minutes and is of another data set has nowhere to be shown.
+    if end.kind.lane() == Lane::Batch && task.is_none_or(|task| task.outdated) {
+        return;
+    }
+    let before = state.library.open.as_ref().map(|open| (open.seq, open.place.clone()));
+    end.land(state, effects);
+    if let Some(open) = &state.library.open
+        && before.as_ref().is_none_or(|(seq, _)| *seq != open.seq)
+    {
+        let again = before.is_some_and(|(_, place)| place == open.place);
+        follow::opened(state, again, effects);
+        export::opened(state, effects);
+    }
 }
 
 /// What the rooms do about a result that is there now.
@@ -235,7 +160,7 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         state.library.opening = None;
         state.library.failure = Some(err.clone());
     }
-    if state.table.running.take_if(|running| *running == ticket).is_some() {
+    if task.kind == TaskKind::Evaluate && !task.outdated {
         // What was scored before it stopped is kept.
         state.table.round += 1;
     }

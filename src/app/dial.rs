@@ -6,12 +6,16 @@ pub use state::{DialPairs, DialState};
 
 use std::sync::Arc;
 
-use super::effect::Effect;
+use super::effect::{Access, Effect, Errand};
+use super::services::DataSource;
 use super::settings::{self, MaskSettings, SettingsCommand};
 use super::state::State;
-use super::tasks::state::{Level, Ticket};
+use super::tasks;
+use super::tasks::state::{Level, TaskKind};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::job::JobCx;
 use touch2touch_work::recipe::Recipe;
-use touch2touch_work::sweep::{Dial, Setting, Sweep};
+use touch2touch_work::sweep::{self, Dial, Setting, Sweep, SweepSetup};
 
 /// What can happen to the dial.
 #[derive(Clone, Copy, Debug)]
@@ -44,15 +48,10 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
         DialCommand::Over(pairs) => state.dial.pairs = pairs,
         DialCommand::Predictions(predictions) => state.dial.predictions = predictions,
         DialCommand::Start => {
-            if state.turning().is_some() {
-                return;
-            }
             let (Ok(setup), Some(open)) = (state.sweep_setup(), &state.library.open) else { return };
             let source = open.source.clone();
-            let name = state.dial.dial.name().to_lowercase();
-            let ticket = state.tasks.start(format!("Turn the {name} over {}", source.title()), Vec::new());
-            state.dial.running = Some(ticket);
-            effects.push(Effect::Sweep { ticket, source, setup: Box::new(setup) });
+            let title = format!("Turn the {} over {}", state.dial.dial.name().to_lowercase(), source.title());
+            tasks::start(state, title, Turn { source, setup }, effects);
         }
         DialCommand::Use(setting) => {
             let before = state.dial_recipe();
@@ -72,17 +71,29 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
     }
 }
 
-/// Shows what the dial does; one that another data set's opening stopped has nowhere to be shown.
-pub(super) fn arrived(state: &mut State, ticket: Ticket, sweep: Arc<Sweep>) {
-    if state.dial.running.take_if(|running| *running == ticket).is_none() {
-        return;
+/// Turns the dial over pairs of a data set.
+pub struct Turn {
+    source: Arc<dyn DataSource>,
+    setup: SweepSetup,
+}
+
+impl Errand for Turn {
+    type End = Arc<Sweep>;
+    const KIND: TaskKind = TaskKind::Dial;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let dataset = self.source.on_disk(Self::KIND.name())?;
+        sweep::sweep(dataset, &self.setup, access.services.models(), cx).map(Arc::new)
     }
-    if !sweep.complete {
-        state.log.info("The dial was stopped: the plots hold the pairs that were done until then");
+
+    fn ended(sweep: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        if !sweep.complete {
+            state.log.info("The dial was stopped: the plots hold the pairs that were done until then");
+        }
+        if let Some(first) = sweep.left_out.first() {
+            let why = format!("the first: {}: {}", first.name, first.why);
+            state.log.push(Level::Warning, format!("{} pairs were left out", sweep.left_out.len()), Some(why), None);
+        }
+        state.dial.result = Some(sweep.clone());
     }
-    if let Some(first) = sweep.left_out.first() {
-        let why = format!("the first: {}: {}", first.name, first.why);
-        state.log.push(Level::Warning, format!("{} pairs were left out", sweep.left_out.len()), Some(why), None);
-    }
-    state.dial.result = Some(sweep);
 }

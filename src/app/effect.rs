@@ -1,31 +1,20 @@
 //! [`Effect`]: what `apply` wants done outside the state.
 
-use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::export::state::{PairExport, Recipes};
-use super::keys::{DatasetSeq, PredictionKey, Revision};
+use super::jobs::Lane;
+use super::keys::{DatasetSeq, Revision};
 use super::labels::state::PairLabels;
-use super::library::state::Place;
-use super::services::DataSource;
+use super::results::preview::Onlooker;
+use super::services::{DataSource, SharedServices};
 use super::settings::state::Settings;
-use super::tasks::state::Ticket;
+use super::state::State;
+use super::tasks::state::{TaskKind, Ticket};
 use super::view::state::UiRequest;
-use touch2touch_core::sample::Sample;
-use touch2touch_work::adapt::{AdaptSetup, Adapted};
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::case::CaseSetup;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::evaluate::{Evaluation, Setup};
-use touch2touch_work::export::ExportChoice;
-use touch2touch_work::figure::FigureSetup;
-use touch2touch_work::import::ImportSetup;
-use touch2touch_work::io::dataset::ToolUnit;
+use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{Deed, Unsaved};
-use touch2touch_work::propose::BatchSetup;
-use touch2touch_work::sweep::SweepSetup;
-use touch2touch_work::train::TrainSetup;
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,48 +50,101 @@ impl std::fmt::Debug for NotSaved {
     }
 }
 
-/// Work that leaves the state.
+/// What an errand works with besides what it holds.
+pub struct Access {
+    /// Files and models.
+    pub services: SharedServices,
+    /// Who looks at pictures of predictions on the way.
+    pub onlooker: Onlooker,
+}
+
+/// A job that a person starts, with all that it needs. `tasks::start` lists it; the rest follows.
+pub trait Errand: Send + 'static {
+    /// What it ends with.
+    type End: Send + Sync + 'static;
+
+    /// Its row among what can be started.
+    const KIND: TaskKind;
+
+    /// What it does, for errors.
+    fn what(&self) -> String {
+        Self::KIND.name().to_owned()
+    }
+
+    /// Where it runs.
+    fn lane(&self) -> Lane {
+        Self::KIND.lane()
+    }
+
+    /// Does it.
+    ///
+    /// # Errors
+    /// If it cannot be done, or was told to stop.
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError>;
+
+    /// What follows from its end.
+    fn ended(end: &Self::End, state: &mut State, effects: &mut Vec<Effect>);
+}
+
+/// The body of an errand.
+type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<Ended, TaskError> + Send>;
+/// What follows from its end.
+type Follows = Arc<dyn Fn(&mut State, &mut Vec<Effect>) + Send + Sync>;
+
+/// An errand on its way to its lane.
+pub struct Started {
+    /// What it does, for errors.
+    pub what: String,
+    /// Where it runs.
+    pub lane: Lane,
+    /// How.
+    pub body: Doing,
+}
+
+impl Started {
+    /// An errand of any kind.
+    pub(super) fn new<E: Errand>(errand: E) -> Self {
+        let (what, lane) = (errand.what(), errand.lane());
+        Self { what, lane, body: Box::new(|access, cx| Ok(Ended::of::<E>(errand.run(access, cx)?))) }
+    }
+}
+
+/// The end of an errand.
 #[derive(Clone)]
+pub struct Ended {
+    /// What it was.
+    pub kind: TaskKind,
+    follows: Follows,
+}
+
+impl Ended {
+    /// With what follows from it.
+    pub fn of<E: Errand>(end: E::End) -> Self {
+        Self { kind: E::KIND, follows: Arc::new(move |state, effects| E::ended(&end, state, effects)) }
+    }
+
+    /// Lets that follow.
+    pub(super) fn land(&self, state: &mut State, effects: &mut Vec<Effect>) {
+        (self.follows)(state, effects);
+    }
+}
+
+impl std::fmt::Debug for Ended {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Ended({:?})", self.kind)
+    }
+}
+
+/// Work that leaves the state.
 pub enum Effect {
-    /// Read a data set's index.
-    Open {
-        /// The job.
-        ticket: Ticket,
-        /// The number of this opening.
-        seq: DatasetSeq,
-        /// What to open.
-        place: Place,
-    },
+    /// Do what a person started.
+    Start(Ticket, Started),
+    /// Tell it to stop.
+    Cancel(Ticket),
     /// Follow the folder of a data set, or none any more.
     Follow(Option<(DatasetSeq, Arc<dyn DataSource>)>),
     /// Look for bundles.
     FindBundles(Vec<PathBuf>),
-    /// Make predictions of one pair, all in one go.
-    Generate {
-        /// The job.
-        ticket: Ticket,
-        /// What to make.
-        recipes: Vec<PredictionKey>,
-        /// The bundle.
-        bundle: BundleInfo,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// The pair, if it is loaded.
-        sample: Option<Arc<Sample>>,
-    },
-    /// Make shift statistics of a data set.
-    Refit {
-        /// The job.
-        ticket: Ticket,
-        /// How its touches are predicted; the touch itself is replaced.
-        recipe: PredictionKey,
-        /// The bundle.
-        bundle: BundleInfo,
-        /// The data.
-        source: Arc<dyn DataSource>,
-    },
-    /// Tell a job to stop.
-    Cancel(Ticket),
     /// Write the labels of a pair; a newer request for the same pair replaces a waiting one.
     SaveLabels(Arc<dyn DataSource>, Box<LabelsToSave>),
     /// Write labels that could not be written where they belong to another folder.
@@ -118,141 +160,6 @@ pub enum Effect {
     },
     /// Write the settings; a newer request replaces a waiting one.
     SaveSettings(Box<Settings>),
-    /// Write masks for UNet training.
-    ExportMasks {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// Labels changed since they were read, by pair name: newer than the files.
-        labels: BTreeMap<String, PairLabels>,
-        /// Which of them, and how they are divided.
-        choice: ExportChoice,
-        /// Where to.
-        folder: PathBuf,
-    },
-    /// Take masks over that lie in a form of other programs.
-    ImportMasks {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// Which, and how.
-        setup: ImportSetup,
-    },
-    /// Have a tool's CAD file read in a unit.
-    SetUnit {
-        /// The job.
-        ticket: Ticket,
-        /// The opening.
-        seq: DatasetSeq,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// The tool.
-        tool: String,
-        /// The unit.
-        unit: ToolUnit,
-        /// What the file beside it says now, as the person was told.
-        replacing: Option<String>,
-    },
-    /// Score the open data set.
-    Evaluate {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// By what, and how.
-        setup: Box<Setup>,
-    },
-    /// Turn a dial over the open data set.
-    Sweep {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// Which one, and how.
-        setup: Box<SweepSetup>,
-    },
-    /// Propose masks for many pairs of the open data set.
-    ProposeAll {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// Which, and how.
-        setup: Box<BatchSetup>,
-    },
-    /// Fit a generator to pairs, where the program keeps models.
-    Adapt {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// What to what.
-        setup: Box<AdaptSetup>,
-    },
-    /// Write a fit that was refused.
-    KeepFit {
-        /// The job.
-        ticket: Ticket,
-        /// The fit.
-        adapted: Arc<Adapted>,
-    },
-    /// Train a mask model, and keep the new one where the program keeps models.
-    Train {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// What was said about pairs, as far as it may not be on the disk yet.
-        labels: BTreeMap<String, PairLabels>,
-        /// What on what.
-        setup: Box<TrainSetup>,
-    },
-    /// Write a results table into a folder.
-    ExportTable {
-        /// The job.
-        ticket: Ticket,
-        /// The table.
-        evaluation: Arc<Evaluation>,
-        /// Whether with the published rows.
-        published: bool,
-        /// Where to.
-        folder: PathBuf,
-    },
-    /// Draw a figure into a file.
-    Figure {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// What to draw.
-        setup: Box<FigureSetup>,
-        /// The predictions in it.
-        recipes: Recipes,
-        /// Where to.
-        file: PathBuf,
-    },
-    /// Write a pair for other programs.
-    ExportPair {
-        /// The job.
-        ticket: Ticket,
-        /// What of it.
-        pair: Box<PairExport>,
-        /// Where to.
-        folder: PathBuf,
-    },
-    /// Write a case.
-    SaveCase {
-        /// The job.
-        ticket: Ticket,
-        /// The data.
-        source: Arc<dyn DataSource>,
-        /// What goes into it.
-        setup: Box<CaseSetup>,
-        /// Where to.
-        file: PathBuf,
-    },
     /// Show a file or folder in the system's own window.
     Reveal(PathBuf),
     /// Something only the window can do.
@@ -263,36 +170,5 @@ impl Effect {
     /// Has labels wait for the next opening of their data set.
     pub(super) fn keep_waiting(source: Arc<dyn DataSource>, unsaved: Vec<Unsaved>) -> Self {
         Self::KeepLabels { source, unsaved, folder: None, revisions: Vec::new() }
-    }
-}
-
-impl std::fmt::Debug for Effect {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Open { place, .. } => write!(f, "Open({place})"),
-            Self::Follow(of) => write!(f, "Follow({:?})", of.as_ref().map(|(seq, _)| seq)),
-            Self::FindBundles(folders) => write!(f, "FindBundles({folders:?})"),
-            Self::Generate { ticket, recipes, .. } => write!(f, "Generate({ticket:?}, {recipes:?})"),
-            Self::Refit { ticket, recipe, .. } => write!(f, "Refit({ticket:?}, {recipe:?})"),
-            Self::Cancel(ticket) => write!(f, "Cancel({ticket:?})"),
-            Self::SaveLabels(_, save) => write!(f, "SaveLabels({})", save.name),
-            Self::KeepLabels { unsaved, folder, .. } => write!(f, "KeepLabels({}, {folder:?})", unsaved.len()),
-            Self::SaveSettings(_) => write!(f, "SaveSettings"),
-            Self::ExportMasks { folder, .. } => write!(f, "ExportMasks({})", folder.display()),
-            Self::ImportMasks { setup, .. } => write!(f, "ImportMasks({})", setup.from.display()),
-            Self::SetUnit { tool, unit, .. } => write!(f, "SetUnit({tool}, {unit:?})"),
-            Self::Evaluate { ticket, .. } => write!(f, "Evaluate({ticket:?})"),
-            Self::Sweep { ticket, .. } => write!(f, "Sweep({ticket:?})"),
-            Self::ProposeAll { ticket, .. } => write!(f, "ProposeAll({ticket:?})"),
-            Self::Adapt { ticket, .. } => write!(f, "Adapt({ticket:?})"),
-            Self::KeepFit { ticket, .. } => write!(f, "KeepFit({ticket:?})"),
-            Self::Train { ticket, .. } => write!(f, "Train({ticket:?})"),
-            Self::ExportTable { folder, .. } => write!(f, "ExportTable({})", folder.display()),
-            Self::Figure { setup, file, .. } => write!(f, "Figure({:?}, {})", setup.pairs, file.display()),
-            Self::ExportPair { folder, .. } => write!(f, "ExportPair({})", folder.display()),
-            Self::SaveCase { file, .. } => write!(f, "SaveCase({})", file.display()),
-            Self::Reveal(place) => write!(f, "Reveal({})", place.display()),
-            Self::Ui(request) => write!(f, "Ui({request:?})"),
-        }
     }
 }

@@ -7,11 +7,15 @@ pub use state::{GRASPS, ScoreChoice, ScoreTable, SourceScores, Standing, TableSt
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::effect::Effect;
+use super::effect::{Access, Effect, Errand};
+use super::jobs::Lane;
+use super::services::DataSource;
 use super::state::State;
-use super::tasks::state::{Level, Ticket};
-use touch2touch_work::evaluate::{Evaluation, Setup};
-use touch2touch_work::job::Progress;
+use super::tasks;
+use super::tasks::state::{Level, TaskKind};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::evaluate::{self, Evaluation, Setup};
+use touch2touch_work::job::{JobCx, Progress};
 use touch2touch_work::queue::measured_only;
 
 /// How often what was scored so far is looked up while all pairs are scored.
@@ -52,8 +56,14 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         EvaluateCommand::Rank => rank(state, effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
-            let ticket = state.tasks.start("Export the table".into(), Vec::new());
-            effects.push(Effect::ExportTable { ticket, evaluation, published: state.table.published, folder });
+            let published = state.table.published;
+            let what = "Export the table";
+            let write = tasks::Write::new(Lane::Files, what, folder, move |folder, _, _| {
+                let folder = evaluate::export(&evaluation, published, &folder)?;
+                let line = format!("Wrote evaluation.csv, .md, .tex and .json to {}", folder.display());
+                Ok((line, folder))
+            });
+            tasks::start(state, what, write, effects);
         }
     }
 }
@@ -66,41 +76,51 @@ pub(super) fn rank(state: &mut State, effects: &mut Vec<Effect>) {
 
 /// Has the open data set scored. One at a time: a second would only take the cores from the first.
 fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<Effect>) {
-    if state.evaluating().is_some() {
-        return;
-    }
     let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
     let source = open.source.clone();
-    let ticket = state.tasks.start(format!("{what} {}", source.title()), Vec::new());
-    (state.table.running, state.table.next_look) = (Some(ticket), 0);
-    effects.push(Effect::Evaluate { ticket, source, setup: Box::new(setup) });
+    let title = format!("{what} {}", source.title());
+    if tasks::start(state, title, Score { source, setup }, effects).is_some() {
+        state.table.next_look = 0;
+    }
 }
 
 /// Has what was scored so far looked up now and then.
-pub(super) fn progressed(state: &mut State, ticket: Ticket, progress: &Progress) {
+pub(super) fn progressed(state: &mut State, progress: &Progress) {
     let table = &mut state.table;
-    if table.running == Some(ticket) && progress.done >= table.next_look {
+    if progress.done >= table.next_look {
         table.next_look = progress.done + (progress.total / LOOKS).max(1);
         table.round += 1;
     }
 }
 
-/// Shows a table; one that another data set's opening stopped has nowhere to be shown.
-pub(super) fn arrived(state: &mut State, ticket: Ticket, evaluation: Arc<Evaluation>) {
-    if state.table.running.take_if(|running| *running == ticket).is_none() {
-        return;
+/// Scores a data set.
+pub struct Score {
+    source: Arc<dyn DataSource>,
+    setup: Setup,
+}
+
+impl Errand for Score {
+    type End = Arc<Evaluation>;
+    const KIND: TaskKind = TaskKind::Evaluate;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let dataset = self.source.on_disk(Self::KIND.name())?;
+        evaluate::evaluate(dataset, &self.setup, access.services.models(), cx).map(Arc::new)
     }
-    if !evaluation.complete {
-        state.log.info("The evaluation was stopped: the table holds what was scored until then");
+
+    fn ended(evaluation: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        if !evaluation.complete {
+            state.log.info("The evaluation was stopped: the table holds what was scored until then");
+        }
+        if let Some(first) = evaluation.skipped.first() {
+            let text = format!("{} things could not be scored", evaluation.skipped.len());
+            let why = format!("the first: {}: {}", first.what, first.why);
+            state.log.push(Level::Warning, text, Some(why), None);
+        }
+        // A ranking is no results table.
+        if !evaluation.setup.bundles.is_empty() {
+            state.table.result = Some(evaluation.clone());
+        }
+        state.table.round += 1;
     }
-    if let Some(first) = evaluation.skipped.first() {
-        let text = format!("{} things could not be scored", evaluation.skipped.len());
-        let why = format!("the first: {}: {}", first.what, first.why);
-        state.log.push(Level::Warning, text, Some(why), None);
-    }
-    // A ranking is no results table.
-    if !evaluation.setup.bundles.is_empty() {
-        state.table.result = Some(evaluation);
-    }
-    state.table.round += 1;
 }

@@ -9,15 +9,26 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::Effect;
+use super::jobs::Lane;
 use super::keys::{ImprintSource, PredictionKey};
+use super::labels::ImportMasks;
+use super::results::prediction::generate;
 use super::settings::state::GenerateSettings;
 use super::state::State;
+use super::tasks::state::TaskKind;
+use super::tasks::{self, Write};
 use super::view::state::UiRequest;
 use super::{library, predict, settings};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::PerPad;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::case;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::ExportChoice;
-use touch2touch_work::figure::FigureSetup;
+use touch2touch_work::figure::{FigureSetup, figure};
+use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::case_file;
+use touch2touch_work::job::JobCx;
 
 /// What can happen to what is taken away.
 #[derive(Clone, Debug)]
@@ -67,9 +78,12 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::WriteCase(file, camera) => {
             let (Some(setup), Some(open)) = (state.case_setup(&camera), &state.library.open) else { return };
             let source = open.source.clone();
-            let ticket = state.tasks.start("Save the case".into(), Vec::new());
-            let file = ended(file, case_file::ENDING);
-            effects.push(Effect::SaveCase { ticket, source, setup: Box::new(setup), file });
+            let (what, file) = ("Save the case", ended(file, case_file::ENDING));
+            let write = Write::new(Lane::Models, what, file, move |file, access, cx| {
+                case::make(source.on_disk("Case")?, &setup, access.services.models(), &file, cx)?;
+                Ok((format!("Saved {}", file.display()), file))
+            });
+            tasks::start(state, what, write, effects);
         }
         ExportCommand::OwnPreferences => own_preferences(state, effects),
         ExportCommand::Write(Output::Case, file) => {
@@ -157,14 +171,12 @@ pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
 
 fn import(state: &mut State, effects: &mut Vec<Effect>) {
     let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };
-    if state.export.import.is_some_and(|ticket| state.tasks.running.contains_key(&ticket)) {
+    if state.running(TaskKind::Import).is_some() {
         return;
     }
     let source = open.source.clone();
     state.export.importing = None;
-    let ticket = state.tasks.start("Import masks".into(), Vec::new());
-    state.export.import = Some(ticket);
-    effects.push(Effect::ImportMasks { ticket, source, setup });
+    tasks::start(state, TaskKind::Import.name(), ImportMasks { source, setup }, effects);
 }
 
 fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Effect>) {
@@ -178,17 +190,24 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
         Output::Masks => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
-            let ticket = state.tasks.start("Export masks".into(), Vec::new());
             let (labels, choice) = (state.document.own_labels(), state.export.masks);
-            effects.push(Effect::ExportMasks { ticket, source, labels, choice, folder: file });
+            let write = Write::new(Lane::Compute, "Export masks", file, move |folder, _, cx| {
+                Ok((source.export_masks(&labels, choice, &folder, cx)?, folder))
+            });
+            tasks::start(state, "Export masks", write, effects);
         }
         Output::Pair(source) => {
             let Some(pair) = state.pair_export(source) else {
                 let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
-            let ticket = state.tasks.start("Export the pair".into(), Vec::new());
-            effects.push(Effect::ExportPair { ticket, pair: Box::new(pair), folder: file });
+            let write = Write::new(Lane::Compute, "Export the pair", file, move |folder, _, _| {
+                let files = pair.write(&folder)?;
+                let names = files.iter().filter_map(|file| file.file_name()).map(|name| name.to_string_lossy());
+                let text = format!("Saved {}", names.collect::<Vec<_>>().join(", "));
+                Ok((text, files.into_iter().next().unwrap_or_default()))
+            });
+            tasks::start(state, "Export the pair", write, effects);
         }
         Output::Picture { pane, scale, error_m } => {
             let Some(setup) = state.picture_setup(pane, scale, error_m) else { return };
@@ -208,6 +227,25 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
         return state.log.error(&TaskError::new(title, "no data set is open"));
     };
     let recipes = state.figure_recipes(&setup);
-    let ticket = state.tasks.start(title.to_owned(), Vec::new());
-    effects.push(Effect::Figure { ticket, source, setup: Box::new(setup), recipes, file });
+    let write = Write::new(Lane::Models, "Figure", file, move |file, access, cx| {
+        let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
+            let mut made = PerPad::default();
+            for (key, bundle) in recipes.iter().filter(|(of, _)| *of == pair).flat_map(|(_, list)| list) {
+                let finger = key.touch.finger;
+                let ends = bundle.ends(&sample.rig).and_then(Result::ok);
+                let input = |end: Ends| sample.pad(finger)?.picture(end.input).map(drop);
+                if ends.and_then(input).is_none() {
+                    continue;
+                }
+                let (one, sample) = (vec![key.clone()], Some(sample.clone()));
+                let found = generate(&*access.services, one, bundle, &*source, sample, cx, None)?;
+                made[finger] = found.into_iter().next().map(|(_, made)| Arc::unwrap_or_clone(made));
+            }
+            Ok(made)
+        };
+        let written = figure(source.on_disk("Figure")?, &setup, predict, cx)?.write(&file)?;
+        let [width, height] = written.size_px;
+        Ok((format!("Saved {} ({width} x {height} pixels)", file.display()), file))
+    });
+    tasks::start(state, title, write, effects);
 }

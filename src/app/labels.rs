@@ -6,7 +6,7 @@ mod repeat;
 pub mod state;
 pub(super) mod unsaved;
 
-pub(super) use batch::{imported, proposed};
+pub use batch::{ImportMasks, ProposeAll};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
 pub use state::{
     Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Question, Repeating, Review, Stored, Stroke,

@@ -10,15 +10,15 @@ use std::sync::Arc;
 
 use super::adapt::AdaptState;
 use super::dial::DialState;
-use super::effect::Effect;
+use super::effect::{Access, Effect, Errand};
 use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
 use super::labels::state::{Document, Review};
 use super::results::{Request, Results};
-use super::services::Opened;
+use super::services::{DataSource, Opened};
 use super::settings::state::MAX_RECENT;
 use super::state::State;
-use super::tasks::state::Level;
+use super::tasks::state::{Level, TaskKind};
 use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
@@ -26,6 +26,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::dataset::ToolUnit;
+use touch2touch_work::job::JobCx;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::tool::UnitSet;
 
@@ -93,8 +94,8 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         }
         LibraryCommand::ReadToolAs { tool, unit, replacing } => {
             if let Some((source, seq)) = state.library.open.as_ref().map(|open| (open.source.clone(), open.seq)) {
-                let ticket = state.tasks.start(format!("Read {tool} in {}", unit.name()), Vec::new());
-                effects.push(Effect::SetUnit { ticket, seq, source, tool, unit, replacing });
+                let errand = ReadTool { seq, source, tool, unit, replacing };
+                tasks::start(state, errand.what(), errand, effects);
             }
         }
         LibraryCommand::SetFilter(filter) => {
@@ -152,30 +153,81 @@ fn open(state: &mut State, place: Place, effects: &mut Vec<Effect>) {
     labels::end_stroke(state, effects);
     state.library.last_seq.0 += 1;
     let seq = state.library.last_seq;
-    let ticket = state.tasks.start(format!("Open {place}"), Vec::new());
-    if let Some(task) = state.tasks.running.get_mut(&ticket) {
-        task.opening = Some(seq);
-    }
     state.library.opening = Some(place.clone());
     state.library.failure = None;
-    effects.push(Effect::Open { ticket, seq, place });
+    let errand = Open { seq, place };
+    if let Some(task) = tasks::start(state, errand.what(), errand, effects) {
+        task.opening = Some(seq);
+    }
 }
 
-/// A CAD file is read in another unit: what failed for it is tried again.
-pub(super) fn unit_set(state: &mut State, set: UnitSet, current: bool) {
-    let done = format!("{} is read in {}", set.tool, set.unit.name());
-    match set.not_written {
-        None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file),
-        Some(why) => state.log.push(
-            Level::Warning,
-            format!("{done} as long as this data set is open: unit.txt could not be written"),
-            Some(why),
-            Some("Copy the data set to where you may write, or ask who may".to_owned()),
-        ),
+/// Reads the index of a data set.
+pub struct Open {
+    /// The number of this opening.
+    seq: DatasetSeq,
+    place: Place,
+}
+
+impl Errand for Open {
+    type End = (DatasetSeq, Place, Opened);
+    const KIND: TaskKind = TaskKind::Open;
+
+    fn what(&self) -> String {
+        format!("Open {}", self.place)
     }
-    if current {
-        state.tasks.failed.clear();
-        state.table.round += 1;
+
+    fn run(self, access: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
+        let opened = access.services.open(&self.place)?;
+        Ok((self.seq, self.place, opened))
+    }
+
+    fn ended((seq, place, opened): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+        // Else a later opening was started meanwhile: this one is not wanted any more.
+        if *seq == state.library.last_seq {
+            show(state, *seq, place.clone(), opened.clone(), effects);
+        }
+    }
+}
+
+/// Reads a tool's CAD file in another unit.
+pub struct ReadTool {
+    seq: DatasetSeq,
+    source: Arc<dyn DataSource>,
+    tool: String,
+    unit: ToolUnit,
+    /// What the file beside it says now, as the person was told.
+    replacing: Option<String>,
+}
+
+impl Errand for ReadTool {
+    /// The data set that it is of, and what was done.
+    type End = (DatasetSeq, UnitSet);
+    const KIND: TaskKind = TaskKind::ReadTool;
+
+    fn what(&self) -> String {
+        format!("Read {} in {}", self.tool, self.unit.name())
+    }
+
+    fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
+        Ok((self.seq, self.source.set_tool_unit(&self.tool, self.unit, self.replacing.as_deref())?))
+    }
+
+    /// Has what failed for it tried again.
+    fn ended((seq, set): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        let done = format!("{} is read in {}", set.tool, set.unit.name());
+        match &set.not_written {
+            None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file.clone()),
+            Some(why) => state.log.push(
+                Level::Warning,
+                format!("{done} as long as this data set is open: unit.txt could not be written"),
+                Some(why.clone()),
+                Some("Copy the data set to where you may write, or ask who may".to_owned()),
+            ),
+        }
+        if state.library.is_open(*seq) {
+            state.tasks.failed.clear();
+            state.table.round += 1;
+        }
     }
 }
 
@@ -296,14 +348,8 @@ pub(super) fn say_notes(state: &mut State) {
     }
 }
 
-/// Shows a data set that was opened; whether it was read again.
-pub(super) fn show(
-    state: &mut State,
-    seq: DatasetSeq,
-    place: Place,
-    opened: Opened,
-    effects: &mut Vec<Effect>,
-) -> bool {
+/// Shows a data set that was opened.
+fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effects: &mut Vec<Effect>) {
     labels::end_stroke(state, effects);
     // What is being written goes on; what could not be would be forgotten.
     let failed = state.document.failed.clone();
@@ -313,6 +359,7 @@ pub(super) fn show(
     }
     // Predictions under way are of the data set before.
     tasks::cancel_all(state, effects);
+    state.tasks.running.values_mut().for_each(|task| task.outdated = true);
     let before = state.entry().map(|entry| entry.name.clone());
     let same_place = state.library.open.as_ref().is_some_and(|open| open.place == place);
     // The first opening of a run goes on where the last run ended.
@@ -321,9 +368,8 @@ pub(super) fn show(
     state.results = Results::default();
     state.table.result = None;
     state.table.scores = Arc::default();
-    state.table.running = None;
     state.library.brush = None;
-    state.dial = DialState { running: None, result: None, ..state.dial.clone() };
+    state.dial = DialState { result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.train = TrainState { form: state.train.form, ..TrainState::default() };
     state.history.clear();
@@ -374,7 +420,6 @@ pub(super) fn show(
     }
     opened.recovered.failed.iter().for_each(|err| state.log.error(err));
     remember(state, &place, effects);
-    same_place
 }
 
 /// Takes the bundles that were found.

@@ -1,15 +1,24 @@
 //! The room of predictions: starting them, choosing among them, and the refit of their range.
 
 mod recipe;
-pub(super) mod refit;
+mod refit;
 
-use super::effect::Effect;
+pub use refit::Refit;
+
+use std::sync::Arc;
+
+use super::effect::{Access, Effect, Errand};
 use super::keys::PredictionKey;
-use super::settings;
+use super::results::prediction::{self, Keyed};
+use super::services::DataSource;
 use super::state::{Absent, State};
+use super::tasks::state::TaskKind;
+use super::{settings, tasks};
 use touch2touch_core::rig::{PadId, Text};
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
+use touch2touch_work::job::JobCx;
 
 /// What can happen to predictions.
 #[derive(Clone, Debug)]
@@ -88,8 +97,40 @@ fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
     }
     let names: Vec<Text> = recipes.iter().map(|recipe| state.finger_name(recipe.touch.finger)).collect();
     let title = format!("Generate {} {}", state.pair_name(), names.join(" and "));
-    let ticket = state.tasks.start(title, recipes.clone());
-    effects.push(Effect::Generate { ticket, recipes, bundle, source, sample });
+    let errand = Generate { recipes: recipes.clone(), bundle, source, sample };
+    if let Some(task) = tasks::start(state, title, errand, effects) {
+        task.recipes = recipes;
+    }
+}
+
+/// Makes predictions of one pair, all in one go.
+pub struct Generate {
+    recipes: Vec<PredictionKey>,
+    bundle: BundleInfo,
+    source: Arc<dyn DataSource>,
+    /// The pair, if it is loaded.
+    sample: Option<Arc<Sample>>,
+}
+
+impl Errand for Generate {
+    type End = Keyed;
+    const KIND: TaskKind = TaskKind::Generate;
+
+    fn what(&self) -> String {
+        format!("Generate with {}", self.bundle.name)
+    }
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Keyed, TaskError> {
+        let Self { recipes, bundle, source, sample } = self;
+        let onlooker = Some(access.onlooker.clone());
+        prediction::generate(&*access.services, recipes, &bundle, &*source, sample, cx, onlooker)
+    }
+
+    fn ended(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {
+        for (key, prediction) in made {
+            state.keep_prediction(key.clone(), prediction.clone(), true);
+        }
+    }
 }
 
 /// The seed after `seed`: scattered, so that neighbors share nothing, and of at most six digits, to be read out.

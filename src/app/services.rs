@@ -6,7 +6,7 @@ pub mod live;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use super::keys::{PredictionKey, TouchKey};
@@ -16,29 +16,23 @@ use super::settings::state::Settings;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::evaluation::Scores;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::adapt::{self, AdaptSetup, Adapted};
-use touch2touch_work::bundles::{self, BundleInfo};
-use touch2touch_work::case::{self, Case, CaseSetup, Held};
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::case::{Case, Held};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::evaluate::{self, Evaluation, Setup};
-use touch2touch_work::export::{ExportChoice, HandMasks, Plan};
+use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
-use touch2touch_work::labels::{Deed, Labels, Recovered, Told, Unsaved};
+use touch2touch_work::labels::{Deed, Recovered, Told, Unsaved};
 use touch2touch_work::models::{Models, Wanted};
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::propose::{self, Batch, BatchSetup};
-use touch2touch_work::sweep::{self, Sweep, SweepSetup};
 use touch2touch_work::tool::{UnitSet, set_unit};
-use touch2touch_work::train::{self, TrainSetup, Trained};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {
@@ -265,64 +259,20 @@ pub trait Services: Send + Sync {
         probability: Option<f32>,
     ) -> Result<ContactMask, TaskError>;
 
-    /// The results table of a data set.
-    ///
-    /// # Errors
-    /// As [`evaluate::evaluate`].
-    fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
-        evaluate::evaluate(dataset, setup, &Models::new(None), cx)
+    /// The models, which stay loaded between calls.
+    fn models(&self) -> &Models {
+        static MODELS: LazyLock<Models> = LazyLock::new(|| Models::new(None));
+        &MODELS
     }
 
-    /// The scores that are kept of a data set.
-    ///
-    /// # Errors
-    /// As [`evaluate::known`].
-    fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
-        evaluate::known(dataset, setup, &Models::new(None))
+    /// Where models are kept that were made here.
+    fn models_folder(&self) -> Option<&Path> {
+        None
     }
 
-    /// Turns a dial over pairs of a data set.
-    ///
-    /// # Errors
-    /// As [`sweep::sweep`].
-    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
-        sweep::sweep(dataset, setup, &Models::new(None), cx)
-    }
-
-    /// Proposes masks for many pairs, and stores them.
-    ///
-    /// # Errors
-    /// As [`propose::propose_all`].
-    fn propose_all(&self, dataset: &Dataset, setup: &BatchSetup, cx: &JobCx) -> Result<Batch, TaskError> {
-        propose::propose_all(dataset, setup, &Models::new(None), cx)
-    }
-
-    /// Fits a generator to pairs; the new bundle, where one is kept.
-    ///
-    /// # Errors
-    /// As [`adapt::adapt`].
-    fn adapt(
-        &self,
-        dataset: &Dataset,
-        setup: &AdaptSetup,
-        cx: &JobCx,
-    ) -> Result<(Adapted, Option<BundleInfo>), TaskError> {
-        Ok((adapt::adapt(dataset, setup, &Models::new(None), cx)?, None))
-    }
-
-    /// Trains a mask model on corrected masks (`changed` has those that may not be on the disk yet), and opens the new
-    /// bundle.
-    ///
-    /// # Errors
-    /// As [`train::train`].
-    fn train(
-        &self,
-        dataset: &Dataset,
-        changed: &BTreeMap<String, PairLabels>,
-        setup: &TrainSetup,
-        cx: &JobCx,
-    ) -> Result<(Trained, BundleInfo), TaskError> {
-        train_and_open(dataset, changed, setup, &Models::new(None), cx)
+    /// Where tuning that was stopped is kept.
+    fn unfinished_folder(&self) -> Option<&Path> {
+        None
     }
 
     /// How long a pair stays on screen before it is predicted without being asked for.
@@ -333,14 +283,6 @@ pub trait Services: Send + Sync {
     /// How long labels that could not be written wait until they are tried again.
     fn retry_after(&self) -> Duration {
         Duration::from_secs(5)
-    }
-
-    /// Makes a case of a pair and writes it.
-    ///
-    /// # Errors
-    /// As [`case::make`].
-    fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {
-        case::make(dataset, setup, &Models::new(None), file, cx).map(drop)
     }
 
     /// The stored settings (defaults where there are none), and what was wrong if they were set aside.
@@ -359,20 +301,6 @@ pub trait Services: Send + Sync {
     /// # Errors
     /// If they cannot be written.
     fn save_settings(&self, settings: &Settings) -> Result<(), TaskError>;
-}
-
-/// Trains a mask model as the setup says, and opens the new bundle.
-fn train_and_open(
-    dataset: &Dataset,
-    changed: &BTreeMap<String, PairLabels>,
-    setup: &TrainSetup,
-    models: &Models,
-    cx: &JobCx,
-) -> Result<(Trained, BundleInfo), TaskError> {
-    let masks = HandMasks { labels: &Labels::of(dataset), changed };
-    let trained = train::train(dataset, &masks, setup, models, cx)?;
-    let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
-    Ok((trained, bundle))
 }
 
 /// Shared services.

@@ -4,11 +4,13 @@ pub mod state;
 
 use std::path::PathBuf;
 
-pub use state::{Entry, Level, Log, Task, Tasks, Ticket};
+pub use state::{Entry, Level, Log, Task, TaskKind, Tasks, Ticket};
 
-use super::effect::Effect;
+use super::effect::{Access, Effect, Errand, Started};
+use super::jobs::Lane;
 use super::state::State;
 use touch2touch_work::error::TaskError;
+use touch2touch_work::job::{JobCx, Progress};
 
 /// What can happen to jobs and log.
 #[derive(Clone, Debug)]
@@ -46,6 +48,76 @@ pub(super) fn step(state: &mut State, command: TasksCommand, effects: &mut Vec<E
         TasksCommand::Notice(text) => state.log.info(text),
         TasksCommand::Saved(text, place) => state.log.saved(text, place),
         TasksCommand::Reveal(place) => effects.push(Effect::Reveal(place)),
+    }
+}
+
+/// Starts an errand, listed under a title while it runs. `None` where one of its kind has to end first.
+pub(super) fn start<'a, E: Errand>(
+    state: &'a mut State,
+    title: impl Into<String>,
+    errand: E,
+    effects: &mut Vec<Effect>,
+) -> Option<&'a mut Task> {
+    if E::KIND.lane() == Lane::Batch && state.running(E::KIND).is_some() {
+        return None;
+    }
+    state.tasks.last_ticket += 1;
+    let ticket = Ticket(state.tasks.last_ticket);
+    effects.push(Effect::Start(ticket, Started::new(errand)));
+    let task = Task {
+        kind: E::KIND,
+        title: title.into(),
+        progress: Progress::default(),
+        recipes: Vec::new(),
+        opening: None,
+        cancelling: false,
+        outdated: false,
+    };
+    Some(state.tasks.running.entry(ticket).or_insert(task))
+}
+
+/// Something that is written to a place that a person named: what it says then, and where it lies.
+type Writer = Box<dyn FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send>;
+
+/// Has something written.
+pub struct Write {
+    lane: Lane,
+    what: &'static str,
+    place: PathBuf,
+    writer: Writer,
+}
+
+impl Write {
+    /// On a lane, in these words, to that place.
+    pub(super) fn new(
+        lane: Lane,
+        what: &'static str,
+        place: PathBuf,
+        writer: impl FnOnce(PathBuf, &Access, &JobCx) -> Result<(String, PathBuf), TaskError> + Send + 'static,
+    ) -> Self {
+        Self { lane, what, place, writer: Box::new(writer) }
+    }
+}
+
+impl Errand for Write {
+    type End = (String, PathBuf);
+    const KIND: TaskKind = TaskKind::Write;
+
+    fn what(&self) -> String {
+        self.what.to_owned()
+    }
+
+    fn lane(&self) -> Lane {
+        self.lane
+    }
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        // As the system knows it, whatever folder the program was started in: what the log says must be found again.
+        (self.writer)(std::path::absolute(&self.place).unwrap_or(self.place), access, cx)
+    }
+
+    fn ended((line, place): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        state.log.saved(line, place.clone());
     }
 }
 

@@ -4,14 +4,22 @@ pub mod state;
 
 pub use state::{MINUTES, STEPS, TrainForm, TrainState};
 
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
-use super::effect::Effect;
+use super::effect::{Access, Effect, Errand};
+use super::labels::state::PairLabels;
+use super::services::DataSource;
 use super::settings::{self, SettingsCommand, state::MaskSettings};
 use super::state::State;
-use super::tasks::state::{Level, Ticket};
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::train::Trained;
+use super::tasks;
+use super::tasks::state::{Level, TaskKind};
+use touch2touch_work::bundles::{self, BundleInfo};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::export::HandMasks;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::Labels;
+use touch2touch_work::train::{self, TrainSetup, Trained};
 
 /// What can happen to the training.
 #[derive(Clone, Copy, Debug)]
@@ -28,15 +36,9 @@ pub(super) fn step(state: &mut State, command: TrainCommand, effects: &mut Vec<E
     match command {
         TrainCommand::SetForm(form) => state.train.form = form.validated(),
         TrainCommand::Start => {
-            if state.training().is_some() {
-                return;
-            }
             let (Some(setup), Some(open)) = (state.train_setup(), &state.library.open) else { return };
-            let source = open.source.clone();
-            let ticket = state.tasks.start("Train the mask model".into(), Vec::new());
-            state.train.running = Some(ticket);
-            let labels = state.document.labels.clone();
-            effects.push(Effect::Train { ticket, source, labels, setup: Box::new(setup) });
+            let errand = Train { source: open.source.clone(), changed: state.document.labels.clone(), setup };
+            tasks::start(state, TaskKind::Train.name(), errand, effects);
         }
         TrainCommand::Use => take_up(state, effects),
     }
@@ -50,32 +52,52 @@ fn take_up(state: &mut State, effects: &mut Vec<Effect>) {
     state.log.info(format!("Automatic masks are made by {name} from now on"));
 }
 
-/// Keeps a training and puts its bundle in the place of the mask model in force, unless it is worse than that on pairs that
-/// were left out. One that another data set's opening stopped has nowhere to be shown.
-pub(super) fn arrived(
-    state: &mut State,
-    ticket: Ticket,
-    trained: Arc<Trained>,
-    bundle: BundleInfo,
-    effects: &mut Vec<Effect>,
-) {
-    if state.train.running.take_if(|running| *running == ticket).is_none() {
-        return;
+/// Trains a mask model, and keeps the new one where the program keeps models.
+pub struct Train {
+    source: Arc<dyn DataSource>,
+    /// What was said about pairs, as far as it may not be on the disk yet.
+    changed: BTreeMap<String, PairLabels>,
+    setup: TrainSetup,
+}
+
+impl Errand for Train {
+    type End = (Arc<Trained>, BundleInfo);
+    const KIND: TaskKind = TaskKind::Train;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let (services, what) = (&access.services, Self::KIND.name());
+        let dataset = self.source.on_disk(what)?;
+        let models = services.models_folder().ok_or_else(|| {
+            TaskError::new(what, "this system names no folder for models")
+                .with_hint("Train with touch2touch masks train --out FOLDER.")
+        })?;
+        let unfinished = services.unfinished_folder().map(Into::into);
+        let setup = TrainSetup { out: train::new_folder(models, dataset), unfinished, ..self.setup };
+        let masks = HandMasks { labels: &Labels::of(dataset), changed: &self.changed };
+        let trained = train::train(dataset, &masks, &setup, services.models(), cx)?;
+        let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
+        Ok((Arc::new(trained), bundle))
     }
-    let scores = match (trained.before, trained.after) {
-        (Some(before), Some(after)) => format!(", IoU {:.3} instead of {:.3} on other pairs", after.iou, before.iou),
-        _ => String::new(),
-    };
-    state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
-    state.train.bundle = Some(bundle.id.clone());
-    state.library.bundles.retain(|known| known.origin != bundle.origin && known.id != bundle.id);
-    state.library.bundles.push(bundle);
-    if trained.is_worse() {
-        let hint = "Train it for longer or on more masks; \"Use the trained mask model\" takes it all the same.";
-        let text = "The trained mask model is worse on other pairs, and was not taken into use";
-        state.log.push(Level::Warning, text, None, Some(hint.into()));
-    } else {
-        take_up(state, effects);
+
+    /// Puts the bundle in the place of the mask model in force, unless it is worse than that on pairs that were left out.
+    fn ended((trained, bundle): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+        let scores = match (trained.before, trained.after) {
+            (Some(before), Some(after)) => {
+                format!(", IoU {:.3} instead of {:.3} on other pairs", after.iou, before.iou)
+            }
+            _ => String::new(),
+        };
+        state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
+        state.train.bundle = Some(bundle.id.clone());
+        state.library.bundles.retain(|known| known.origin != bundle.origin && known.id != bundle.id);
+        state.library.bundles.push(bundle.clone());
+        if trained.is_worse() {
+            let hint = "Train it for longer or on more masks; \"Use the trained mask model\" takes it all the same.";
+            let text = "The trained mask model is worse on other pairs, and was not taken into use";
+            state.log.push(Level::Warning, text, None, Some(hint.into()));
+        } else {
+            take_up(state, effects);
+        }
+        state.train.result = Some(trained.clone());
     }
-    state.train.result = Some(trained);
 }

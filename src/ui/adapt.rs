@@ -11,6 +11,7 @@ use super::widget::{curves, empty};
 use crate::app::action::Action;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane};
+use crate::app::tasks::TaskKind;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
@@ -48,7 +49,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (what, why) = match cx.state.adapting() {
+    let (what, why) = match cx.state.running(TaskKind::Fit) {
         Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
         None => (
             "The model is as it was trained, on simulated touches",
@@ -73,7 +74,7 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
     for reason in found.objections.iter().chain(&found.in_place_of) {
         ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
     }
-    if refused && cx.state.adapting().is_none() {
+    if refused && cx.state.running(TaskKind::Fit).is_none() {
         let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
         if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
             cx.push(AdaptCommand::Keep);
@@ -161,7 +162,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.push(AdaptCommand::Steps(steps));
             }
         }
-        match cx.state.adapting() {
+        match cx.state.running(TaskKind::Fit) {
             Some((ticket, task)) => {
                 let tip = "Stop; the same fit goes on from here when it is asked for again";
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));

@@ -18,6 +18,7 @@ use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
+use crate::app::tasks::TaskKind;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Figure;
 use touch2touch_core::units::counted;
@@ -231,7 +232,7 @@ fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
     let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
-    if cx.state.evaluating().is_none() {
+    if cx.state.running(TaskKind::Evaluate).is_none() {
         ui.horizontal_wrapped(|ui| {
             cx.action_button(ui, Action::RankMasks, "Rank");
             ui.label(caption(format!("{known} of {total} ranked"), cx.p));
@@ -330,7 +331,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
     let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible && scored < total) || cx.state.evaluating().is_some() {
+    if (possible && scored < total) || cx.state.running(TaskKind::Evaluate).is_some() {
         predict_all(cx, ui, scored);
     }
 }
@@ -338,7 +339,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// The button that scores all pairs, or how far that is.
 pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
-    ui.horizontal_wrapped(|ui| match cx.state.evaluating() {
+    ui.horizontal_wrapped(|ui| match cx.state.running(TaskKind::Evaluate) {
         Some((ticket, task)) => {
             let text = format!("{} of {}", task.progress.done, task.progress.total);
             let what = (text.as_str(), "Stop; what was scored until then is kept");

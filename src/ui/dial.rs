@@ -12,6 +12,7 @@ use crate::app::action::Action;
 use crate::app::command::{DialCommand, Pane};
 use crate::app::dial::DialPairs;
 use crate::app::keys::ImprintSource;
+use crate::app::tasks::TaskKind;
 use touch2touch_work::sweep::{Dial, MOST_VALUES, Series, Sweep};
 
 /// Which imprints are shown.
@@ -40,7 +41,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     let refused = cx.state.sweep_setup().err();
-    let (what, why) = match (cx.state.turning(), refused) {
+    let (what, why) = match (cx.state.running(TaskKind::Dial), refused) {
         (Some(_), _) => {
             ("The plots appear when all pairs are done".to_owned(), "Cancel keeps those done until then".to_owned())
         }
@@ -93,7 +94,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut predictions, "predictions").on_hover_text(tip).changed() {
             cx.push(DialCommand::Predictions(predictions));
         }
-        match cx.state.turning() {
+        match cx.state.running(TaskKind::Dial) {
             Some((ticket, task)) => {
                 let tip = "Stop, and show the pairs that were done until then";
                 cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));

@@ -17,6 +17,7 @@ use crate::app::action::Action;
 use crate::app::command::{Command, Pane, SettingsCommand, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
+use crate::app::tasks::TaskKind;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::postprocess::{
     ChainReading, CorrectionPart, CorrectionParts, Flag, Severity, Stage, StageRecord,
@@ -113,11 +114,10 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
         });
         response.response.accessible_name("Shift of the depth chain").on_hover_text(shift_tooltip(current));
     });
-    let running = cx.state.tasks.running.iter().find(|(_, task)| task.title.starts_with("Shift statistics"));
-    match running {
+    match cx.state.running(TaskKind::Refit) {
         Some((ticket, task)) => {
             let what = (task.progress.text.as_str(), "Stop computing shift statistics");
-            ui.horizontal(|ui| cx.stoppable(ui, (*ticket, task), f32::INFINITY, what));
+            ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, what));
         }
         None => {
             cx.action_button(ui, Action::Refit, "Refit on this data set");

@@ -10,6 +10,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
+use crate::app::tasks::TaskKind;
 use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
 
 /// Height of a row, points.
@@ -32,7 +33,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.separator();
         let rows = cx.state.table_rows();
         if rows.is_empty() {
-            let (what, why) = match cx.state.evaluating() {
+            let (what, why) = match cx.state.running(TaskKind::Evaluate) {
                 Some(_) => ("The table appears when all grasps are scored", "Cancel keeps what was scored until then"),
                 None => (
                     "No results yet",
@@ -89,7 +90,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
-        match cx.state.evaluating() {
+        match cx.state.running(TaskKind::Evaluate) {
             Some((ticket, task)) => {
                 let now = &task.progress;
                 let text = match now.fraction() {

@@ -13,6 +13,7 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores};
 use crate::app::library::{Sort, short_name};
+use crate::app::tasks::TaskKind;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Figure, mean};
 
@@ -52,12 +53,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         let table = &cx.state.table;
         let total = cx.state.library.pairs().len();
         let scored = table.scores.sources.iter().map(|source| source.scored).min().unwrap_or(0);
-        let empty = table.scores.sources.is_empty() && cx.state.evaluating().is_none();
-        if !empty && (scored < total || cx.state.evaluating().is_some()) {
+        let empty = table.scores.sources.is_empty() && cx.state.running(TaskKind::Evaluate).is_none();
+        if !empty && (scored < total || cx.state.running(TaskKind::Evaluate).is_some()) {
             predict_all(cx, ui, scored);
         }
         if table.scores.sources.is_empty() {
-            if cx.state.evaluating().is_none() {
+            if cx.state.running(TaskKind::Evaluate).is_none() {
                 let action = Action::PredictAll.command(cx.state);
                 let action = action.map(|_| ("Predict all", Action::PredictAll.tooltip()));
                 let why = "Every pair by every source appears here: measured imprints and the chosen generators";

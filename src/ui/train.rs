@@ -9,6 +9,7 @@ use super::widget::curves;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
+use crate::app::tasks::TaskKind;
 use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
@@ -88,7 +89,7 @@ fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
 
 /// What would be learned from.
 fn plan(cx: &Cx<'_>, ui: &mut Ui) {
-    if cx.state.training().is_some() {
+    if cx.state.running(TaskKind::Train).is_some() {
         return;
     }
     let Some(key) = cx.state.train_plan_key() else { return };
@@ -119,7 +120,7 @@ fn plan(cx: &Cx<'_>, ui: &mut Ui) {
 fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        match cx.state.training() {
+        match cx.state.running(TaskKind::Train) {
             Some((ticket, task)) => {
                 let tip = "Stop; the same training goes on from here when it is asked for again";
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));

@@ -2,6 +2,7 @@
 
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{HandMask, Review};
+use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
 use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::models::Models;
@@ -234,7 +235,7 @@ fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_
     strokes(&mut studio);
     let painted = hand(&studio).unwrap();
     studio.send(LabelsCommand::ProposeAll.into());
-    assert!(studio.state.batching().is_none());
+    assert!(studio.state.running(TaskKind::Propose).is_none());
     let said = &studio.state.log.entries.back().unwrap().text;
     assert!(said.contains("proposed in") && said.contains("1 pair judged before"), "{said}");
 

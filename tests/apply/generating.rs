@@ -4,8 +4,10 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 
 use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::effect::Ended;
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
+use touch2touch::app::predict::Generate;
 use touch2touch::app::results::Preview;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::state::{Absent, Lookup};
@@ -63,7 +65,7 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     let slow = Prediction { seconds: 5.0, ..(**bench.state.results.predictions.get(&key).unwrap()).clone() };
     let keys: Vec<_> = bench.state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
     let slow = keys.into_iter().map(|key| (key, Arc::new(slow.clone()))).collect();
-    bench.send(Answer::Generated(Ticket(u64::MAX), slow));
+    bench.send(Answer::Ended(Ticket(u64::MAX), Ended::of::<Generate>(slow)));
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
     assert_eq!(bench.services.generated(), 2);

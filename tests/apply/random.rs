@@ -10,6 +10,7 @@ use strum::IntoEnumIterator;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
+use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::grid::Mask;
 
 use self::commands::command;
@@ -33,11 +34,11 @@ fn said(doc: &Document) -> Said {
 /// Whether a command leaves the history as it is: that of another data set, and of labels read again, is in files that the
 /// double has not.
 fn stays(command: &Command) -> bool {
-    !matches!(
-        command,
-        Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload)
-            | Command::Answer(Answer::ProposedAll(..) | Answer::Imported(..))
-    )
+    match command {
+        Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
+        Command::Answer(Answer::Ended(_, end)) => !matches!(end.kind, TaskKind::Propose | TaskKind::Import),
+        _ => true,
+    }
 }
 
 fn session(command: impl Strategy<Value = Command>, most: usize) -> impl Strategy<Value = Vec<(Command, u8)>> {

@@ -4,6 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{AdaptCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::tasks::TaskKind;
 use touch2touch_work::bundles::BundleKind;
 
 use super::rig::{Rig, write_dataset};
@@ -68,7 +69,7 @@ fn pictures_of_tuning() {
         rig.send(AdaptCommand::Tune(true));
         rig.send(AdaptCommand::Steps(30));
         rig.send(AdaptCommand::Start);
-        while rig.harness.state().state().adapting().is_some() {
+        while rig.harness.state().state().running(TaskKind::Fit).is_some() {
             std::thread::sleep(std::time::Duration::from_millis(100));
             rig.harness.step();
         }

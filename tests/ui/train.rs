@@ -4,6 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Pane, SettingsCommand, TrainCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::train::TrainForm;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::train::TrainChoice;
@@ -33,7 +34,7 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
 
     rig.harness.get_by_label("Start training").click();
     rig.harness.step();
-    while rig.harness.state().state().training().is_some() {
+    while rig.harness.state().state().running(TaskKind::Train).is_some() {
         std::thread::sleep(std::time::Duration::from_millis(50));
         rig.harness.step();
     }

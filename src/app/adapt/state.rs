@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::super::labels::state::Review;
 use super::super::state::State;
-use super::super::tasks::state::{Task, Ticket};
+use super::super::tasks::state::TaskKind;
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
@@ -51,8 +51,6 @@ pub struct AdaptState {
     pub tune: bool,
     /// With how many steps: 50 take about a minute on two free cores, for each part and for all.
     pub steps: u32,
-    /// The fit under way.
-    pub running: Option<Ticket>,
     /// The last fit to the open data set.
     pub result: Option<Arc<Adapted>>,
     /// Its bundle.
@@ -61,7 +59,7 @@ pub struct AdaptState {
 
 impl Default for AdaptState {
     fn default() -> Self {
-        Self { pairs: AdaptPairs::default(), tune: false, steps: 50, running: None, result: None, bundle: None }
+        Self { pairs: AdaptPairs::default(), tune: false, steps: 50, result: None, bundle: None }
     }
 }
 
@@ -112,15 +110,9 @@ impl State {
         })
     }
 
-    /// The fit under way.
-    pub fn adapting(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.adapt.running?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
-    }
-
     /// How the tuning goes, or how the last one went.
     pub fn tuning_curves(&self) -> &[Curve] {
-        match (self.adapting(), &self.adapt.result) {
+        match (self.running(TaskKind::Fit), &self.adapt.result) {
             (Some((_, task)), _) => &task.progress.curves,
             (None, Some(result)) => &result.curves,
             (None, None) => &[],

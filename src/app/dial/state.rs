@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::super::state::State;
-use super::super::tasks::state::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pairs;
@@ -48,8 +47,6 @@ pub struct DialState {
     pub pairs: DialPairs,
     /// Whether predictions are posed as well.
     pub predictions: bool,
-    /// The turn under way.
-    pub running: Option<Ticket>,
     /// What the last turn over the open data set did.
     pub result: Option<Arc<Sweep>>,
 }
@@ -58,15 +55,7 @@ impl Default for DialState {
     fn default() -> Self {
         let dial = Dial::default();
         let (first, last, count) = dial.usual();
-        Self {
-            dial,
-            range: [first, last],
-            count,
-            pairs: DialPairs::Spread(24),
-            predictions: true,
-            running: None,
-            result: None,
-        }
+        Self { dial, range: [first, last], count, pairs: DialPairs::Spread(24), predictions: true, result: None }
     }
 }
 
@@ -111,12 +100,6 @@ impl State {
             return Err("A shift is of predictions, and they are left out".into());
         }
         Ok(SweepSetup { values, pairs, recipe })
-    }
-
-    /// The turn under way.
-    pub fn turning(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.dial.running?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
     }
 
     /// Whether a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.

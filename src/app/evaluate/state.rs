@@ -6,7 +6,6 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::state::State;
-use super::super::tasks::state::{Task, Ticket};
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
@@ -25,8 +24,6 @@ pub struct TableState {
     pub grasps_per_tool: Option<usize>,
     /// Whether published figures are shown as well.
     pub published: bool,
-    /// The evaluation under way.
-    pub running: Option<Ticket>,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
     /// The scores that are kept of the open data set.
@@ -47,7 +44,6 @@ impl Default for TableState {
             left_out: BTreeSet::new(),
             grasps_per_tool: Some(4),
             published: false,
-            running: None,
             result: None,
             scores: Arc::default(),
             round: 0,
@@ -232,12 +228,6 @@ impl State {
             grasps_per_tool: self.table.grasps_per_tool,
             ..Setup::default()
         })
-    }
-
-    /// The evaluation under way.
-    pub fn evaluating(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.table.running?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
     }
 
     /// The rows to show: those of the table, and the published ones if wanted.

@@ -10,7 +10,6 @@ use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, Predicti
 use super::super::pane::{Kind, Pane};
 use super::super::settings::state::{ColorMap as MapChoice, Settings};
 use super::super::state::State;
-use super::super::tasks::state::Ticket;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
@@ -94,8 +93,6 @@ pub struct ExportState {
     pub importing: Option<ImportForm>,
     /// How many imports were asked about.
     pub(in crate::app) imports: u64,
-    /// The import that is under way.
-    pub(in crate::app) import: Option<Ticket>,
     /// Whether the prediction of a case that was opened is still to be made.
     pub predict: bool,
 }

@@ -1,20 +1,26 @@
 //! Proposals for all pairs of the list at once.
 
-use super::super::effect::Effect;
+use std::sync::Arc;
+
+use super::super::effect::{Access, Effect, Errand};
+use super::super::services::DataSource;
 use super::super::state::State;
-use super::super::tasks::state::{Level, Task, Ticket};
+use super::super::tasks;
+use super::super::tasks::state::{Level, TaskKind};
 use super::end_stroke;
 use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::import::Import;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::import::{Import, ImportSetup, import_masks};
+use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::propose::{Batch, BatchSetup, ProposeSetup};
+use touch2touch_work::propose::{self, Batch, BatchSetup, ProposeSetup};
 
 impl State {
     /// Whether masks can be proposed for the listed pairs.
     pub fn can_propose_all(&self) -> bool {
         let predicts = self.worked_on(self.selection.finger) == ImprintSource::Predicted;
         let has_model = !predicts || self.bundle(BundleKind::Generator).is_ok();
-        !self.library.order.is_empty() && has_model && self.batching().is_none()
+        !self.library.order.is_empty() && has_model && self.running(TaskKind::Propose).is_none()
     }
 
     /// What proposing masks for the listed pairs does.
@@ -29,12 +35,6 @@ impl State {
             person: self.known_person(),
         }
     }
-
-    /// The proposing for many pairs that is under way.
-    pub fn batching(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.document.batch?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
-    }
 }
 
 /// Starts it.
@@ -42,30 +42,58 @@ pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let Some(open) = state.library.open.as_ref().filter(|_| state.can_propose_all()) else { return };
     let (source, setup) = (open.source.clone(), state.batch_setup());
-    let ticket = state.tasks.start(format!("Propose masks for {} pairs", setup.pairs.len()), Vec::new());
-    state.document.batch = Some(ticket);
-    effects.push(Effect::ProposeAll { ticket, source, setup: Box::new(setup) });
+    let title = format!("Propose masks for {} pairs", setup.pairs.len());
+    tasks::start(state, title, ProposeAll { source, setup }, effects);
 }
 
-/// Has the masks that were proposed read again where they are looked at, and says what became of them.
-pub(in crate::app) fn proposed(state: &mut State, ticket: Ticket, batch: &Batch) {
-    if state.document.batch.take_if(|running| *running == ticket).is_none() {
-        return;
+/// Proposes masks for many pairs, and stores them.
+pub struct ProposeAll {
+    source: Arc<dyn DataSource>,
+    setup: BatchSetup,
+}
+
+impl Errand for ProposeAll {
+    type End = Batch;
+    const KIND: TaskKind = TaskKind::Propose;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Batch, TaskError> {
+        let dataset = self.source.on_disk(Self::KIND.name())?;
+        propose::propose_all(dataset, &self.setup, access.services.models(), cx)
     }
-    reread(state, &batch.changed);
-    state.selection.proposing &= batch.masks == 0;
-    let level = if batch.left_out.is_empty() { Level::Info } else { Level::Warning };
-    let why = batch.left_out.first().map(|first| format!("the first: {}: {}", first.name, first.why));
-    state.log.push(level, batch.text(), why, None);
+
+    fn ended(batch: &Batch, state: &mut State, _: &mut Vec<Effect>) {
+        reread(state, &batch.changed);
+        state.selection.proposing &= batch.masks == 0;
+        let level = if batch.left_out.is_empty() { Level::Info } else { Level::Warning };
+        let why = batch.left_out.first().map(|first| format!("the first: {}: {}", first.name, first.why));
+        state.log.push(level, batch.text(), why, None);
+    }
 }
 
-/// Has the masks that were imported read again where they are looked at, and says what became of them.
-pub(in crate::app) fn imported(state: &mut State, import: &Import) {
-    reread(state, &import.changed);
-    let level = if import.complete { Level::Info } else { Level::Warning };
-    state.log.push(level, import.text(), None, None);
-    if import.total() > 0 {
-        state.log.place_last(import.labels.clone());
+/// Takes masks over that lie in a form of other programs.
+pub struct ImportMasks {
+    pub(in crate::app) source: Arc<dyn DataSource>,
+    pub(in crate::app) setup: ImportSetup,
+}
+
+impl Errand for ImportMasks {
+    type End = Import;
+    const KIND: TaskKind = TaskKind::Import;
+
+    fn run(self, _: &Access, cx: &JobCx) -> Result<Import, TaskError> {
+        let Self { source, mut setup } = self;
+        let dataset = source.on_disk(Self::KIND.name())?;
+        setup.from = std::path::absolute(&setup.from).unwrap_or(setup.from);
+        import_masks(dataset, &setup, cx)
+    }
+
+    fn ended(import: &Import, state: &mut State, _: &mut Vec<Effect>) {
+        reread(state, &import.changed);
+        let level = if import.complete { Level::Info } else { Level::Warning };
+        state.log.push(level, import.text(), None, None);
+        if import.total() > 0 {
+            state.log.place_last(import.labels.clone());
+        }
     }
 }
 

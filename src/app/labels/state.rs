@@ -5,7 +5,6 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PoseKey, Revision};
-use super::super::tasks::state::Ticket;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, Seen};
 use touch2touch_core::rig::PadId;
@@ -46,8 +45,6 @@ pub struct Document {
     pub(in crate::app) marked: bool,
     /// What was counted last.
     pub stats: Option<Arc<LabelStats>>,
-    /// Masks being proposed for many pairs.
-    pub(in crate::app) batch: Option<Ticket>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// Those of them whose last writing failed, and why.

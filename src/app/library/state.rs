@@ -148,6 +148,11 @@ pub struct Library {
 }
 
 impl Library {
+    /// Whether a data set is the one that is open: what is of an earlier opening comes too late.
+    pub(in crate::app) fn is_open(&self, seq: DatasetSeq) -> bool {
+        self.open.as_ref().is_some_and(|open| open.seq == seq)
+    }
+
     /// The index of what is open; empty when nothing is.
     pub fn pairs(&self) -> &[PairEntry] {
         self.open.as_ref().map_or(&[], |open| &open.index().pairs)

@@ -1,20 +1,30 @@
 //! The refit shift: statistics of the open data set's own predictions.
 
-use super::super::effect::Effect;
-use super::super::keys::ShiftMode;
-use super::super::settings;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::super::effect::{Access, Effect, Errand};
+use super::super::keys::{PredictionKey, ShiftMode};
+use super::super::services::DataSource;
 use super::super::state::State;
+use super::super::tasks::state::TaskKind;
+use super::super::{settings, tasks};
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::models::Wanted;
+use touch2touch_work::pairs;
+use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
-/// Name of the job on screen.
+/// The job on screen.
 const TITLE: &str = "Shift statistics";
 
 /// Starts a pass over the data set, unless one is under way.
 pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.tasks.running.values().any(|task| task.title.starts_with(TITLE) && !task.cancelling) {
+    if state.tasks.running.values().any(|task| task.kind == TaskKind::Refit && !task.cancelling) {
         return;
     }
     let ready = state.can_generate().and_then(|()| state.bundle(BundleKind::Generator).cloned());
@@ -28,29 +38,60 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
         return;
     };
     let Some(recipe) = state.recipe(touch) else { return };
-    let ticket = state.tasks.start(format!("{TITLE} of {}", source.title()), Vec::new());
-    effects.push(Effect::Refit { ticket, recipe, bundle, source });
+    let title = format!("{TITLE} of {}", source.title());
+    tasks::start(state, title, Refit { recipe, bundle, source }, effects);
 }
 
-/// Uses statistics that arrived.
-pub(in crate::app) fn arrived(
-    state: &mut State,
-    statistics: &ShiftStatistics,
-    saved: Option<String>,
-    effects: &mut Vec<Effect>,
-) {
-    let p = &statistics.provenance;
-    match statistics.shift_for(&p.bundle, &p.bundle_hash) {
-        Ok(shift) => {
-            let place = saved.map_or(String::new(), |file| format!(", kept in {file}"));
-            state.log.info(format!(
-                "Shift statistics of {} touches of {} with {}{place}",
-                statistics.touches, p.dataset, p.bundle
-            ));
-            state.settings.refit = Some(shift);
-            state.settings.shift = ShiftMode::Refit(shift);
-            settings::save(state, effects);
+/// Makes shift statistics of a data set.
+pub struct Refit {
+    /// How its touches are predicted; the touch itself is replaced.
+    recipe: PredictionKey,
+    bundle: BundleInfo,
+    source: Arc<dyn DataSource>,
+}
+
+impl Errand for Refit {
+    /// The statistics, and where they are kept.
+    type End = (ShiftStatistics, Option<PathBuf>);
+    const KIND: TaskKind = TaskKind::Refit;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let Self { recipe, bundle, source } = self;
+        let pairs = pairs::spread(source.index().pairs.len(), Some(PAIRS));
+        let rig = source.rig();
+        let ends = bundle.ends(&rig).transpose().map_err(|err| TaskError::from_error(TITLE, &err))?;
+        let setup = StatisticsSetup {
+            pairs: pairs.map(|at| PairId(at as u32)).collect(),
+            fingers: rig.pad_list(),
+            input: ends.ok_or_else(|| TaskError::new(TITLE, "the bundle is not a generator"))?.input,
+            config: recipe.config(),
+            dataset: source.title().to_owned(),
+            bundle,
+        };
+        let predict = |wanted: Wanted<'_>, cx: &JobCx| {
+            let made = access.services.predict(&setup.bundle, recipe.runtime, &setup.config, &[wanted], cx)?;
+            made.into_iter().next().ok_or_else(|| TaskError::new(TITLE, "no answer"))
+        };
+        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), predict, cx)?;
+        let saved = access.services.save_statistics(&found)?;
+        Ok((found, saved))
+    }
+
+    /// Uses them.
+    fn ended((statistics, saved): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+        let p = &statistics.provenance;
+        match statistics.shift_for(&p.bundle, &p.bundle_hash) {
+            Ok(shift) => {
+                let place = saved.as_ref().map_or(String::new(), |file| format!(", kept in {}", file.display()));
+                state.log.info(format!(
+                    "Shift statistics of {} touches of {} with {}{place}",
+                    statistics.touches, p.dataset, p.bundle
+                ));
+                state.settings.refit = Some(shift);
+                state.settings.shift = ShiftMode::Refit(shift);
+                settings::save(state, effects);
+            }
+            Err(err) => state.log.error(&TaskError::from_error(TITLE, &err)),
         }
-        Err(err) => state.log.error(&TaskError::from_error(TITLE, &err)),
     }
 }

@@ -4,7 +4,7 @@ use super::super::evaluate::state::ScoreTable;
 use super::super::pane::Need;
 use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
 use std::sync::Arc;
-use touch2touch_work::evaluate::Setup;
+use touch2touch_work::evaluate::{self, Setup};
 use touch2touch_work::infer::engine::EngineChoice;
 
 /// Everything that decides which scores are there.
@@ -28,7 +28,7 @@ impl Computes for ScoresKey {
         let source = state.library.open.as_ref()?.source.clone();
         Some(Job::new(Lane::Compute, "Look for scores", move |_| {
             let dataset = source.on_disk("Look for scores")?;
-            Ok(ScoreTable::new(source.index(), services.known_scores(dataset, &setup)?))
+            Ok(ScoreTable::new(source.index(), evaluate::known(dataset, &setup, services.models())?))
         }))
     }
 

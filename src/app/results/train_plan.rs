@@ -2,6 +2,7 @@
 
 use super::super::keys::{DatasetSeq, Revision};
 use super::super::pane::Need;
+use super::super::tasks::state::TaskKind;
 use super::{Computes, Job, Lane, SharedServices, State, Wanted};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::HandMasks;
@@ -53,7 +54,7 @@ impl State {
 impl Wanted<'_> {
     pub(crate) fn train_plan(&mut self) {
         let state = self.state;
-        if !state.needs(Need::Training) || state.document.stroke.is_some() || state.training().is_some() {
+        if !state.needs(Need::Training) || state.document.stroke.is_some() || state.running(TaskKind::Train).is_some() {
             return;
         }
         if let Some(key) = state.train_plan_key() {

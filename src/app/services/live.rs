@@ -14,21 +14,18 @@ use super::super::labels::state::{PairLabels, Review};
 use super::super::library::state::Place;
 use super::super::services::Opened;
 use super::super::settings::state::{SETTINGS_VERSION, Settings};
-use super::{DataSource, Following, Services, train_and_open};
+use super::{DataSource, Following, Services};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::evaluation::Scores;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::adapt::{self, AdaptSetup, Adapted};
 use touch2touch_work::bundles::{self, BundleInfo};
-use touch2touch_work::case::{self, Case, CaseSetup, Held};
+use touch2touch_work::case::{self, Case, Held};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::evaluate::{self, Evaluation, Setup};
 use touch2touch_work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
@@ -36,17 +33,14 @@ use touch2touch_work::io::case_file;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, files, folders, names};
+use touch2touch_work::io::{atomic, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::{LabelStats, label_stats};
 use touch2touch_work::labels::{Deed, Labels, Recovered, Reviews, Told, Unsaved, recover};
 use touch2touch_work::models::{KeptPrediction, Models, Wanted};
 use touch2touch_work::new_bundle::models_folder;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::propose::{self, Batch, BatchSetup};
-use touch2touch_work::sweep::{self, Sweep, SweepSetup};
 use touch2touch_work::tool::tool_file;
-use touch2touch_work::train::{TrainSetup, Trained, new_folder};
 use touch2touch_work::tuning::unfinished_folder;
 
 /// Longer than a key that is held down leaves a pair on screen.
@@ -297,59 +291,20 @@ impl Services for LiveServices {
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }
 
-    fn evaluate(&self, dataset: &Dataset, setup: &Setup, cx: &JobCx) -> Result<Evaluation, TaskError> {
-        evaluate::evaluate(dataset, setup, &self.models, cx)
+    fn models(&self) -> &Models {
+        &self.models
+    }
+
+    fn models_folder(&self) -> Option<&Path> {
+        self.models_folder.as_deref()
+    }
+
+    fn unfinished_folder(&self) -> Option<&Path> {
+        self.unfinished.as_deref()
     }
 
     fn patience(&self) -> Duration {
         PATIENCE
-    }
-
-    fn known_scores(&self, dataset: &Dataset, setup: &Setup) -> Result<Vec<Scores>, TaskError> {
-        evaluate::known(dataset, setup, &self.models)
-    }
-
-    fn sweep(&self, dataset: &Dataset, setup: &SweepSetup, cx: &JobCx) -> Result<Sweep, TaskError> {
-        sweep::sweep(dataset, setup, &self.models, cx)
-    }
-
-    fn propose_all(&self, dataset: &Dataset, setup: &BatchSetup, cx: &JobCx) -> Result<Batch, TaskError> {
-        propose::propose_all(dataset, setup, &self.models, cx)
-    }
-
-    fn adapt(
-        &self,
-        dataset: &Dataset,
-        setup: &AdaptSetup,
-        cx: &JobCx,
-    ) -> Result<(Adapted, Option<BundleInfo>), TaskError> {
-        // Among the models that the program looks for at its start.
-        let name = format!("fitted-to-{}", names::label(&dataset.title));
-        let out = self.models_folder.as_ref().map(|folder| folder.join(name));
-        let setup = AdaptSetup { out, unfinished: self.unfinished.clone(), ..setup.clone() };
-        let adapted = adapt::adapt(dataset, &setup, &self.models, cx)?;
-        let bundle = adapted
-            .bundle
-            .as_ref()
-            .map(|folder| bundles::open("Open the fitted bundle", folder.as_path()))
-            .transpose()?;
-        Ok((adapted, bundle))
-    }
-
-    fn train(
-        &self,
-        dataset: &Dataset,
-        changed: &BTreeMap<String, PairLabels>,
-        setup: &TrainSetup,
-        cx: &JobCx,
-    ) -> Result<(Trained, BundleInfo), TaskError> {
-        let models = self.models_folder.as_ref().ok_or_else(|| {
-            TaskError::new("Train the mask model", "this system names no folder for models")
-                .with_hint("Train with touch2touch masks train --out FOLDER.")
-        })?;
-        let setup =
-            TrainSetup { out: new_folder(models, dataset), unfinished: self.unfinished.clone(), ..setup.clone() };
-        train_and_open(dataset, changed, &setup, &self.models, cx)
     }
 
     fn mask_by_model(
@@ -360,10 +315,6 @@ impl Services for LiveServices {
         probability: Option<f32>,
     ) -> Result<ContactMask, TaskError> {
         self.models.mask(bundle, engine, imprint, probability)
-    }
-
-    fn make_case(&self, dataset: &Dataset, setup: &CaseSetup, file: &Path, cx: &JobCx) -> Result<(), TaskError> {
-        case::make(dataset, setup, &self.models, file, cx).map(drop)
     }
 
     fn save_statistics(&self, statistics: &ShiftStatistics) -> Result<Option<PathBuf>, TaskError> {

@@ -3,7 +3,9 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
+use super::super::jobs::Lane;
 use super::super::keys::{DatasetSeq, PredictionKey, Request};
+use super::super::state::State;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
 
@@ -11,9 +13,57 @@ use touch2touch_work::job::Progress;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Ticket(pub u64);
 
+macro_rules! kinds {
+    ($( #[doc = $doc:literal] $kind:ident, $name:literal, $lane:ident; )*) => {
+        /// What a person can start. On [`Lane::Batch`] there is one of a kind at a time, and nobody waits for its end any
+        /// more once another data set is open.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter)]
+        pub enum TaskKind { $( #[doc = $doc] $kind, )* }
+
+        impl TaskKind {
+            /// What it does, for errors.
+            pub fn name(self) -> &'static str {
+                match self { $( Self::$kind => $name, )* }
+            }
+
+            /// Where it runs.
+            pub fn lane(self) -> Lane {
+                match self { $( Self::$kind => Lane::$lane, )* }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// A data set is opened.
+    Open, "Open", Files;
+    /// A tool's CAD file is read in another unit.
+    ReadTool, "Read the tool", Files;
+    /// Touches of a pair are predicted.
+    Generate, "Generate", Models;
+    /// Shift statistics are made.
+    Refit, "Shift statistics", Models;
+    /// Something is written to a place that a person named.
+    Write, "Write", Files;
+    /// Masks are taken over that lie in a form of other programs.
+    Import, "Import masks", Files;
+    /// Masks are proposed for many pairs.
+    Propose, "Propose masks", Batch;
+    /// A data set is scored.
+    Evaluate, "Evaluate", Batch;
+    /// A dial is turned over many pairs.
+    Dial, "Dial", Batch;
+    /// A generator is fitted to pairs.
+    Fit, "Fit the model", Batch;
+    /// A mask model is trained.
+    Train, "Train the mask model", Batch;
+}
+
 /// A job that a person started.
 #[derive(Clone, Debug)]
 pub struct Task {
+    /// What it is.
+    pub kind: TaskKind,
     /// Its name on screen, e.g. `Generate data_4 right`.
     pub title: String,
     /// How far it is.
@@ -24,6 +74,8 @@ pub struct Task {
     pub opening: Option<DatasetSeq>,
     /// Whether it was told to stop and has not stopped yet.
     pub cancelling: bool,
+    /// Whether another data set was opened since.
+    pub outdated: bool,
 }
 
 /// Running jobs, and what the panes wait for.
@@ -53,13 +105,13 @@ impl Tasks {
     pub fn is_idle(&self) -> bool {
         self.running.is_empty() && self.demanded.is_empty()
     }
+}
 
-    pub(in crate::app) fn start(&mut self, title: String, recipes: Vec<PredictionKey>) -> Ticket {
-        self.last_ticket += 1;
-        let ticket = Ticket(self.last_ticket);
-        self.running
-            .insert(ticket, Task { title, progress: Progress::default(), recipes, opening: None, cancelling: false });
-        ticket
+impl State {
+    /// What runs of a kind for the data set that is open.
+    pub fn running(&self, kind: TaskKind) -> Option<(Ticket, &Task)> {
+        let mut tasks = self.tasks.running.iter();
+        tasks.find(|(_, task)| task.kind == kind && !task.outdated).map(|(ticket, task)| (*ticket, task))
     }
 }
 

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use super::super::state::State;
-use super::super::tasks::state::{Task, Ticket};
+use super::super::tasks::state::TaskKind;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::job::Curve;
 use touch2touch_work::train::{TrainChoice, TrainSetup, Trained};
@@ -62,8 +62,6 @@ impl TrainForm {
 pub struct TrainState {
     /// What is asked for.
     pub form: TrainForm,
-    /// The training under way.
-    pub running: Option<Ticket>,
     /// The last training on the open data set.
     pub result: Option<Arc<Trained>>,
     /// Its bundle.
@@ -87,15 +85,9 @@ impl State {
         })
     }
 
-    /// The training under way.
-    pub fn training(&self) -> Option<(Ticket, &Task)> {
-        let ticket = self.train.running?;
-        Some((ticket, self.tasks.running.get(&ticket)?))
-    }
-
     /// How the training goes, or how the last one went.
     pub fn training_curves(&self) -> &[Curve] {
-        match (self.training(), &self.train.result) {
+        match (self.running(TaskKind::Train), &self.train.result) {
             (Some((_, task)), _) => &task.progress.curves,
             (None, Some(result)) => &result.curves,
             (None, None) => &[],

@@ -8,6 +8,7 @@ use crate::app::action::Action;
 use crate::app::command::SettingsCommand;
 use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
+use crate::app::tasks::TaskKind;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{PROPOSED, SMALL, section};
 use touch2touch_work::propose::FARTHEST_M;
@@ -57,7 +58,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// The same for every pair in the list, with how far it is.
 fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
-    if let Some((ticket, task)) = cx.state.batching() {
+    if let Some((ticket, task)) = cx.state.running(TaskKind::Propose) {
         let tip = "Stop; the pairs that were done until then keep their masks";
         ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip)));
     } else {

@@ -9,23 +9,24 @@ use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::action::{Action, Key, Shortcut};
-use touch2touch::app::adapt::AdaptPairs;
+use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
     AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
     InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
     TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
-use touch2touch::app::dial::DialPairs;
-use touch2touch::app::effect::{LabelsToSave, NotSaved};
-use touch2touch::app::evaluate::ScoreChoice;
+use touch2touch::app::dial::{DialPairs, Turn};
+use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
+use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
     TouchKey,
 };
-use touch2touch::app::labels::{PairLabels, Review, StrokeIn3d};
-use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, StrokeIn3d};
+use touch2touch::app::library::{Open, Place, ReadTool, Sort};
+use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
@@ -33,8 +34,8 @@ use touch2touch::app::settings::{
     ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
     SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
-use touch2touch::app::tasks::Ticket;
-use touch2touch::app::train::TrainForm;
+use touch2touch::app::tasks::{TaskKind, Ticket, Write};
+use touch2touch::app::train::{Train, TrainForm};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
@@ -286,6 +287,39 @@ fn followed() -> Followed {
     Followed { source, pair: PairId(0), completed: false, sample: Err(TaskError::new("Load", "it is half written")) }
 }
 
+/// The end of an errand of any kind, as empty as it can be. A kind that has none does not compile.
+fn ended() -> impl Strategy<Value = Ended> {
+    (any_of::<TaskKind>(), select(vec!["tool_a/data_0", "elsewhere"]), select(vec![DatasetSeq(1), NEVER])).prop_map(
+        |(kind, name, seq)| match kind {
+            TaskKind::Open => {
+                let opened = Double::new(false, true).open(&Place::Demo).expect("the double opens");
+                Ended::of::<Open>((NEVER, Place::Path(name.into()), opened))
+            }
+            TaskKind::ReadTool => {
+                let (tool, word, file) = ("tool_a".into(), "mm".into(), "unit.txt".into());
+                let set = UnitSet { tool, unit: ToolUnit::Millimeters, file, word, not_written: None };
+                Ended::of::<ReadTool>((seq, set))
+            }
+            TaskKind::Generate => Ended::of::<Generate>(Vec::new()),
+            TaskKind::Refit => Ended::of::<Refit>((statistics(), None)),
+            TaskKind::Write => Ended::of::<Write>(("Something".into(), "/dev/null/folder".into())),
+            TaskKind::Import => {
+                Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
+            }
+            TaskKind::Propose => {
+                Ended::of::<ProposeAll>(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
+            }
+            TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
+            TaskKind::Dial => Ended::of::<Turn>(Arc::new(swept())),
+            TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
+            TaskKind::Train => {
+                let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
+                Ended::of::<Train>((Arc::new(trained()), bundle))
+            }
+        },
+    )
+}
+
 /// One way to draw each command of a room, with its weight. A command that is not drawn does not compile.
 macro_rules! draws {
     ($( $name:ident: $command:ident { $( $weight:literal $variant:ident $(($($each:expr),+))?, )* } )*) => {
@@ -529,29 +563,16 @@ draws! {
     // Answers that nobody waits for, or that come too late.
     answers: Answer {
         1 Followed(Just(NEVER), Just(()).prop_map(|()| followed())),
-        1 Opened(ticket(), Just(NEVER), place(), Just(()).prop_map(|()| {
-            Double::new(false, true).open(&Place::Demo).expect("the double opens")
-        })),
-        1 UnitSet(ticket(), select(vec![DatasetSeq(1), NEVER]), Just(()).prop_map(|()| UnitSet {
-            tool: "tool_a".into(),
-            unit: ToolUnit::Millimeters,
-            file: "unit.txt".into(),
-            word: "mm".into(),
-            not_written: None,
-        })),
         1 Bundles(Just(()).prop_map(|()| Double::new(false, true).find_bundles(&[]).0), Just(Vec::new())),
         1 SettingsLoaded(mask().prop_map(|mask| Box::new(Settings { mask, ..Settings::default() })), Just(None)),
         1 Demanded(touch().prop_map(|touch| vec![Request::Sample(touch.pair)])),
         1 Computed(select(vec![DatasetSeq(1), NEVER]),
             touch().prop_map(|touch| Computed::Ambiguity(AmbiguityKey(touch), Arc::new(None)))),
-        1 Generated(ticket(), Just(Vec::new())),
         1 Previewed(ticket(), recipe().prop_map(|recipe| {
             Arc::new(Preview { recipe, picture: PreviewPicture { step: 1, of: 2, depth: DepthMap::filled(2, 2, 0.0) } })
         })),
-        1 Refitted(ticket(), Just(()).prop_map(|()| Box::new(statistics())), Just(None)),
         1 Progressed(ticket(), Just(Progress { done: 3, total: 4, text: "step".into(), ..Progress::default() })),
-        1 Finished(ticket(), Just(None)),
-        1 Saved(ticket(), Just("Something".to_owned()), Just(PathBuf::from("/dev/null/folder"))),
+        12 Ended(ticket(), ended()),
         1 Revealed,
         1 TaskFailed(ticket(), error()),
         1 RequestFailed(select(vec![DatasetSeq(1), NEVER]), touch().prop_map(|t| Box::new(Request::Sample(t.pair))), error()),
@@ -560,18 +581,6 @@ draws! {
         1 LabelsKept(select(vec![Vec::new(), vec![("tool_a/data_0".to_owned(), Revision(1))]]), Just(PathBuf::from("elsewhere"))),
         1 SettingsSaved,
         1 JobFailed(error()),
-        1 Evaluated(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(evaluation()))),
-        1 Swept(ticket(), Just(()).prop_map(|()| Arc::new(swept()))),
-        1 ProposedAll(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
-            Box::new(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
-        })),
-        1 Imported(ticket(), select(vec!["tool_a/data_0", "elsewhere"]).prop_map(|name| {
-            Box::new(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
-        })),
-        1 Adapted(Just(Ticket(0)), Just(()).prop_map(|()| Arc::new(adapted())), Just(None)),
-        1 Trained(ticket(), Just(()).prop_map(|()| Arc::new(trained())), Just(()).prop_map(|()| {
-            Box::new(Double::new(false, true).find_bundles(&[]).0.remove(1))
-        })),
     }
 }
 
