@@ -129,7 +129,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             let elsewhere = cx.state.accepted_elsewhere();
             if source == ImprintSource::Predicted && !elsewhere.is_empty() {
                 let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
-                ui.label(caption("accepted of another prediction", cx.p)).on_hover_text(of.join("\n"));
+                ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
             }
         }
     }

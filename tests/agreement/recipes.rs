@@ -132,7 +132,10 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     let (state, mut compared) = (&studio.state, 0);
     let said = |pane| {
         let words = state.equivalent_words(pane, 0.004).unwrap();
-        json(&words[1..].iter().map(String::as_str).collect::<Vec<_>>(), home)
+        // What it writes goes where the test's files are.
+        let out = home.join("predictions").display().to_string();
+        let words = words[1..].iter().map(|word| if word == "predictions" { &out } else { word });
+        json(&words.map(String::as_str).collect::<Vec<_>>(), home)
     };
     let (poses, name) = (said(Pane::Metrics), state.pair_name());
     let made = {

@@ -31,12 +31,15 @@ fn texts() -> Vec<(String, String)> {
     files.into_iter().map(read).collect()
 }
 
-/// The lines of the code fences, without what follows ` # `, and the rest of the text.
+/// The lines of the code fences (not of drawings), without what follows ` # `, and the rest of the text.
 fn fenced(text: &str) -> (Vec<String>, String) {
-    let (mut lines, mut rest, mut inside) = (Vec::new(), String::new(), false);
+    let (mut lines, mut rest, mut inside, mut drawn) = (Vec::new(), String::new(), false, false);
     for line in text.lines() {
-        if line.trim_start().starts_with("```") {
+        if let Some(kind) = line.trim_start().strip_prefix("```") {
             inside = !inside;
+            drawn = kind == "text";
+        } else if inside && drawn {
+            // A drawing in letters has no commands.
         } else if inside {
             let command = line.split(" #").next().unwrap().trim();
             lines.extend((!command.is_empty()).then(|| command.to_owned()));
