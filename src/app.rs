@@ -11,7 +11,7 @@
 //! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger, with its keys: menus, palette and shortcut sheet are made
-//!   from it; [`act`] says what each does now.
+//!   from it; [`act`] turns its rows into commands.
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
 pub mod act;
