@@ -10,6 +10,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
+use touch2touch::app::settings::prefer;
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
@@ -17,7 +18,7 @@ use touch2touch::app::action::Action;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
     AdaptCommand, Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
-    PredictCommand, SettingsCommand, ViewCommand,
+    PredictCommand, ViewCommand,
 };
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, Output};
@@ -314,7 +315,8 @@ fn two_predictions_are_compared_by_one_function() {
     let mut studio = Studio::open(Place::Demo, home.path());
     studio.send(ViewCommand::ShowPanes([Pane::Compare].into_iter().collect()).into());
     let versus = Versus { a: a.parse().unwrap(), b: b.parse().unwrap(), mode: VersusMode::default() };
-    studio.send(SettingsCommand::SetVersus(versus.clone()).into());
+    let shown = versus.clone();
+    studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
     studio.send(LibraryCommand::Select(PairId(40)).into());
     let state = &studio.state;
     let report = json(&["compare", "demo", "--pair", state.pair_name(), "--a", a, "--b", b], home.path());
@@ -517,7 +519,7 @@ fn a_dial_does_the_same_in_both() {
     let folder = lab_folder(home.path());
     let mut studio = Studio::open(Place::Path(folder), home.path());
     let threshold = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
-    studio.send(SettingsCommand::SetMask(MaskSettings { choice: threshold, ..MaskSettings::default() }).into());
+    studio.send(prefer(move |s| s.mask = MaskSettings { choice: threshold, ..MaskSettings::default() }).into());
     studio.send(DialCommand::Over(DialPairs::Spread(2)).into());
     for (dial, range, count) in
         [(Dial::Threshold, [4.0, 6.0], 3), (Dial::Gate, [0.6, 1.4], 3), (Dial::Shift, [0.0; 2], 1)]
@@ -572,10 +574,10 @@ fn every_pane_says_a_command_that_the_program_understands() {
     studio.send(LibraryCommand::Select(PairId(3)).into());
     let mut said = 0;
     for shift in ShiftMode::ALL {
-        studio.send(SettingsCommand::SetShift(shift).into());
+        studio.send(prefer(move |s| s.shift = shift).into());
         for source in MaskSource::iter() {
             let choice = MaskChoice { source, ..MaskChoice::default() };
-            studio.send(SettingsCommand::SetMask(MaskSettings { choice, ..MaskSettings::default() }).into());
+            studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
             for pane in Pane::iter() {
                 let Some(words) = studio.state.equivalent_words(pane, 0.004) else { continue };
                 said += 1;
@@ -587,8 +589,8 @@ fn every_pane_says_a_command_that_the_program_understands() {
     }
     assert!(said > 18 * 12, "{said}");
     // One of them, run: it answers with the number that the studio shows.
-    studio.send(SettingsCommand::SetShift(ShiftMode::ExactInverse).into());
-    studio.send(SettingsCommand::SetMask(MaskSettings::default()).into());
+    studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
+    studio.send(prefer(|s| s.mask = MaskSettings::default()).into());
     studio.predict(3);
     let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
@@ -612,13 +614,13 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     let home = tempfile::tempdir().unwrap();
     let mut studio = Studio::open(Place::Demo, home.path());
     for pane in [Pane::Results, Pane::Table, Pane::Scatter] {
-        studio.send(SettingsCommand::SetShift(ShiftMode::ExactInverse).into());
-        studio.send(SettingsCommand::SetRuntime(EngineChoice::Rten).into());
+        studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
+        studio.send(prefer(|s| s.runtime = EngineChoice::Rten).into());
         assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"), "{pane:?}");
         assert_eq!(said(&studio, pane, "--runtime").as_deref(), Some("rten"), "{pane:?}");
-        studio.send(SettingsCommand::SetShift(ShiftMode::Parts(CorrectionParts::NONE)).into());
+        studio.send(prefer(|s| s.shift = ShiftMode::Parts(CorrectionParts::NONE)).into());
         assert_eq!(said(&studio, pane, "--fit-parts").as_deref(), Some("none"), "{pane:?}");
-        studio.send(SettingsCommand::SetShift(ShiftMode::PaperShift).into());
+        studio.send(prefer(|s| s.shift = ShiftMode::PaperShift).into());
         assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"), "{pane:?}");
     }
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), None);
@@ -644,7 +646,7 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     let mask = MaskSettings { tool: MaskTool::Polygon, wand_m: 0.0004, clean_mm: 1.5, ..MaskSettings::default() };
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
     let mask = MaskSettings { choice, ..mask };
-    studio.send(SettingsCommand::SetMask(mask).into());
+    studio.send(prefer(move |s| s.mask = mask.clone()).into());
     let finger = lab::RIGHT;
     let begin = |at_px, erase| LabelsCommand::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase };
     studio.send(begin([20.0, 20.0], false).into());
@@ -652,7 +654,7 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
         studio.send(LabelsCommand::Corner(corner).into());
     }
     studio.send(LabelsCommand::EndStroke.into());
-    studio.send(SettingsCommand::SetMaskTool(MaskTool::Wand).into());
+    studio.send(prefer(|s| s.mask.tool = MaskTool::Wand).into());
     studio.send(begin([87.0, 70.0], true).into());
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
     studio.send(LabelsCommand::EndStroke.into());

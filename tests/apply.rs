@@ -13,6 +13,7 @@ mod whole;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
+use touch2touch::app::settings::prefer;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{
@@ -65,13 +66,13 @@ fn from_opening_to_the_figures() {
     assert!(bench.state.tasks.running.is_empty());
     assert_eq!(bench.services.generated(), runs);
     // Another range mapping needs no model.
-    bench.send(SettingsCommand::SetShift(ShiftMode::Raw));
+    bench.send(prefer(|s| s.shift = ShiftMode::Raw));
     bench.settle();
     assert!(bench.state.comparison(RIGHT).ready().is_some());
     assert_eq!(bench.services.generated(), runs);
     // A bundle without statistics has no paper shift: the pane says so, the log does not repeat it.
     let errors = bench.errors();
-    bench.send(SettingsCommand::SetShift(ShiftMode::PaperShift));
+    bench.send(prefer(|s| s.shift = ShiftMode::PaperShift));
     bench.settle();
     assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Failed(_)));
     assert_eq!(bench.errors(), errors);
@@ -273,17 +274,13 @@ fn preferences_are_kept_in_range_and_saved() {
     let mut bench = Bench::open();
     bench.settle();
     let saved = bench.services.settings_saved();
-    bench.send(SettingsCommand::SetBrushRadius(f32::NAN));
-    bench.send(SettingsCommand::SetBrushRadius(1e9));
+    bench.send(prefer(|s| s.mask.radius_px = f32::NAN));
+    bench.send(prefer(|s| s.mask.radius_px = 1e9));
     assert_eq!(bench.state.settings.mask.radius_px, 40.0);
-    bench.send(SettingsCommand::SetMaskOpacity(-3.0));
+    bench.send(prefer(|s| s.mask_opacity = -3.0));
     assert_eq!(bench.state.settings.mask_opacity, 0.0);
     let range = bench.state.settings.range;
-    bench.send(SettingsCommand::SetRange(touch2touch::app::settings::ColorRange {
-        min_m: 1.0,
-        max_m: f32::NAN,
-        ..range
-    }));
+    bench.send(prefer(move |s| (s.range.min_m, s.range.max_m) = (1.0, f32::NAN)));
     assert_eq!(bench.state.settings.range, range);
     bench.settle();
     assert_eq!(bench.services.settings_saved(), saved + 1, "changes that wait for the disk become one");
@@ -301,7 +298,7 @@ fn the_color_range_stays_until_it_is_told_otherwise() {
     bench.send(SettingsCommand::RangeFromShown);
     assert_ne!(bench.state.settings.range, range);
     let fitted = bench.state.settings.range;
-    bench.send(SettingsCommand::SetRange(touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
+    bench.send(prefer(move |s| s.range = touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
     bench.send(LibraryCommand::Step(1));
     bench.settle();
     assert_ne!(bench.state.settings.range.max_m, fitted.max_m, "unlocked, it follows the pair");

@@ -16,14 +16,13 @@ use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use touch2touch::app::settings::prefer;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use sha2::Digest as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{
-    Command, ExportCommand, LabelsCommand, LibraryCommand, Opened, Pane, SettingsCommand, ViewCommand,
-};
+use touch2touch::app::command::{Command, ExportCommand, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
 use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::{HandMask, MaskPlace, PairLabels, Review};
@@ -204,8 +203,8 @@ fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
                     erase: rng.random(),
                 });
                 let mut act = vec![
-                    Command::Settings(SettingsCommand::SetMaskTool(tool)),
-                    Command::Settings(SettingsCommand::SetPaint(paint)),
+                    prefer(move |s| s.mask.tool = tool).into(),
+                    prefer(move |s| s.mask.paint = paint).into(),
                     Command::View(ViewCommand::SelectFinger(finger)),
                     begin,
                 ];

@@ -5,9 +5,9 @@ use std::path::Path;
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use serde_json::json;
-use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results::Results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch_core::catalog;
 use touch2touch_core::grid::Grid;
@@ -67,10 +67,10 @@ pub(super) fn strokes() -> std::io::Result<serde_json::Value> {
     for (open, radius_px) in [(None, 4.0), (Some(folder.path()), 4.0), (Some(folder.path()), 40.0)] {
         let mut studio = Studio::on(open.map(Path::to_owned), false, true)?;
         studio.settle();
-        studio.send(SettingsCommand::DismissHint);
-        studio.send(SettingsCommand::SetWorkspace(Workspace::Label));
-        studio.send(SettingsCommand::SetMaskTool(MaskTool::Brush));
-        studio.send(SettingsCommand::SetBrushRadius(radius_px));
+        studio.send(prefer(|s| s.hint_dismissed = true));
+        studio.send(prefer(|s| s.workspace = Workspace::Label));
+        studio.send(prefer(|s| s.mask.tool = MaskTool::Brush));
+        studio.send(prefer(move |s| s.mask.radius_px = radius_px));
         let state = studio.harness.state().state();
         let imprint = state.imprint(ImprintSource::Measured, state.selection.finger);
         let size = imprint.ready().map_or([0, 0], |imprint| imprint.size());
@@ -128,8 +128,8 @@ pub(super) fn paging() -> std::io::Result<serde_json::Value> {
         let state = studio.harness.state().state();
         state.imprint(ImprintSource::Measured, state.selection.finger).ready().is_some()
     };
-    studio.harness.state_mut().push(SettingsCommand::DismissHint);
-    studio.harness.state_mut().push(SettingsCommand::SetWorkspace(Workspace::Label));
+    studio.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
+    studio.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
     let begin = std::time::Instant::now();
     while !felt(&studio) && begin.elapsed().as_secs() < 120 {
         studio.frame(&[]);

@@ -11,9 +11,10 @@ use egui_kittest::kittest::Queryable as _;
 use egui_kittest::{Harness, TestRenderer};
 use serde_json::json;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, SettingsCommand};
+use touch2touch::app::command::Command;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch::gpu::wgpu;
 use touch2touch::ui::{Options, StudioApp};
 
@@ -116,7 +117,7 @@ impl Studio {
     fn new(whole_frames: bool) -> std::io::Result<Self> {
         let mut studio = Self::on(None, whole_frames, true)?;
         studio.settle();
-        studio.send(SettingsCommand::DismissHint);
+        studio.send(prefer(|s| s.hint_dismissed = true));
         Ok(studio)
     }
 
@@ -261,7 +262,7 @@ pub(super) fn frames() -> std::io::Result<serde_json::Value> {
     let some = Workspace::iter().any(|w| std::env::args().any(|word| word == w.name()));
     for workspace in Workspace::iter().filter(|w| !some || std::env::args().any(|word| word == w.name())) {
         for studio in [&mut whole, &mut kept] {
-            studio.send(SettingsCommand::SetWorkspace(workspace));
+            studio.send(prefer(move |s| s.workspace = workspace));
             studio.frame(&[]);
         }
         let view = |studio: &Studio| studio.harness.query_all_by_label("3D view, measured").next().map(|n| n.rect());

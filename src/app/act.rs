@@ -1,5 +1,6 @@
 //! What the rows of actions say: the command that an [`Action`] is now.
 
+use super::settings::prefer;
 use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
@@ -14,8 +15,7 @@ use super::keys::{ImprintSource, Request, ShiftMode};
 use super::labels::state::Review;
 use super::library::state::Place;
 use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
-use super::settings::state::versus::Versus;
-use super::settings::state::{ColorRange, GenerateSettings, MaskSettings, MaskTool, Workspace};
+use super::settings::state::{ColorRange, MaskTool, Workspace};
 use super::state::{Absent, State};
 use super::tasks::state::TaskKind;
 use super::workbench::state::{SceneTool, Section};
@@ -96,23 +96,9 @@ fn clean_up(state: &State, kind: CleanKind) -> Option<Command> {
     editable(state, LabelsCommand::CleanUp(state.settings.mask.clean_up(kind)))
 }
 
-/// Changes something about the mask tools.
-fn mask(state: &State, change: impl FnOnce(&mut MaskSettings)) -> Option<Command> {
-    let mut mask = state.settings.mask.clone();
-    change(&mut mask);
-    does(SettingsCommand::SetMask(mask))
-}
-
 /// Has the tools paint this, or contact again.
-fn paint(state: &State, paint: Paint) -> Option<Command> {
-    does(SettingsCommand::SetPaint(if state.settings.mask.paint == paint { Paint::Contact } else { paint }))
-}
-
-/// Changes something about the look of the 3D views.
-fn scene(state: &State, change: impl FnOnce(&mut SceneLook)) -> Option<Command> {
-    let mut look = state.settings.scene.clone();
-    change(&mut look);
-    does(SettingsCommand::SetScene(look))
+fn paint(paint: Paint) -> SettingsCommand {
+    prefer(move |s| s.mask.paint = if s.mask.paint == paint { Paint::Contact } else { paint })
 }
 
 /// Shows the membrane's surface in place of its points, or the other way round.
@@ -120,7 +106,8 @@ fn swap_membrane(look: &mut SceneLook) {
     let (surface, points) = (look.layer(SceneLayer::Surface), look.layer(SceneLayer::Membrane));
     let points = LayerLook { shown: surface.shown, ..points };
     let surface = LayerLook { shown: !surface.shown, ..surface };
-    *look = look.clone().with(SceneLayer::Surface, surface).with(SceneLayer::Membrane, points);
+    look.set(SceneLayer::Surface, surface);
+    look.set(SceneLayer::Membrane, points);
 }
 
 fn follow(state: &State) -> Option<Command> {
@@ -141,7 +128,7 @@ fn next_shift(state: &State) -> Option<Command> {
         (ShiftMode::ExactInverse, Some(refit)) => ShiftMode::Refit(refit),
         (shift, _) => next_of(&shift),
     };
-    when(next != state.settings.shift, SettingsCommand::SetShift(next))
+    when(next != state.settings.shift, prefer(move |s| s.shift = next))
 }
 
 /// Gives up what is under way: what is in hand first, jobs last.

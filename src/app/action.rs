@@ -112,7 +112,7 @@ macro_rules! actions {
         RunSeeds, Generate, "Several seeds", "Predicts the touch with several seeds, one after the other, or stops; shows where they disagree", [],
             state => when(state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds), SeedsCommand::Run(!state.seeds_running()));
         LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)],
-            state => does(SettingsCommand::SetGenerate(GenerateSettings { seed_locked: !state.settings.generate.seed_locked, ..state.settings.generate.clone() }));
+            _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
             state => when(state.can_adapt() && state.running(TaskKind::Fit).is_none(), AdaptCommand::Start);
         UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
@@ -135,31 +135,31 @@ macro_rules! actions {
             state => when(state.can_generate().is_ok(), PredictCommand::Refit);
 
         Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Brush));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Brush));
         Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Eraser));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Eraser));
         Lasso, Mask, "Lasso", "Adds what a drawn line encloses; the right button removes", [plain(K::L)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Lasso));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Lasso));
         Polygon, Mask, "Polygon", "Adds what lines between clicks enclose; a double click ends it, the right button removes", [plain(K::P)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Polygon));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Polygon));
         RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Rectangle));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Rectangle));
         Wand, Mask, "Wand", "Adds what is connected with the point and about as deep; drag to the right for more", [plain(K::M)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Wand));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Wand));
         PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)],
-            _ => does(SettingsCommand::SetMaskTool(MaskTool::Pan));
+            _ => does(prefer(|s| s.mask.tool = MaskTool::Pan));
         PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the points of the 3D views, or the pointer turns the views again", [alt(K::B)],
             state => toggle(state, SceneTool::Paint);
         PaintLayers, Mask, "Draw through all layers", "Drawings in 3D reach all points under them, also hidden ones, or only the front-most", [alt(K::L)],
-            state => mask(state, |mask| mask.layers = mask.layers.other());
+            _ => does(prefer(|s| s.mask.layers = s.mask.layers.other()));
         PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels that count neither as contact nor as free of it, or paint contact again", [shift(K::B)],
-            state => paint(state, Paint::Ignore);
+            _ => does(paint(Paint::Ignore));
         LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)],
-            _ => does(SettingsCommand::LastMaskTool);
+            _ => does(prefer(|s| s.mask.tool = s.mask.last_tool));
         BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)],
-            state => does(SettingsCommand::SetBrushRadius(state.settings.mask.radius_px / BRUSH_STEP));
+            _ => does(prefer(|s| s.mask.radius_px /= BRUSH_STEP));
         BrushLarger, Mask, "Larger brush", "Makes the brush larger", [plain(K::CloseBracket)],
-            state => does(SettingsCommand::SetBrushRadius(state.settings.mask.radius_px * BRUSH_STEP));
+            _ => does(prefer(|s| s.mask.radius_px *= BRUSH_STEP));
         FillHoles, Mask, "Fill holes", "Fills the holes of the mask", [plain(K::H)],
             state => clean_up(state, CleanKind::FillHoles);
         LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)],
@@ -185,11 +185,11 @@ macro_rules! actions {
         Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
         NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)],
-            state => mask(state, |mask| mask.proposal = next_of(&mask.proposal));
+            _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
         ProposeAll, Mask, "Propose for all listed", "Makes what the source proposes the mask of every pair in the list that is not marked done, flagged or skipped; hand work stays, and each pair can be undone", [],
             state => when(state.can_propose_all(), LabelsCommand::ProposeAll);
         LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)],
-            state => paint(state, Paint::LetThrough).filter(|_| state.settings.mask.paint == Paint::LetThrough || state.proposes());
+            state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || state.proposes());
         TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [],
             state => editable(state, LabelsCommand::TakeOver);
         ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
@@ -205,17 +205,17 @@ macro_rules! actions {
         UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
             state => when(state.trained().is_some() && !state.uses_trained(), TrainCommand::Use);
         MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)],
-            state => does(SettingsCommand::SetMaskVisible(!state.settings.mask_visible));
+            _ => does(prefer(|s| s.mask_visible ^= true));
         MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)],
-            state => does(SettingsCommand::SetMaskOutline(!state.settings.mask_outline));
+            _ => does(prefer(|s| s.mask_outline ^= true));
         MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)],
-            state => does(SettingsCommand::SetMaskOpacity(state.settings.mask_opacity - OPACITY_STEP));
+            _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
         MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)],
-            state => does(SettingsCommand::SetMaskOpacity(state.settings.mask_opacity + OPACITY_STEP));
+            _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
         Influence, Mask, "What the angle hangs on", "Colors the pixels by how much the registered angle would change without them, or with those beside the mask", [shift(K::I)],
             state => of_pair(state, ViewCommand::ShowInfluence(!state.selection.influence));
         Ghosts, Mask, "As it was before", "Keeps mask, points and pose as they were before the last change visible until the next one, or not", [shift(K::H)],
-            state => does(SettingsCommand::SetGhosts(!state.settings.ghosts));
+            _ => does(prefer(|s| s.ghosts ^= true));
         Lens, Mask, "Lens", "Magnifies the imprint under the pointer eight times, or not", [shift(K::M)],
             state => does(ViewCommand::ShowLens(!state.selection.lens));
         DoneAndNext, Mask, "Done and next", "Marks the pair as done and shows the next unfinished one", [ctrl(K::Enter)],
@@ -276,14 +276,14 @@ macro_rules! actions {
         Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [],
             state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [],
-            state => does(SettingsCommand::SetPoseEngine(next_of(&state.settings.pose_engine.by).into()));
+            _ => does(prefer(|s| s.pose_engine = next_of(&s.pose_engine.by).into()));
 
         LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)],
-            state => does(SettingsCommand::SetRange(ColorRange { locked: !state.settings.range.locked, ..state.settings.range }));
+            _ => does(prefer(|s| s.range.locked ^= true));
         RangeOnce, View, "Fit the color range once", "Sets the color range from what is shown", [plain(K::C)],
             state => of_pair(state, SettingsCommand::RangeFromShown);
         ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)],
-            _ => does(SettingsCommand::SetRange(ColorRange::default()));
+            _ => does(prefer(|s| s.range = ColorRange::default()));
         Fit, View, "Fit", "Fits images and 3D views to their panes", [plain(K::Num0)],
             _ => ui(UiRequest::Fit);
         CameraLeft, View, "View from the left", "Looks along the closing axis from the left finger", [ctrl(K::Num1)],
@@ -301,37 +301,37 @@ macro_rules! actions {
         BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
         CompareMode, View, "Next comparison", "Goes through side by side, wipe, difference and 3D in the Compare pane", [shift(K::F)],
-            state => does(SettingsCommand::SetVersus(Versus { mode: next_of(&state.versus().mode), ..state.versus() }));
+            _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
         SwapCompared, View, "Swap A and B", "Puts B in the place of A in the Compare pane, and A in that of B", [shift(K::R)],
-            state => does(SettingsCommand::SetVersus(state.versus().swapped()));
+            _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));
         Section, View, "Cut open", "Cuts the 3D views open with a plane, or no longer", [plain(K::X)],
             state => does(WorkbenchCommand::SetSection(state.workbench.section.is_none().then(Section::default)));
         WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)],
-            state => scene(state, |look| look.only_window = !look.only_window);
+            _ => does(prefer(|s| s.scene.only_window ^= true));
         MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [],
-            state => scene(state, swap_membrane);
+            _ => does(prefer(|s| swap_membrane(&mut s.scene)));
         EyeDome, View, "Depth shading", "Darkens in 3D what lies behind its neighbors (eye-dome lighting), or not", [],
-            state => scene(state, |look| look.eye_dome = !look.eye_dome);
+            _ => does(prefer(|s| s.scene.eye_dome ^= true));
         Parallel, View, "Parallel projection", "Looks at 3D along parallel lines, or in perspective", [plain(K::I)],
-            state => scene(state, |look| look.orthographic = !look.orthographic);
+            _ => does(prefer(|s| s.scene.orthographic ^= true));
         CopyCamera, View, "Copy the camera", "Copies where the 3D view under the pointer looks from; Ctrl+V over a 3D view takes it over", [],
             _ => ui(UiRequest::CopyCamera);
         LinkCameras, View, "Link cameras", "Moves both 3D views together", [],
-            state => does(SettingsCommand::SetCamerasLinked(!state.settings.cameras_linked));
+            _ => does(prefer(|s| s.cameras_linked ^= true));
         Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [],
-            state => does(SettingsCommand::SetFootprintVisible(!state.settings.footprint_visible));
+            _ => does(prefer(|s| s.footprint_visible ^= true));
         SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [],
-            state => does(SettingsCommand::SetTheme(next_of(&state.settings.theme)));
+            _ => does(prefer(|s| s.theme = next_of(&s.theme)));
         DepthChain, View, "Depth chain", "Shows everything between the decoder and the meters, stage by stage", [],
             _ => ui(UiRequest::ShowPane(Pane::Ledger));
         InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [],
-            _ => does(SettingsCommand::SetWorkspace(Workspace::Inspect));
+            _ => does(prefer(|s| s.workspace = Workspace::Inspect));
         AlignWorkspace, View, "Align", "The cloud on the CAD model", [],
-            _ => does(SettingsCommand::SetWorkspace(Workspace::Align));
+            _ => does(prefer(|s| s.workspace = Workspace::Align));
         LabelWorkspace, View, "Label", "Correcting masks", [],
-            _ => does(SettingsCommand::SetWorkspace(Workspace::Label));
+            _ => does(prefer(|s| s.workspace = Workspace::Label));
         EvaluateWorkspace, View, "Evaluate", "The metrics", [],
-            _ => does(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+            _ => does(prefer(|s| s.workspace = Workspace::Evaluate));
         ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [],
             _ => ui(UiRequest::ResetWorkspace);
         MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)],

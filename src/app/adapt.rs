@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
 use super::services::DataSource;
-use super::settings::{self, SettingsCommand, state::GenerateSettings};
+use super::settings::{self, prefer};
 use super::state::State;
 use super::tasks;
 use super::tasks::state::{Level, TaskKind};
@@ -58,8 +58,7 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
         }
         AdaptCommand::Use => {
             let Some(name) = state.fitted().map(|bundle| bundle.name.clone()) else { return };
-            let generate = GenerateSettings { bundle: Some(name), ..state.settings.generate.clone() };
-            settings::step(state, SettingsCommand::SetGenerate(generate), effects);
+            settings::step(state, prefer(move |s| s.generate.bundle = Some(name.clone())), effects);
         }
     }
 }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
 use super::services::DataSource;
-use super::settings::{self, MaskSettings, SettingsCommand};
+use super::settings::{self, prefer};
 use super::state::State;
 use super::tasks;
 use super::tasks::state::{Level, TaskKind};
@@ -57,11 +57,9 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
             let before = state.dial_recipe();
             let Ok(Recipe { mask, registration, shift, .. }) = setting.put(&before) else { return };
             let change = match setting {
-                Setting::Threshold(_) | Setting::Probability(_) => {
-                    SettingsCommand::SetMask(MaskSettings { choice: mask, ..state.settings.mask.clone() })
-                }
-                Setting::Rejection(_) => SettingsCommand::SetPoseEngine(registration),
-                Setting::Shift(_) => SettingsCommand::SetShift(shift),
+                Setting::Threshold(_) | Setting::Probability(_) => prefer(move |s| s.mask.choice = mask),
+                Setting::Rejection(_) => prefer(move |s| s.pose_engine = registration),
+                Setting::Shift(_) => prefer(move |s| s.shift = shift),
             };
             settings::step(state, change, effects);
             if state.dial_recipe() != before {

@@ -298,14 +298,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let (pair, finger, place) = (stroke.pair, stroke.place.pad, stroke.place);
     let edit = Edit::Mask { pair: pair.clone(), place, mask: stroke.before.as_ref().map(KeptMask::of) };
-    let name = match (stroke.drawing.tool, stroke.drawing.paint) {
-        (DrawTool::Brush { .. }, Paint::Free) => "eraser stroke",
-        (DrawTool::Brush { .. }, _) => "brush stroke",
-        (DrawTool::Lasso, _) => "lasso",
-        (DrawTool::Polygon, _) => "polygon",
-        (DrawTool::Rectangle, _) => "rectangle",
-        (DrawTool::Wand { .. }, _) => "wand",
-    };
+    let name = stroke.drawing.name();
     let name = if stroke.drawing.sight.is_some() { format!("{name} in 3D") } else { name.to_owned() };
     let how = serde_json::to_value(&stroke.drawing).ok();
     record(state, &pair, Deed { how, ..Deed::named(name.clone()) }, edit, effects);

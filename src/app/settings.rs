@@ -6,146 +6,69 @@ pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::versus::{Versus, VersusMode};
 pub use state::{
     BRUSH_RADIUS_PX, CLEAN_MM, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice,
-    MaskSettings, MaskSource, MaskTool, ProposalSource, SETTINGS_VERSION, STEPS, Settings, Theme, Workspace,
+    MaskSettings, MaskSource, MaskTool, ProposalSource, SETTINGS_VERSION, STEPS, Settings, Theme, ToolRow, Workspace,
 };
 
-use super::action::{Action, Shortcut};
+use std::fmt;
+use std::sync::Arc;
+
+use serde_json::Value;
+
 use super::effect::Effect;
-use super::keys::{ImprintSource, RegistrationChoice, ShiftMode};
+use super::keys::ImprintSource;
 use super::state::State;
-use touch2touch_core::label::Paint;
-use touch2touch_work::infer::engine::EngineChoice;
+use super::view::{self, ViewCommand};
 
 /// What can happen to the preferences.
 #[derive(Clone, Debug)]
 pub enum SettingsCommand {
-    /// Light or dark.
-    SetTheme(Theme),
-    /// Scale of the window.
-    SetUiZoom(f32),
-    /// The color range.
-    SetRange(ColorRange),
+    /// Takes over what a person changed ([`prefer`]).
+    Change(Change),
     /// Sets the color range once from what is shown.
     RangeFromShown,
-    /// The color map.
-    SetColorMap(ColorMap),
-    /// How predictions become meters.
-    SetShift(ShiftMode),
-    /// The generator.
-    SetGenerate(GenerateSettings),
-    /// The mask tools.
-    SetMask(MaskSettings),
-    /// The tool in hand.
-    SetMaskTool(MaskTool),
-    /// What the tools make of pixels.
-    SetPaint(Paint),
-    /// The tool before.
-    LastMaskTool,
-    /// The automatic source.
-    SetMaskSource(MaskSource),
-    /// Brush radius, pixels.
-    SetBrushRadius(f32),
-    /// Whether the mask is drawn.
-    SetMaskVisible(bool),
-    /// Whether only its outline is.
-    SetMaskOutline(bool),
-    /// How strongly it covers, 0..1.
-    SetMaskOpacity(f32),
-    /// Whether the GelSlim's window is drawn.
-    SetFootprintVisible(bool),
-    /// Whether what the last change of a mask started from is drawn.
-    SetGhosts(bool),
-    /// The registration.
-    SetPoseEngine(RegistrationChoice),
-    /// The model runtime.
-    SetRuntime(EngineChoice),
-    /// Who labels; empty: whom the system says.
-    SetPerson(String),
-    /// How many of the pairs that one marked done come back, percent.
-    SetRepeats(f32),
-    /// What kept predictions may take on the disk, MiB.
-    SetCacheBudget(u32),
-    /// Whether the 3D views move together.
-    SetCamerasLinked(bool),
-    /// How the 3D views look.
-    SetScene(SceneLook),
-    /// What is compared with what, in the workspace in front.
-    SetVersus(Versus),
-    /// The workspace in front.
-    SetWorkspace(Workspace),
     /// The arrangement of the panes of a workspace, in the window's format.
     SetLayout(Workspace, String),
     /// What is on screen as the window is closed.
     Remember(Last),
-    /// Another shortcut of an action, in the place of its `place`th (0 is the main one, behind the last one more) or none
-    /// there. It is taken from the action that has it.
-    BindKey {
-        /// Whose.
-        action: Action,
-        /// Which of its shortcuts.
-        place: usize,
-        /// What is pressed for it.
-        shortcut: Option<Shortcut>,
-    },
-    /// The default shortcuts back, of one action or of all.
-    ResetKeys(Option<Action>),
-    /// The hint of the first start is not shown again.
-    DismissHint,
     /// All preferences back to their defaults; recent places stay.
     ResetSettings,
+}
+
+/// A change to the preferences. A function rather than the new preferences whole, so that two in one frame both count.
+#[derive(Clone)]
+pub struct Change(Arc<dyn Fn(&mut Settings) + Send + Sync>);
+
+impl fmt::Debug for Change {
+    /// The fields as they are once defaults were changed.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut changed = Settings::default();
+        (self.0)(&mut changed);
+        let [changed, default] = [&changed, &Settings::default()].map(|settings| serde_json::to_value(settings).ok());
+        let (Some(Value::Object(changed)), Some(Value::Object(default))) = (changed, default) else {
+            return f.write_str("Change");
+        };
+        f.debug_map().entries(changed.iter().filter(|(name, value)| default.get(*name) != Some(value))).finish()
+    }
+}
+
+/// The command that changes preferences; numbers out of range are brought back, an impossible color range is left out.
+pub fn prefer(change: impl Fn(&mut Settings) + Send + Sync + 'static) -> SettingsCommand {
+    SettingsCommand::Change(Change(Arc::new(change)))
 }
 
 pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Vec<Effect>) {
     let before = state.settings.clone();
     let settings = &mut state.settings;
     match command {
-        SettingsCommand::SetTheme(theme) => settings.theme = theme,
-        SettingsCommand::SetUiZoom(zoom) => settings.ui_zoom = zoom,
-        SettingsCommand::SetRange(range) => {
-            if range.is_valid() {
-                settings.range = range;
-            }
-            follow_range(state);
+        SettingsCommand::Change(change) => {
+            (change.0)(settings);
+            follow(state, &before, effects);
         }
         SettingsCommand::RangeFromShown => range_from_shown(state),
-        SettingsCommand::SetColorMap(map) => settings.color_map = map,
-        SettingsCommand::SetShift(shift) => settings.shift = shift,
-        SettingsCommand::SetGenerate(generate) => {
-            // Whoever changes a number of a preset has left it.
-            let before = &settings.generate;
-            let left = generate.preset == before.preset && !generate.same_numbers(before);
-            let preset = generate.preset.filter(|_| !left);
-            settings.generate = GenerateSettings { preset, ..generate };
-        }
-        SettingsCommand::SetMask(mask) => settings.mask = mask,
-        SettingsCommand::SetMaskTool(tool) => set_tool(settings, tool),
-        SettingsCommand::SetPaint(paint) => settings.mask.paint = paint,
-        SettingsCommand::LastMaskTool => set_tool(settings, settings.mask.last_tool),
-        SettingsCommand::SetMaskSource(source) => settings.mask.choice.source = source,
-        SettingsCommand::SetBrushRadius(radius_px) => settings.mask.radius_px = radius_px,
-        SettingsCommand::SetMaskVisible(visible) => settings.mask_visible = visible,
-        SettingsCommand::SetMaskOutline(outline) => settings.mask_outline = outline,
-        SettingsCommand::SetMaskOpacity(opacity) => settings.mask_opacity = opacity,
-        SettingsCommand::SetFootprintVisible(visible) => settings.footprint_visible = visible,
-        SettingsCommand::SetGhosts(shown) => settings.ghosts = shown,
-        SettingsCommand::SetPoseEngine(engine) => settings.pose_engine = engine,
-        SettingsCommand::SetRuntime(runtime) => settings.runtime = runtime,
-        SettingsCommand::SetPerson(person) => settings.person = person,
-        SettingsCommand::SetRepeats(percent) => settings.repeats_percent = percent,
-        SettingsCommand::SetCacheBudget(mib) => settings.cache_mib = mib,
-        SettingsCommand::SetCamerasLinked(linked) => settings.cameras_linked = linked,
-        SettingsCommand::SetScene(look) => settings.scene = look.validated(),
-        SettingsCommand::SetVersus(versus) => {
-            settings.versus.insert(settings.workspace, versus);
-        }
-        SettingsCommand::SetWorkspace(workspace) => settings.workspace = workspace,
         SettingsCommand::SetLayout(workspace, layout) => {
             settings.layouts.insert(workspace.name().to_owned(), layout);
         }
         SettingsCommand::Remember(last) => settings.last = last,
-        SettingsCommand::BindKey { action, place, shortcut } => settings.keys.bind(action, place, shortcut),
-        SettingsCommand::ResetKeys(action) => settings.keys.reset(action),
-        SettingsCommand::DismissHint => settings.hint_dismissed = true,
         SettingsCommand::ResetSettings => {
             let recent = std::mem::take(&mut settings.recent);
             *settings = Settings { recent, hint_dismissed: true, ..Settings::default() };
@@ -158,10 +81,26 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
     }
 }
 
-fn set_tool(settings: &mut Settings, tool: MaskTool) {
-    if settings.mask.tool != tool {
-        settings.mask.last_tool = settings.mask.tool;
-        settings.mask.tool = tool;
+/// Brings about what follows from a change.
+fn follow(state: &mut State, before: &Settings, effects: &mut Vec<Effect>) {
+    let settings = &mut state.settings;
+    // Whoever changes a number of a preset has left it.
+    let generate = &mut settings.generate;
+    if generate.preset == before.generate.preset && !generate.same_numbers(&before.generate) {
+        generate.preset = None;
+    }
+    if settings.mask.tool != before.mask.tool {
+        settings.mask.last_tool = before.mask.tool;
+    }
+    if !settings.range.is_valid() {
+        settings.range = before.range;
+    }
+    let workspace = settings.workspace;
+    if settings.range != before.range {
+        follow_range(state);
+    }
+    if workspace != before.workspace {
+        view::step(state, ViewCommand::ShowBothFingers(workspace == Workspace::Label), effects);
     }
 }
 

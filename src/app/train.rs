@@ -10,7 +10,7 @@ use std::sync::Arc;
 use super::effect::{Access, Effect, Errand};
 use super::labels::state::PairLabels;
 use super::services::DataSource;
-use super::settings::{self, SettingsCommand, state::MaskSettings};
+use super::settings::{self, prefer};
 use super::state::State;
 use super::tasks;
 use super::tasks::state::{Level, TaskKind};
@@ -47,8 +47,8 @@ pub(super) fn step(state: &mut State, command: TrainCommand, effects: &mut Vec<E
 /// Makes automatic masks with the trained model.
 fn take_up(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(name) = state.trained().map(|bundle| bundle.name.clone()) else { return };
-    let mask = MaskSettings { bundle: Some(name.clone()), ..state.settings.mask.clone() };
-    settings::step(state, SettingsCommand::SetMask(mask), effects);
+    let bundle = name.clone();
+    settings::step(state, prefer(move |s| s.mask.bundle = Some(bundle.clone())), effects);
     state.log.info(format!("Automatic masks are made by {name} from now on"));
 }
 

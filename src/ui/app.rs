@@ -1,5 +1,6 @@
 //! The window: one frame from input to commands.
 
+use crate::app::settings::prefer;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -204,29 +205,23 @@ impl StudioApp {
             }
             _ => true,
         });
-        if commands.iter().any(|c| {
-            matches!(
-                c,
-                Command::Labels(LabelsCommand::Undo)
-                    | Command::Labels(LabelsCommand::Redo)
-                    | Command::Settings(SettingsCommand::SetWorkspace(_))
-            )
-        }) {
+        if commands
+            .iter()
+            .any(|c| matches!(c, Command::Labels(LabelsCommand::Undo) | Command::Labels(LabelsCommand::Redo)))
+        {
             // The pen is not to be followed into another state.
             self.lift_pen();
         }
         if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
         }
-        let switched = commands.iter().find_map(|c| match c {
-            Command::Settings(SettingsCommand::SetWorkspace(w)) if *w != self.state.settings.workspace => Some(*w),
-            _ => None,
-        });
-        if let Some(workspace) = switched {
-            self.panes.memories.browser.scrolled_to = None;
-            commands.push(Command::View(ViewCommand::ShowBothFingers(workspace == Workspace::Label)));
-        }
+        let before = self.state.settings.workspace;
         requests.extend(self.runtime.tick(&mut self.state, commands));
+        if self.state.settings.workspace != before {
+            // The pen is not to be followed into another workspace.
+            self.lift_pen();
+            self.panes.memories.browser.scrolled_to = None;
+        }
         if self.inline {
             let more = crate::app::jobs::Lane::iter().any(|lane| self.runtime.run_one(lane));
             if more {
@@ -256,7 +251,13 @@ impl StudioApp {
             ctx.set_zoom_factor(settings.ui_zoom);
         } else if (ctx.zoom_factor() - self.applied_zoom).abs() > 1e-4 {
             self.applied_zoom = ctx.zoom_factor();
-            self.inbox.push(Command::Settings(SettingsCommand::SetUiZoom(self.applied_zoom)));
+            self.inbox.push(
+                prefer({
+                    let zoom = self.applied_zoom;
+                    move |s| s.ui_zoom = zoom
+                })
+                .into(),
+            );
         }
     }
 
@@ -391,7 +392,7 @@ impl StudioApp {
         let all = std::iter::once(own).chain(Workspace::iter());
         let Some(workspace) = all.into_iter().find(|w| pane.dock(*w).is_some()) else { return };
         if workspace != own {
-            self.inbox.push(Command::Settings(SettingsCommand::SetWorkspace(workspace)));
+            self.inbox.push(prefer(move |s| s.workspace = workspace).into());
         }
         self.panes.maximized = None;
         if let Some(tree) = self.trees.get_mut(&workspace)

@@ -1,5 +1,6 @@
 //! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
@@ -9,7 +10,7 @@ use super::dialogs::Purpose;
 use super::theme::{SMALL, caption, medium};
 use super::widget::progress;
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, Pane, SettingsCommand, TasksCommand, ViewCommand};
+use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::{Theme, Workspace};
 
@@ -136,7 +137,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
         Workspace::Evaluate => Action::EvaluateWorkspace,
     };
     if response.on_hover_text(tip.tooltip()).clicked() {
-        cx.push(SettingsCommand::SetWorkspace(workspace));
+        cx.push(prefer(move |s| s.workspace = workspace));
     }
 }
 
@@ -281,7 +282,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                 });
                 ui.add_space(8.0);
                 if ui.button("Got it").on_hover_text("Do not show this again").clicked() {
-                    cx.push(SettingsCommand::DismissHint);
+                    cx.push(prefer(|s| s.hint_dismissed = true));
                 }
             });
         });

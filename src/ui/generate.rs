@@ -1,12 +1,13 @@
 //! The generator: bundle, steps, seed, range mapping, run, and the results so far.
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
 use super::theme::{SMALL, caption, section, value};
 use crate::app::action::Action;
-use crate::app::command::{Pane, PredictCommand, SettingsCommand};
+use crate::app::command::{Pane, PredictCommand};
 use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use touch2touch_core::diffusion::GUIDANCE;
@@ -158,7 +159,7 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
         if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
             new.preset = None;
         }
-        cx.push(SettingsCommand::SetGenerate(new));
+        cx.push(prefer(move |s| s.generate = new.clone()));
     }
 }
 
@@ -240,7 +241,7 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
         for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
             let radio = ui.radio(mode == current, mode.label());
             if radio.on_hover_text(shift_tooltip(mode)).clicked() {
-                cx.push(SettingsCommand::SetShift(mode));
+                cx.push(prefer(move |s| s.shift = mode));
             }
         }
         if cx.state.settings.refit.is_none() {
@@ -291,16 +292,19 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
             let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
             if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
-                cx.push(SettingsCommand::SetGenerate(GenerateSettings {
-                    preset: None,
-                    steps: recipe.steps,
-                    seed: recipe.seed,
-                    seed_locked: true,
-                    sampler: recipe.sampler,
-                    eta: recipe.eta.get(),
-                    spacing: recipe.spacing,
-                    guidance: recipe.guidance.get(),
-                    ..cx.state.settings.generate.clone()
+                let recipe = recipe.clone();
+                cx.push(prefer(move |s| {
+                    s.generate = GenerateSettings {
+                        preset: None,
+                        steps: recipe.steps,
+                        seed: recipe.seed,
+                        seed_locked: true,
+                        sampler: recipe.sampler,
+                        eta: recipe.eta.get(),
+                        spacing: recipe.spacing,
+                        guidance: recipe.guidance.get(),
+                        ..s.generate.clone()
+                    }
                 }));
             }
         });

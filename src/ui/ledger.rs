@@ -3,6 +3,7 @@
 
 mod plots;
 
+use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Align2, FontId, Layout, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
     pos2, vec2,
@@ -14,7 +15,7 @@ use super::images;
 use super::theme::{SMALL, caption, medium, pane_frame, section};
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, SettingsCommand, ViewCommand};
+use crate::app::command::{Pane, ViewCommand};
 use crate::app::keys::{ImprintSource, ShiftMode, shift_tooltip};
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
@@ -108,7 +109,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
             for mode in ShiftMode::iter().chain(own) {
                 let label = ui.selectable_label(mode == current, mode.label());
                 if label.on_hover_text(shift_tooltip(mode)).clicked() {
-                    cx.out.push(Command::Settings(SettingsCommand::SetShift(mode)));
+                    cx.out.push(prefer(move |s| s.shift = mode).into());
                 }
             }
         });
@@ -141,7 +142,7 @@ fn fit_parts(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult) {
             if ui.checkbox(&mut on, RichText::new(part.label()).size(SMALL)).on_hover_text(part.tip()).changed() {
                 let next = parts.with(part, on);
                 let mode = if next == CorrectionParts::ALL { ShiftMode::ExactInverse } else { ShiftMode::Parts(next) };
-                cx.out.push(Command::Settings(SettingsCommand::SetShift(mode)));
+                cx.out.push(prefer(move |s| s.shift = mode).into());
             }
         }
     });
@@ -356,6 +357,6 @@ fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
         ));
     }
     if let Some(mode) = chosen {
-        cx.push(SettingsCommand::SetShift(mode));
+        cx.push(prefer(move |s| s.shift = mode));
     }
 }

@@ -3,6 +3,7 @@
 mod proposal;
 mod stats;
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, Align, Layout, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
@@ -10,13 +11,13 @@ use super::browser::review_color;
 use super::cx::Cx;
 use super::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
 use crate::app::action::Action;
-use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand, ViewCommand};
+use crate::app::command::{LabelsCommand, Pane, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
-use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool};
+use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool, ToolRow};
 use crate::app::state::Lookup;
 use crate::app::workbench::SceneTool;
-use touch2touch_core::label::{Layers, Paint};
+use touch2touch_core::label::{DrawTool, Layers, Paint};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::labels::{MAX_NOTE, system_person};
@@ -62,39 +63,25 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-        for (tool, action) in [
-            (MaskTool::Brush, Action::Brush),
-            (MaskTool::Eraser, Action::Eraser),
-            (MaskTool::Lasso, Action::Lasso),
-            (MaskTool::Polygon, Action::Polygon),
-            (MaskTool::Rectangle, Action::RectangleTool),
-            (MaskTool::Wand, Action::Wand),
-            (MaskTool::Pan, Action::PanTool),
-        ] {
-            let on = cx.state.settings.mask.tool == tool;
-            let button = ui.add(egui::Button::selectable(on, tool.name()).min_size(vec2(56.0, 24.0)));
-            if button.on_hover_text(cx.keys().help(action)).clicked() {
-                cx.push(SettingsCommand::SetMaskTool(tool));
+        for tool in MaskTool::iter() {
+            let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
+            let button = egui::Button::selectable(mask.tool == tool, row.name).min_size(vec2(56.0, 24.0));
+            if ui.add(button).on_hover_text(cx.keys().help(row.action)).clicked() {
+                cx.act(row.action);
             }
         }
     });
-    match cx.state.settings.mask.tool {
-        MaskTool::Brush | MaskTool::Eraser => radius(cx, ui),
-        MaskTool::Wand => wand(cx, ui),
-        MaskTool::Lasso => hint(cx, ui, "Around it in one line"),
-        MaskTool::Polygon => hint(cx, ui, "Corner by corner; the first closes it"),
-        MaskTool::Rectangle => hint(cx, ui, "From corner to corner"),
-        MaskTool::Pan => hint(cx, ui, "Moves the picture, draws nothing"),
+    let mask = &cx.state.settings.mask;
+    match mask.tool.row(mask) {
+        ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
+        ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
+        // As high as a number: what lies below stays where it is from tool to tool.
+        row => _ = ui.horizontal(|ui| ui.label(caption(row.hint, cx.p))),
     }
     paints(cx, ui);
     in_3d(cx, ui);
     gate(cx, ui);
     overlay(cx, ui);
-}
-
-/// What a tool without a number does, as high as a number: what lies below stays where it is from tool to tool.
-fn hint(cx: &Cx<'_>, ui: &mut Ui, text: &str) {
-    ui.horizontal(|ui| ui.label(caption(text, cx.p)));
 }
 
 /// Drawing on the points of the 3D views, and what that reaches.
@@ -131,7 +118,7 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
             let text = RichText::new(text).color(if now == paint { color } else { cx.p.text });
             if ui.add(egui::Button::selectable(now == paint, text)).on_hover_text(tip).clicked() {
-                cx.push(SettingsCommand::SetPaint(paint));
+                cx.push(prefer(move |s| s.mask.paint = paint));
             }
         }
     });
@@ -147,7 +134,7 @@ fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
             radius = MaskSettings::default().radius_px;
         }
         if response.changed() || response.double_clicked() {
-            cx.push(SettingsCommand::SetBrushRadius(radius));
+            cx.push(prefer(move |s| s.mask.radius_px = radius));
         }
         let mm = f64::from(radius) / cx.state.rig().depth_px_per_mm();
         ui.label(caption(format!("{mm:.2} mm"), cx.p));
@@ -174,7 +161,7 @@ fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
                halves it";
     if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {
-        cx.push(SettingsCommand::SetMask(new));
+        cx.push(prefer(move |s| s.mask = new.clone()));
     }
 }
 
@@ -208,7 +195,7 @@ fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
         slider_mm(ui, "Gate around CAD", cad_m, 0.0..=5.0, "The greatest distance to the CAD model");
     }
     if new.gate != cx.state.settings.mask.gate {
-        cx.push(SettingsCommand::SetMask(new));
+        cx.push(prefer(move |s| s.mask = new.clone()));
     }
 }
 
@@ -223,7 +210,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         for source in MaskSource::iter() {
             let option = ui.selectable_label(source == settings.choice.source, source.name());
             if option.on_hover_text(source.tooltip()).clicked() {
-                cx.out.push(Command::Settings(SettingsCommand::SetMaskSource(source)));
+                cx.out.push(prefer(move |s| s.mask.choice.source = source).into());
             }
         }
     });
@@ -268,7 +255,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
     }
     if new != *settings {
-        cx.push(SettingsCommand::SetMask(new));
+        cx.push(prefer(move |s| s.mask = new.clone()));
     }
     for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
         let several = cx.state.imprint(ImprintSource::Predicted, finger).ready().is_some();
@@ -427,7 +414,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         let tip =
             "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
         if slider.on_hover_text(tip).changed() {
-            cx.push(SettingsCommand::SetMask(new));
+            cx.push(prefer(move |s| s.mask = new.clone()));
         }
     });
 }
@@ -513,7 +500,7 @@ fn opacity(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response =
             ui.add(egui::Slider::new(&mut opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Mask opacity");
         if response.changed() {
-            cx.push(SettingsCommand::SetMaskOpacity(opacity));
+            cx.push(prefer(move |s| s.mask_opacity = opacity));
         }
         response.on_hover_text("How strongly the mask covers the image (- and =). Hold X to hide it");
     });

@@ -1,5 +1,6 @@
 //! The figures of the selected pair: image metrics, the ledger of the prediction, the pose.
 
+use crate::app::settings::prefer;
 use eframe::egui::{Align, Color32, Layout, RichText, ScrollArea, Sense, Ui};
 
 use super::cx::{Cx, side_color};
@@ -9,7 +10,7 @@ use super::theme::{SMALL, caption, grade_color, section, value};
 use super::widget::line::Line;
 use super::widget::texture::Memo;
 use crate::app::action::Action;
-use crate::app::command::{Command, LabelsCommand, Pane, SettingsCommand};
+use crate::app::command::{LabelsCommand, Pane};
 use crate::app::keys::{ImprintSource, Registration};
 use crate::app::state::{Absent, Lookup};
 use strum::IntoEnumIterator as _;
@@ -66,7 +67,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             let response = combo.show_ui(ui, |ui| {
                 for e in Registration::iter() {
                     if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                        cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e.into())));
+                        cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
                     }
                 }
             });

@@ -1,5 +1,6 @@
 //! The pen: what the pointer draws on masks, on an image or on the points of a 3D view, and what shows of it on the way.
 
+use crate::app::settings::prefer;
 use eframe::egui::{
     Align2, Color32, CursorIcon, Event, FontId, Modifiers, Painter, PointerButton, Pos2, Response, Stroke, Ui, Vec2,
     vec2,
@@ -9,7 +10,7 @@ use super::cx::Cx;
 use super::theme::{IGNORED, PROPOSED};
 use super::widget::brush_cursor;
 use super::widget::image_canvas::CanvasMap;
-use crate::app::command::{LabelsCommand, SettingsCommand, ViewCommand};
+use crate::app::command::{LabelsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Stroke as Drawn;
 use crate::app::settings::MaskTool;
@@ -106,10 +107,9 @@ pub(super) fn follow<K: Copy + PartialEq>(
             let scroll = if i.modifiers.shift { i.smooth_scroll_delta() } else { vec2(0.0, 0.0) };
             (scroll, if i.modifiers.alt { i.pointer.delta().x } else { 0.0 })
         });
-        let radius = cx.state.settings.mask.radius_px;
         let amount = (scroll.x + scroll.y) * 0.005 + alt * 0.01;
         if amount != 0.0 {
-            cx.push(SettingsCommand::SetBrushRadius(radius * amount.exp()));
+            cx.push(prefer(move |s| s.mask.radius_px *= amount.exp()));
         }
         let ctrl = ui.input(|i| i.modifiers.ctrl || i.pointer.secondary_down());
         let erase = (tool == MaskTool::Eraser) != ctrl;

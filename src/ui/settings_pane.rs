@@ -1,12 +1,13 @@
 //! Preferences.
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, ScrollArea, Ui};
 use strum::IntoEnumIterator as _;
 
 use super::cx::Cx;
 use super::theme::{caption, section};
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, SettingsCommand};
+use crate::app::command::Pane;
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::system_person;
@@ -34,7 +35,7 @@ pub(super) fn person(cx: &mut Cx<'_>, ui: &mut Ui) {
         let edit = egui::TextEdit::singleline(&mut name).hint_text(hint).desired_width(f32::INFINITY);
         let edit = ui.add(edit).accessible_name("Your name");
         if edit.on_hover_text("Stands with every mask and in the journal of every pair").changed() {
-            cx.push(SettingsCommand::SetPerson(name));
+            cx.push(prefer(move |s| s.person = name.clone()));
         }
     });
 }
@@ -49,7 +50,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
             if ui.radio(settings.theme == theme, name).on_hover_text("Colors of the window").clicked() {
-                cx.out.push(Command::Settings(SettingsCommand::SetTheme(theme)));
+                cx.out.push(prefer(move |s| s.theme = theme).into());
             }
         }
         let mut zoom = settings.ui_zoom;
@@ -57,7 +58,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         // The whole window is scaled: while the number is dragged the pointer must not slip off it.
         let response = ui.add(drag.update_while_editing(false)).accessible_name("Zoom");
         if response.changed() {
-            cx.out.push(Command::Settings(SettingsCommand::SetUiZoom(zoom)));
+            cx.out.push(prefer(move |s| s.ui_zoom = zoom).into());
         }
         response.on_hover_text("Scale of the whole window (Ctrl + and Ctrl -). Default 1.00");
     });
@@ -66,7 +67,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         for map in ColorMap::iter() {
             let radio = ui.radio(settings.color_map == map, map.name());
             if radio.on_hover_text("Colors of depth").clicked() {
-                cx.out.push(Command::Settings(SettingsCommand::SetColorMap(map)));
+                cx.out.push(prefer(move |s| s.color_map = map).into());
             }
         }
     });
@@ -76,15 +77,15 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         .on_hover_text(Action::Footprint.tooltip())
         .changed()
     {
-        cx.out.push(Command::Settings(SettingsCommand::SetFootprintVisible(footprint)));
+        cx.out.push(prefer(move |s| s.footprint_visible = footprint).into());
     }
     let mut mask = settings.mask_visible;
     if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
-        cx.out.push(Command::Settings(SettingsCommand::SetMaskVisible(mask)));
+        cx.out.push(prefer(move |s| s.mask_visible = mask).into());
     }
     let mut linked = settings.cameras_linked;
     if ui.checkbox(&mut linked, "3D views move together").on_hover_text(Action::LinkCameras.tooltip()).changed() {
-        cx.out.push(Command::Settings(SettingsCommand::SetCamerasLinked(linked)));
+        cx.out.push(prefer(move |s| s.cameras_linked = linked).into());
     }
     ui.label(section("Models", cx.p));
     ui.horizontal(|ui| {
@@ -93,7 +94,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         let response = combo.show_ui(ui, |ui| {
             for runtime in EngineChoice::iter() {
                 if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
-                    cx.out.push(Command::Settings(SettingsCommand::SetRuntime(runtime)));
+                    cx.out.push(prefer(move |s| s.runtime = runtime).into());
                 }
             }
         });
@@ -105,7 +106,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         let drag = egui::DragValue::new(&mut mib).speed(8.0).range(0..=MAX_CACHE_MIB).suffix(" MiB");
         let response = ui.add(drag.update_while_editing(false)).accessible_name("Keep predictions");
         if response.changed() {
-            cx.out.push(Command::Settings(SettingsCommand::SetCacheBudget(mib)));
+            cx.out.push(prefer(move |s| s.cache_mib = mib).into());
         }
         response.on_hover_text(
             "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",
@@ -118,7 +119,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         let mut percent = cx.state.settings.repeats_percent;
         let drag = egui::DragValue::new(&mut percent).speed(0.1).range(0.0..=100.0).fixed_decimals(1).suffix(" %");
         if ui.add(drag).accessible_name("Blind repeats").on_hover_text(REPEATS).changed() {
-            cx.push(SettingsCommand::SetRepeats(percent));
+            cx.push(prefer(move |s| s.repeats_percent = percent));
         }
     });
     if let Ok(device) = cx.device {

@@ -3,6 +3,7 @@
 mod plot;
 mod table;
 
+use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Color32, ComboBox, Layout, Pos2, Rect, RichText, Shape, Slider, Stroke, Ui, UiBuilder, pos2, vec2,
 };
@@ -13,7 +14,7 @@ use super::images;
 use super::theme::{SMALL, caption, pane_frame};
 use super::widget::empty;
 use crate::app::action::Action;
-use crate::app::command::{Command, Pane, SettingsCommand};
+use crate::app::command::{Command, Pane};
 use crate::app::inspect::{InspectCommand, Inspected};
 use crate::app::keys::{ImprintSource, PoseBits, Registration};
 use crate::app::state::Lookup;
@@ -134,7 +135,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
             if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(Command::Settings(SettingsCommand::SetPoseEngine(e.into())));
+                cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
             }
         }
     });

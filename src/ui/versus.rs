@@ -4,13 +4,13 @@ mod choose;
 mod figures;
 mod space;
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::images::link::Link;
 use super::images::{absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
 use crate::app::action::Action;
-use crate::app::command::SettingsCommand;
 use crate::app::keys::VersusKey;
 use crate::app::pane::Pane;
 use crate::app::settings::{Versus, VersusMode};
@@ -133,11 +133,10 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     ui.horizontal_wrapped(|ui| {
         for letter in [Letter::A, Letter::B] {
             if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - 54.0) / 2.0) {
-                let changed = match letter {
-                    Letter::A => Versus { a: subject, ..versus.clone() },
-                    Letter::B => Versus { b: subject, ..versus.clone() },
-                };
-                cx.push(SettingsCommand::SetVersus(changed));
+                cx.push(match letter {
+                    Letter::A => prefer(move |s| s.versus_mut().a = subject.clone()),
+                    Letter::B => prefer(move |s| s.versus_mut().b = subject.clone()),
+                });
             }
         }
         cx.action_button(ui, Action::SwapCompared, "Swap");
@@ -146,7 +145,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
         for mode in VersusMode::iter() {
             let tip = cx.keys().fill(&format!("{} ([[compare_mode]]: next)", mode.tooltip()));
             if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(tip).clicked() {
-                cx.push(SettingsCommand::SetVersus(Versus { mode, ..versus.clone() }));
+                cx.push(prefer(move |s| s.versus_mut().mode = mode));
             }
         }
         let button = ui.button("Hold: B").on_hover_text("While F or this is held, B stands in the place of A");

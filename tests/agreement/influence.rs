@@ -1,6 +1,7 @@
 //! What an angle hangs on is the same on the screen and by verb.
 
 use touch2touch::app::command::ViewCommand;
+use touch2touch::app::settings::prefer;
 use touch2touch_work::io::npz;
 use touch2touch_work::io::pt::Values;
 
@@ -18,7 +19,7 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let report = json(&verb, home.path());
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
-    studio.send(SettingsCommand::SetMask(MaskSettings { choice, ..MaskSettings::default() }).into());
+    studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
     assert!(studio.state.influence(MEASURED).ready().is_none(), "nobody looks at it");
     studio.send(ViewCommand::ShowInfluence(true).into());
     let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
@@ -49,7 +50,7 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold", "--engine", "gicp"];
     let why = json(&verb, home.path())["cases"][0]["no_influence"].as_str().unwrap().to_owned();
     let engine = touch2touch_core::pose::Registration::Gicp.into();
-    studio.send(SettingsCommand::SetPoseEngine(engine).into());
+    studio.send(prefer(move |s| s.pose_engine = engine).into());
     let Lookup::Failed(said) = studio.state.influence(MEASURED) else { panic!("{:?}", studio.state.tasks.failed) };
     assert!(why.contains(&said.why), "{why}: {}", said.why);
     studio.send(ViewCommand::ShowInfluence(false).into());

@@ -2,6 +2,7 @@
 
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{HandMask, Review};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
 use touch2touch_work::job::{Cancel, JobCx};
@@ -76,7 +77,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         let at = studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().position(|p| p.name == name);
         studio.send(LibraryCommand::Select(PairId(at.unwrap() as u32)).into());
         let mask = MaskSettings { proposal: source, choice, radius_px: 3.0, ..MaskSettings::default() };
-        studio.send(SettingsCommand::SetMask(mask).into());
+        studio.send(prefer(move |s| s.mask = mask.clone()).into());
         if source == ProposalSource::Grow {
             strokes(&mut studio);
         }
@@ -122,7 +123,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
     let proposal = ProposalSource::CadTruth;
     let mask = MaskSettings { proposal, choice, radius_px: 3.0, ..MaskSettings::default() };
-    studio.send(SettingsCommand::SetMask(mask.clone()).into());
+    studio.send(prefer(move |s| s.mask = mask.clone()).into());
     strokes(&mut studio);
     let painted = hand(&studio).unwrap();
     let checked = painted.marks.hand_checked();
@@ -139,7 +140,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
         let from = if *by_hand { &painted.mask } else { &proposed };
         assert_eq!(kept.mask.as_slice()[i], from.as_slice()[i], "pixel {i}");
     }
-    studio.send(SettingsCommand::SetMask(MaskSettings { over_hand: true, ..mask.clone() }).into());
+    studio.send(prefer(move |s| s.mask.over_hand = true).into());
     accept(&mut studio);
     assert!(*hand(&studio).unwrap().mask == proposed);
     for _ in 0..2 {
@@ -147,7 +148,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     }
     assert!(hand(&studio).unwrap().is_same(&painted), "undo gives pixels and their provenance back");
     // By brush: only there, and as the person's own.
-    studio.send(SettingsCommand::SetMask(MaskSettings { paint: Paint::LetThrough, ..mask }).into());
+    studio.send(prefer(move |s| s.mask.paint = Paint::LetThrough).into());
     let begin = LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px: [60.0, 70.0], erase: false };
     let said = studio.state.log.entries.len();
     studio.send(begin.clone().into());
@@ -181,8 +182,8 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
     let name = windows[0].state.pair_name().to_owned();
     for (window, person) in windows.iter_mut().zip(["anna", "ben"]) {
         let mask = MaskSettings { choice, radius_px: 3.0, tool: MaskTool::Rectangle, ..MaskSettings::default() };
-        window.send(SettingsCommand::SetMask(mask).into());
-        window.send(SettingsCommand::SetPerson(person.into()).into());
+        window.send(prefer(move |s| s.mask = mask.clone()).into());
+        window.send(prefer(move |s| s.person = person.into()).into());
         assert_eq!(window.state.pair_name(), name);
     }
     let rectangle = |window: &mut Studio, from: [f32; 2], to: [f32; 2]| {
@@ -228,7 +229,7 @@ fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_
     let mut studio = open(&folder, home.path());
     let (first, judged) = (name(&studio, 0), name(&studio, 1));
     let mask = MaskSettings { proposal: ProposalSource::CadTruth, radius_px: 3.0, ..MaskSettings::default() };
-    studio.send(SettingsCommand::SetMask(mask).into());
+    studio.send(prefer(move |s| s.mask = mask.clone()).into());
     studio.send(LibraryCommand::Select(PairId(1)).into());
     studio.send(LabelsCommand::SetReview(Review::Done).into());
     studio.send(LibraryCommand::Select(PairId(0)).into());

@@ -2,15 +2,16 @@
 //! else, and a random one gives the same numbers in the studio and by the verbs.
 
 use std::path::Path;
+use touch2touch::app::settings::prefer;
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
 use proptest::test_runner::TestRunner;
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Pane, SettingsCommand};
+use touch2touch::app::command::Pane;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{GenerateSettings, MaskSettings};
+use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
@@ -119,11 +120,13 @@ fn put(studio: &mut Studio, recipe: &Recipe) {
     let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = recipe.generator.as_ref().unwrap().1;
     let before = studio.state.settings.clone();
     let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, guidance, ..before.generate };
-    studio.send(SettingsCommand::SetRuntime(EngineChoice::Rten).into());
-    studio.send(SettingsCommand::SetGenerate(generate).into());
-    studio.send(SettingsCommand::SetShift(recipe.shift).into());
-    studio.send(SettingsCommand::SetMask(MaskSettings { choice: recipe.mask, ..before.mask }).into());
-    studio.send(SettingsCommand::SetPoseEngine(recipe.registration).into());
+    let (shift, mask, registration) = (recipe.shift, recipe.mask, recipe.registration);
+    let change = prefer(move |s| {
+        s.runtime = EngineChoice::Rten;
+        s.generate = generate.clone();
+        (s.shift, s.mask.choice, s.pose_engine) = (shift, mask, registration);
+    });
+    studio.send(change.into());
 }
 
 /// What the studio shows of the selected pair, and what the verbs say of it with the words that the studio gives for it.

@@ -2,8 +2,9 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
+use touch2touch::app::settings::prefer;
 
-use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::effect::Ended;
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
@@ -40,11 +41,8 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert_eq!(bench.services.generated(), 0, "switched off");
-    let by_itself = |on: bool, bench: &Bench| {
-        let settings = bench.state.settings.generate.clone();
-        SettingsCommand::SetGenerate(GenerateSettings { by_itself: on, ..settings })
-    };
-    bench.send(by_itself(true, &bench));
+    let by_itself = |on: bool| prefer(move |s| s.generate.by_itself = on);
+    bench.send(by_itself(true));
     bench.settle();
     assert_eq!(bench.services.generated(), 1);
     let key = bench.state.chosen(RIGHT).expect("it is shown").clone();
@@ -83,7 +81,7 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     assert!(bench.state.chosen(RIGHT).is_some() && bench.state.chosen(LEFT).is_none());
     assert_eq!(bench.services.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
-    bench.send(SettingsCommand::SetGenerate(GenerateSettings { seed: 5, ..bench.state.settings.generate.clone() }));
+    bench.send(prefer(move |s| s.generate.seed = 5));
     bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
     bench.settle();
     let (right, left) = (bench.state.chosen(RIGHT).unwrap().clone(), bench.state.chosen(LEFT).unwrap().clone());
@@ -99,7 +97,7 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (4, batches + 1));
     // Switched off, only the active one is made.
     let one = GenerateSettings { both_fingers: false, ..bench.state.settings.generate.clone() };
-    bench.send(SettingsCommand::SetGenerate(one));
+    bench.send(prefer(move |s| s.generate = one.clone()));
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
     assert_eq!(bench.services.generated(), 5);
@@ -175,10 +173,10 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
     assert_eq!(bench.state.recipe(touch).unwrap().steps, 20, "what the bundle recommends");
     let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
-    bench.send(SettingsCommand::SetGenerate(fast));
+    bench.send(prefer(move |s| s.generate = fast.clone()));
     assert!(bench.state.recipe(touch).unwrap().steps <= 4);
     let own = GenerateSettings { steps: 33, ..bench.state.settings.generate.clone() };
-    bench.send(SettingsCommand::SetGenerate(own));
+    bench.send(prefer(move |s| s.generate = own.clone()));
     assert_eq!(bench.state.settings.generate.preset, None);
     assert_eq!(bench.state.recipe(touch).unwrap().steps, 33);
 }

@@ -1,11 +1,12 @@
 //! The time machine and the basin map: computed only while looked at, found again under their recipe.
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, TasksCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, Registration, Request};
 use touch2touch::app::settings::MaskSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
@@ -19,7 +20,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 /// The simulated grasp with the true contact as its mask.
 fn bench(list: &[Pane]) -> Bench {
     let mut bench = Bench::open_simulated();
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.send(panes(list));
     bench.settle();
@@ -149,7 +150,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
     bench.settle();
     assert_eq!(bench.state.inspection().ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);

@@ -1,11 +1,10 @@
 //! Correcting masks: strokes, clean-ups, undo, saving.
 
 use std::sync::atomic::Ordering;
+use touch2touch::app::settings::prefer;
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{
-    Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand,
-};
+use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
 use touch2touch::app::settings::{MaskSource, MaskTool};
@@ -47,7 +46,7 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     let automatic = mask(&bench, lab::RIGHT);
     assert_eq!(count(&automatic), 35 + 4, "the ring and the spot");
@@ -67,7 +66,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(saved.review, Review::InProgress);
     assert!(bench.state.document.unsaved.is_empty());
     // Another automatic source does not touch it; removing it brings that source back.
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::TopPercent));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::TopPercent));
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
     bench.send(LabelsCommand::ResetMask);
@@ -83,9 +82,9 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
 #[test]
 fn a_stroke_that_touches_nothing_leaves_nothing() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
+    bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     stroke(&mut bench, lab::RIGHT, [-900.0, 1.0], [-800.0, 1.0]);
-    bench.send(SettingsCommand::SetMaskTool(MaskTool::Brush));
+    bench.send(prefer(|s| s.mask.tool = MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
     assert!(bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
@@ -94,7 +93,7 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
     // Over what is right already it says that somebody looked: the pixels stay, and are theirs.
     let before = mask(&bench, lab::RIGHT);
-    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
+    bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
     assert_eq!(mask(&bench, lab::RIGHT), before);
     let hand = bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).unwrap();
@@ -343,7 +342,7 @@ fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
 #[test]
 fn every_tool_draws_and_undo_takes_it_back() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     let before = mask(&bench, lab::RIGHT);
     for (tool, name) in [
@@ -352,7 +351,7 @@ fn every_tool_draws_and_undo_takes_it_back() {
         (MaskTool::Rectangle, "rectangle"),
         (MaskTool::Wand, "wand"),
     ] {
-        bench.send(SettingsCommand::SetMaskTool(tool));
+        bench.send(prefer(move |s| s.mask.tool = tool));
         begin(&mut bench, lab::RIGHT, [10.0, 8.0]);
         for at in [[18.0, 8.0], [18.0, 13.0], [11.0, 13.0]] {
             bench.send(LabelsCommand::StrokeTo(at));
@@ -374,7 +373,7 @@ fn every_tool_draws_and_undo_takes_it_back() {
 #[test]
 fn a_gate_keeps_tools_to_a_depth() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     let before = mask(&bench, lab::RIGHT);
     let imprint = bench.state.imprint(MEASURED, lab::RIGHT).ready().unwrap().clone();
@@ -383,15 +382,14 @@ fn a_gate_keeps_tools_to_a_depth() {
     let mut settings = bench.state.settings.mask.clone();
     settings.gate.depth_m = Some([0.002, 0.02]);
     settings.tool = MaskTool::Rectangle;
-    bench.send(SettingsCommand::SetMask(settings.clone()));
+    bench.send(prefer(move |s| s.mask = settings.clone()));
     stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
     let gated = mask(&bench, lab::RIGHT);
     for (at, on) in gated.as_slice().iter().enumerate() {
         assert_eq!(*on, before.as_slice()[at] || deep(imprint.as_slice()[at]), "pixel {at}");
     }
     // What lies near the CAD model is not known here: that is said, and nothing is painted.
-    settings.gate.cad_m = Some(0.001);
-    bench.send(SettingsCommand::SetMask(settings));
+    bench.send(prefer(|s| s.mask.gate.cad_m = Some(0.001)));
     let said = bench.state.log.entries.len();
     stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
     assert_eq!(mask(&bench, lab::RIGHT), gated);
@@ -401,8 +399,8 @@ fn a_gate_keeps_tools_to_a_depth() {
 #[test]
 fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
-    bench.send(SettingsCommand::SetPerson("Anna".into()));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
+    bench.send(prefer(|s| s.person = "Anna".into()));
     bench.settle();
     let first = "tool_a/data_0".to_owned();
     for _ in 0..5 {
@@ -448,7 +446,7 @@ fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
 #[test]
 fn a_disk_that_refuses_keeps_the_second_mask_on_screen() {
     let mut bench = bench();
-    bench.send(SettingsCommand::SetPerson("Anna".into()));
+    bench.send(prefer(|s| s.person = "Anna".into()));
     for _ in 0..5 {
         bench.send(LibraryCommand::DoneAndNext);
         bench.settle();

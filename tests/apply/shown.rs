@@ -1,9 +1,10 @@
 //! A prediction on screen is that of the settings in force, or says that it is not.
 
 use std::sync::Arc;
+use touch2touch::app::settings::prefer;
 
 use proptest::prelude::*;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
 use touch2touch::app::results::shown::Why;
 use touch2touch::app::settings::GenerateSettings;
@@ -51,22 +52,20 @@ fn moves() -> impl Strategy<Value = Move> {
     ]
 }
 
-fn with(state: &State, change: impl FnOnce(&mut GenerateSettings)) -> Command {
-    let mut new = state.settings.generate.clone();
-    change(&mut new);
-    SettingsCommand::SetGenerate(new).into()
+fn with(change: impl Fn(&mut GenerateSettings) + Send + Sync + 'static) -> Command {
+    prefer(move |s| change(&mut s.generate)).into()
 }
 
 impl Move {
     fn command(&self, state: &State) -> Option<Command> {
         Some(match self.clone() {
-            Self::Steps(n) => with(state, |g| (g.preset, g.steps) = (None, n)),
-            Self::Seed(n) => with(state, |g| g.seed = n),
-            Self::Eta(eta) => with(state, |g| (g.preset, g.eta) = (None, eta)),
-            Self::Model(n) => with(state, |g| g.bundle = Some(["gen", "fitted"][usize::from(n)].into())),
-            Self::Preset(preset) => with(state, |g| g.preset = Some(preset)),
-            Self::Runtime(runtime) => SettingsCommand::SetRuntime(runtime).into(),
-            Self::ByItself(on) => with(state, |g| g.by_itself = on),
+            Self::Steps(n) => with(move |g| (g.preset, g.steps) = (None, n)),
+            Self::Seed(n) => with(move |g| g.seed = n),
+            Self::Eta(eta) => with(move |g| (g.preset, g.eta) = (None, eta)),
+            Self::Model(n) => with(move |g| g.bundle = Some(["gen", "fitted"][usize::from(n)].into())),
+            Self::Preset(preset) => with(move |g| g.preset = Some(preset)),
+            Self::Runtime(runtime) => prefer(move |s| s.runtime = runtime).into(),
+            Self::ByItself(on) => with(move |g| g.by_itself = on),
             Self::Select(pair) => LibraryCommand::Select(PairId(pair)).into(),
             Self::Both(on) => ViewCommand::ShowBothFingers(on).into(),
             Self::Generate => PredictCommand::Generate.into(),
@@ -140,7 +139,7 @@ proptest! {
 #[test]
 fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before() {
     let mut bench = bench();
-    bench.send(with(&bench.state, |g| g.by_itself = true));
+    bench.send(with(|g| g.by_itself = true));
     for pair in [2, 3, 1] {
         bench.send(LibraryCommand::Select(PairId(pair)));
         bench.settle();
@@ -179,7 +178,7 @@ fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first
     // Nothing is predicted by itself here: the picture from before is shown, and says whose it is.
     let outdated = again.state.outdated(RIGHT).expect("it is of another model");
     assert!(outdated.made_with.starts_with("gen ") && outdated.why == Why::NotMade, "{outdated:?}");
-    again.send(with(&again.state, |g| g.by_itself = true));
+    again.send(with(|g| g.by_itself = true));
     again.settle();
     assert_eq!(again.state.outdated(RIGHT), None);
     assert_eq!(&*again.state.chosen(RIGHT).unwrap().bundle, "fitted");
@@ -190,7 +189,7 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     let mut bench = bench();
     for seed in [42, 41] {
         bench.send(Move::Seed(seed).command(&bench.state).unwrap());
-        bench.send(with(&bench.state, |g| g.seed_locked = true));
+        bench.send(with(|g| g.seed_locked = true));
         bench.send(PredictCommand::Generate);
         bench.settle();
     }
@@ -201,7 +200,7 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::Picked));
     bench.send(Move::Steps(3).command(&bench.state).unwrap());
     assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::NotMade));
-    bench.send(with(&bench.state, |g| g.preset = Some(Preset::Default)));
+    bench.send(with(|g| g.preset = Some(Preset::Default)));
     assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
     // Generating asks for what the settings say.
     bench.send(PredictCommand::Generate);

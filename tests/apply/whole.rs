@@ -2,9 +2,10 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
+use touch2touch::app::settings::prefer;
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand};
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintSource, PoseKey, Registration, Request};
 use touch2touch::app::library::Place;
 use touch2touch::app::results::pose::ProvisionalPoseKey;
@@ -24,7 +25,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 fn the_pose_follows_the_mask() {
     let mut bench = Bench::open_simulated();
     bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
     let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
@@ -34,7 +35,7 @@ fn the_pose_follows_the_mask() {
     let cloud = bench.state.cloud(MEASURED).ready().unwrap();
     assert_eq!(cloud.contact_points().len(), pose.num_points);
     // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
-    bench.send(SettingsCommand::SetMaskTool(MaskTool::Eraser));
+    bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     let at_px = {
         let mask = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
         let at = mask.as_slice().iter().position(|v| *v).unwrap();
@@ -49,11 +50,11 @@ fn the_pose_follows_the_mask() {
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(SettingsCommand::SetPoseEngine(Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(SettingsCommand::SetPoseEngine(Registration::DistanceField.into()));
+    bench.send(prefer(|s| s.pose_engine = Registration::DistanceField.into()));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
@@ -67,7 +68,7 @@ fn the_pose_follows_the_mask() {
 fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     let mut bench = Bench::open_simulated();
     bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
     let key = |bench: &Bench| bench.state.pose_key(MEASURED).unwrap().unwrap();
@@ -81,7 +82,7 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     assert!(Arc::ptr_eq(&provisional, &pose), "a good mask is registered once");
     assert!(bench.state.provisional_pose(MEASURED).is_none());
     // All that is deeper than a threshold: no cheap search settles it.
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     let (provisional, pose) = both(&bench, &key(&bench));
     assert!(pose.report.certificate.is_some() && provisional.report.certificate.is_none());
@@ -102,14 +103,14 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     assert!(matches!(bench.state.cloud(MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
     for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
-        bench.send(SettingsCommand::SetMaskSource(source));
+        bench.send(prefer(move |s| s.mask.choice.source = source));
         bench.settle();
         match bench.state.mask_in_force(MEASURED, lab::RIGHT) {
             Err(Lookup::Absent(found)) => assert_eq!(found, absent),
             other => panic!("{other:?}"),
         }
     }
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     bench.settle();
     assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
 }
@@ -119,7 +120,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let mut bench = Bench::open();
     bench.services.blind.store(true, Ordering::Relaxed);
     bench.send(panes(&[Pane::Measured]));
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     bench.settle();
     let shown = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
@@ -127,7 +128,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
     assert_eq!(said(&bench), 1, "{:#?}", bench.state.log.entries);
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
-    bench.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     assert_eq!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
@@ -212,10 +213,10 @@ fn colors_stay_from_pair_to_pair() {
     let kept = bench.state.settings.range;
     assert_eq!(ranges(&mut bench), [kept; 3], "nobody asked for other colors");
     // A person gives each pair its own, and takes that back.
-    bench.send(SettingsCommand::SetRange(ColorRange { locked: false, ..kept }));
+    bench.send(prefer(move |s| s.range = ColorRange { locked: false, ..kept }));
     let own = ranges(&mut bench);
     assert!(own[0] != own[1] && own[0] == own[2], "{own:?}");
-    bench.send(SettingsCommand::SetRange(ColorRange { locked: true, ..own[0] }));
+    bench.send(prefer(move |s| s.range = ColorRange { locked: true, ..own[0] }));
     let kept = bench.state.settings.range;
     assert_eq!(ranges(&mut bench), [kept; 3]);
 }

@@ -1,9 +1,10 @@
 //! The fit to one's own pairs in the studio, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{AdaptCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{AdaptCommand, Pane, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_work::bundles::BundleKind;
 
@@ -15,8 +16,8 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 3);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data)) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
     rig.shoot("fit-before");
     let shipped = rig.harness.state().state().bundle(BundleKind::Generator).unwrap().clone();
@@ -63,8 +64,8 @@ fn pictures_of_tuning() {
     write_dataset(&data, 3);
     for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
         let Some(mut rig) = Rig::live(size, Place::Path(data.clone())) else { return };
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
         rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
         rig.send(AdaptCommand::Tune(true));
         rig.send(AdaptCommand::Steps(30));

@@ -1,9 +1,10 @@
 //! The depth chain: its pane, its flags, the refit, the parts seen and invented, and the warning of a bare shaft.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_core::ambiguity::Touch;
 use touch2touch_core::catalog;
@@ -32,18 +33,18 @@ impl Rig {
 #[test]
 fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(PredictCommand::Generate);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+    rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.take("Maximize Error");
     assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Ledger));
     let chains = rig.chains();
-    rig.send(SettingsCommand::SetShift(ShiftMode::Raw));
+    rig.send(prefer(|s| s.shift = ShiftMode::Raw));
     assert_eq!(rig.chains(), chains, "out of sight nothing is computed");
     rig.take("Back to all panes");
     // By the palette's action, from a workspace that has no such pane.
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
     let state = rig.harness.state().state();
     assert_eq!(state.settings.workspace, Workspace::Inspect);
@@ -74,7 +75,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
 #[test]
 fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
     rig.take("Refit on this data set");
@@ -88,7 +89,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     assert!(refit.stats().gt_std > 0.0 && refit.check("quick").is_ok() && refit.check("other").is_err());
     rig.shoot("test-depth-chain-refit");
     // It is a choice like the others from now on, and survives a restart.
-    rig.send(SettingsCommand::SetShift(ShiftMode::Raw));
+    rig.send(prefer(|s| s.shift = ShiftMode::Raw));
     rig.restart(SIZE);
     assert_eq!(rig.harness.state().state().settings.refit, Some(refit));
 }
@@ -104,7 +105,7 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     }
     write_tools(folder.path(), &[(tool.name.as_str(), true, tool.mesh())]).unwrap();
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(LibraryCommand::Open(Place::Path(folder.path().to_owned())));
     rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
@@ -123,16 +124,16 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
 fn pictures_of_the_depth_chain() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(LibraryCommand::Select(PairId(30)));
         rig.send(PredictCommand::Generate);
         rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
         for theme in [Theme::Dark, Theme::Light] {
-            rig.send(SettingsCommand::SetTheme(theme));
-            rig.send(SettingsCommand::SetShift(ShiftMode::ExactInverse));
+            rig.send(prefer(move |s| s.theme = theme));
+            rig.send(prefer(|s| s.shift = ShiftMode::ExactInverse));
             rig.shoot(&format!("{name}-chain-{theme:?}").to_lowercase());
             rig.take("Maximize Depth chain");
-            rig.send(SettingsCommand::SetShift(ShiftMode::Raw));
+            rig.send(prefer(|s| s.shift = ShiftMode::Raw));
             rig.shoot(&format!("{name}-chain-full-{theme:?}").to_lowercase());
             rig.take("Back to all panes");
         }

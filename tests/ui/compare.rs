@@ -3,8 +3,9 @@
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand};
+use touch2touch::app::command::{Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
@@ -41,14 +42,15 @@ fn subject(text: &str) -> Subject {
 }
 
 fn set(rig: &mut Rig, a: &str, b: &str, mode: VersusMode) {
-    rig.send(SettingsCommand::SetVersus(Versus { a: subject(a), b: subject(b), mode }));
+    let versus = Versus { a: subject(a), b: subject(b), mode };
+    rig.send(prefer(move |s| *s.versus_mut() = versus.clone()));
     rig.settle();
 }
 
 #[test]
 fn any_two_imprints_are_compared_where_somebody_looks() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     // Behind its tab nothing is made of what is wished there.
     set(&mut rig, "prediction:seed=7", "measured", VersusMode::Side);
@@ -91,7 +93,7 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
 #[test]
 fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     click(&mut rig, "Compare");
     let place = rig.harness.get_by_label("Compare A right").rect();
@@ -153,7 +155,7 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
 #[test]
 fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     click(&mut rig, "Compare");
     set(&mut rig, "mean:seeds=2", "measured", VersusMode::Clouds);
@@ -176,9 +178,9 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
         assert_eq!(distances[i] < 0.0, a[at] < b[at] && nearest > 0.0);
     }
     rig.shoot("compare-apart");
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert_eq!(state(&rig).versus(), Versus::default());
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart([1280.0, 800.0]);
     assert_eq!(state(&rig).versus().a, mean, "kept in the preferences");
     assert!(Action::SwapCompared.command(state(&rig)).is_some());

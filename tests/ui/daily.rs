@@ -4,6 +4,7 @@ use eframe::egui::vec2;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::tasks::Level;
@@ -29,8 +30,8 @@ fn quiet(rig: &mut Rig) {
 #[test]
 fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     rig.send(LibraryCommand::Step(4));
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
     rig.send(ViewCommand::ShowBothFingers(false));
@@ -78,12 +79,12 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
 #[test]
 fn a_mask_without_contact_offers_the_threshold() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     let mut mask = state(&rig).settings.mask.clone();
     mask.choice.source = MaskSource::TopPercent;
     mask.choice.top_percent = 0.0;
-    rig.send(SettingsCommand::SetMask(mask));
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(move |s| s.mask = mask.clone()));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert!(matches!(state(&rig).pose(MEASURED), Lookup::Failed(_)), "{:?}", state(&rig).pose(MEASURED));
     rig.shoot("daily-no-contact");
     rig.harness.get_all_by_label("Use threshold").next().unwrap().click();
@@ -97,8 +98,8 @@ fn a_mask_without_contact_offers_the_threshold() {
 #[test]
 fn notes_cover_nothing_and_only_errors_stay() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     let dismiss = |rig: &Rig| rig.harness.query_all_by_label("Dismiss").next().map(|button| button.rect());
     // That there is no mask model is a warning: it goes by itself, and stays in the log.
     quiet(&mut rig);

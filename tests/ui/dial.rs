@@ -2,9 +2,10 @@
 
 use eframe::egui;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{DialCommand, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{DialCommand, LibraryCommand, Pane, UiRequest, ViewCommand};
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::library::Place;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Theme, Workspace};
 use touch2touch_core::pose::Registration;
 use touch2touch_work::sweep::Dial;
@@ -12,8 +13,8 @@ use touch2touch_work::sweep::Dial;
 use super::rig::{Rig, write_dataset};
 
 fn open(rig: &mut Rig) {
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Dial)));
 }
 
@@ -76,7 +77,7 @@ fn a_dial_is_turned_a_dot_opens_its_pair_and_a_value_is_put_in_force() {
     click(&mut rig, "Dial over measured imprints");
     rig.shoot("dial-measured");
     // What was seen was with another registration.
-    rig.send(SettingsCommand::SetPoseEngine(Registration::PlanarPointToPoint.into()));
+    rig.send(prefer(|s| s.pose_engine = Registration::PlanarPointToPoint.into()));
     rig.harness.get_by_label("of earlier settings");
     rig.send(DialCommand::Choose(Dial::Trim));
     click(&mut rig, "Turn the dial");
@@ -100,7 +101,7 @@ fn pictures_of_the_dial() {
         rig.send(DialCommand::Predictions(false));
         rig.send(DialCommand::Start);
         rig.shoot(&format!("{name}-dial"));
-        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.send(prefer(|s| s.theme = Theme::Light));
         rig.shoot(&format!("{name}-dial-light"));
         rig.send(DialCommand::Choose(Dial::Gate));
         rig.send(DialCommand::Start);

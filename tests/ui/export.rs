@@ -1,11 +1,12 @@
 //! What is taken away: figures and pictures, each in few clicks.
 
 use std::path::Path;
+use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
@@ -42,7 +43,7 @@ impl Rig {
     }
 
     fn predicted(&mut self) {
-        self.send(SettingsCommand::DismissHint);
+        self.send(prefer(|s| s.hint_dismissed = true));
         self.send(PredictCommand::Generate);
     }
 
@@ -82,7 +83,7 @@ fn a_figure_of_four_pairs_takes_no_more_than_eight_actions() {
 fn a_pane_is_drawn_as_a_picture_from_its_own_menu() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
     rig.predicted();
-    rig.send(SettingsCommand::SetTheme(Theme::Light));
+    rig.send(prefer(|s| s.theme = Theme::Light));
     for (text, name) in [("Save picture 4x", "error.png"), ("Save picture SVG", "error.svg")] {
         let file = rig.data.join(name);
         let mut actions = rig.clicks(&["Export Error"]);
@@ -100,7 +101,7 @@ fn a_pane_is_drawn_as_a_picture_from_its_own_menu() {
 fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a_scene() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
     rig.predicted();
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     let folder = rig.data.join("taken");
     rig.clicks(&["Export 3D measured"]);
     rig.shoot("scene-menu");
@@ -135,18 +136,18 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
     let Some(mut rig) = Rig::live(SIZE, Place::Path(data)) else { return };
     rig.send(LibraryCommand::Select(PairId(3)));
     rig.predicted();
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(ViewCommand::SelectFinger(lab::LEFT));
-    rig.send(SettingsCommand::SetRange(ColorRange { min_m: 0.001, max_m: 0.012, locked: true }));
+    rig.send(prefer(move |s| s.range = ColorRange { min_m: 0.001, max_m: 0.012, locked: true }));
     let file = folder.path().join("grasp.t2tcase");
     let mut actions = rig.clicks(&["Open", "Save case…"]) + rig.take_to(&file);
     assert!(file.is_file(), "{:?}", rig.harness.state().state().log.entries.back());
 
     let Some(mut other) = Rig::live(SIZE, Place::Demo) else { return };
-    other.send(SettingsCommand::DismissHint);
+    other.send(prefer(|s| s.hint_dismissed = true));
     let own = ColorRange { min_m: 0.002, max_m: 0.009, locked: true };
-    other.send(SettingsCommand::SetRange(own));
+    other.send(prefer(move |s| s.range = own));
     actions += other.clicks(&["Open", "Path…"]) + other.take_to(&file);
     assert!(actions <= 8, "{actions}");
     other.shoot("case-elsewhere");
@@ -176,7 +177,7 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
         let services = LiveServices::with_config_folder(Some(rig.config.clone()));
         services.load_settings().0
     };
-    other.send(SettingsCommand::SetMaskOpacity(0.5));
+    other.send(prefer(|s| s.mask_opacity = 0.5));
     assert_eq!((kept(&other).range, kept(&other).workspace), (own, Workspace::Inspect));
     other.send(LibraryCommand::Open(Place::Demo));
     let state = rig_state(&other);

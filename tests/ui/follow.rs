@@ -2,9 +2,9 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch_core::catalog;
 use touch2touch_core::rig::lab;
@@ -16,7 +16,7 @@ use super::rig::Rig;
 #[test]
 fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     let names = |rig: &Rig| -> Vec<String> {
         rig.harness.state().state().library.pairs().iter().map(|p| p.name.clone()).collect()
     };
@@ -57,7 +57,7 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "{:?}", state.pose(ImprintSource::Predicted));
     assert_eq!(state.library.follow.as_ref().unwrap().arrived, 2);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.shoot("follow-gelslim-only-1280");
     let image = rig.harness.render().unwrap();
     assert!(image.pixels().any(|p| p.0[..3] != [0; 3]), "an empty thumbnail must not black out the window");

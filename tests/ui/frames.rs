@@ -2,9 +2,10 @@
 
 use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LibraryCommand, SettingsCommand};
+use touch2touch::app::command::LibraryCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results::Results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::app::state::State;
 
@@ -41,7 +42,7 @@ fn what_is_painted_in_parts_is_what_is_painted_whole() {
         assert!(share < 0.002, "{what}: {:.3} % of the bytes differ, by at most {most}", share * 100.0);
     };
     for rig in [&mut parts, &mut whole] {
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
     }
     for (workspace, theme) in [
         (Workspace::Inspect, Theme::Dark),
@@ -51,8 +52,8 @@ fn what_is_painted_in_parts_is_what_is_painted_whole() {
     ] {
         let name = workspace.name();
         for rig in [&mut parts, &mut whole] {
-            rig.send(SettingsCommand::SetTheme(theme));
-            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(prefer(move |s| s.theme = theme));
+            rig.send(prefer(move |s| s.workspace = workspace));
         }
         check(&mut parts, &mut whole, name);
         for i in 0..6_u8 {
@@ -84,8 +85,8 @@ fn a_turned_view_is_painted() {
     let Some(mut parts) = Rig::new(SIZE, 1) else { return };
     let mut whole = parts.painted_whole(SIZE);
     for rig in [&mut parts, &mut whole] {
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         let center = rig.harness.get_by_label("3D view, measured").rect().center();
         rig.harness.hover_at(center);
         rig.harness.step();
@@ -112,8 +113,8 @@ fn a_turned_view_is_painted() {
 #[test]
 fn an_idle_window_paints_nothing_and_a_pointer_on_the_move_little() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     let painted = |rig: &Rig| rig.harness.state().painted(&rig.harness.ctx).unwrap();
     rig.harness.hover_at(Pos2::new(640.0, 400.0));
     rig.harness.run();
@@ -160,8 +161,8 @@ fn spread(rig: &mut Rig, rect: Rect) -> [u8; 2] {
 #[test]
 fn paging_shows_no_blank_frame_and_keeps_its_budget() {
     let Some(mut rig) = Rig::paging(SIZE, 200) else { return };
-    rig.harness.state_mut().push(SettingsCommand::DismissHint);
-    rig.harness.state_mut().push(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
+    rig.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
     let felt = |state: &State| state.imprint(ImprintSource::Measured, state.selection.finger).ready().is_some();
     rig.until("the imprint", felt);
     rig.harness.run_steps(5);

@@ -1,8 +1,9 @@
 //! Generating as a person sees it: the picture on the way, the presets, the result that is there again after a restart.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{PredictCommand, SettingsCommand};
+use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::{ImprintSource, Preset};
+use touch2touch::app::settings::prefer;
 use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
@@ -12,7 +13,7 @@ const SIZE: [f32; 2] = [1280.0, 800.0];
 #[test]
 fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     let Some((mut rig, gate)) = Rig::gated(SIZE) else { return };
-    rig.harness.state_mut().push(SettingsCommand::DismissHint);
+    rig.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
     rig.harness.state_mut().push(PredictCommand::Generate);
     rig.until("a preview", |state| state.preview(lab::RIGHT).is_some());
     for _ in 0..3 {
@@ -37,7 +38,7 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
 #[test]
 fn a_color_sensor_is_predicted_in_the_same_pane() {
     let Some(mut rig) = Rig::with_bundle(SIZE, "Tiny generator from Soft Bubble to GelSlim") else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
     let picture = state.predicted_color(lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();

@@ -2,9 +2,10 @@
 
 use eframe::egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, Pane, SettingsCommand};
+use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch_core::align::basin::is_same_place;
 
@@ -40,10 +41,10 @@ impl Rig {
     /// The Align workspace on a grasp with its true contact.
     fn align() -> Option<Self> {
         let mut rig = Self::new(SIZE, 2)?;
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
         assert!(rig.harness.state().state().results.inspections.is_empty(), "nobody looks yet");
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         Some(rig)
     }
 }
@@ -157,7 +158,7 @@ fn a_click_on_the_map_loads_that_run() {
     rig.harness.step();
     rig.settle();
     let maps = rig.harness.state().state().results.basins.len();
-    rig.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+    rig.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     rig.send(Command::Inspect(InspectCommand::Color(touch2touch::app::inspect::BasinColor::Winner)));
     assert_eq!(rig.harness.state().state().results.basins.len(), maps);
     assert_eq!(rig.harness.state().state().results.inspections.len(), 3, "the time machine is still on screen");

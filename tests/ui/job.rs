@@ -2,12 +2,13 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Pane, PredictCommand, SettingsCommand, TasksCommand};
+use touch2touch::app::command::{Pane, PredictCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
 use touch2touch::app::settings::{Theme, Workspace};
@@ -231,7 +232,7 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
 fn no_pane_asks_for_what_it_does_not_show() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     // One pane alone: its panes are all that is computed for.
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.harness.get_by_label("Maximize Mask").click();
     rig.settle();
     let state = rig.harness.state().state();

@@ -2,8 +2,9 @@
 
 use eframe::egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use touch2touch::app::command::{PredictCommand, SettingsCommand};
+use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
 use touch2touch_work::subject::Subject;
@@ -21,7 +22,7 @@ struct Person {
 
 impl Person {
     fn at(mut rig: Rig) -> Self {
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(PredictCommand::Generate);
         Self { rig, actions: 0 }
     }

@@ -2,9 +2,10 @@
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, pos2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskChoice, MaskSource, MaskTool, Workspace};
 use touch2touch::app::workbench::SceneTool;
 use touch2touch_core::grid::Mask;
@@ -53,7 +54,7 @@ impl Rig {
 fn with_nothing_automatic(rig: &mut Rig) {
     let mut settings = rig.harness.state().state().settings.mask.clone();
     settings.choice = MaskChoice { source: MaskSource::Threshold, threshold_m: 0.09, ..settings.choice };
-    rig.send(SettingsCommand::SetMask(settings));
+    rig.send(prefer(move |s| s.mask = settings.clone()));
 }
 
 fn inside(rect: Rect, x: f32, y: f32) -> Pos2 {
@@ -67,8 +68,8 @@ fn count(mask: &Mask) -> usize {
 #[test]
 fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(ViewCommand::ShowBothFingers(true));
     with_nothing_automatic(&mut rig);
     let picture = |rig: &Rig, finger: &str| rig.harness.get_by_label(&format!("Measured imprint {finger}")).rect();
@@ -123,8 +124,8 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
 #[test]
 fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     let right = rig.harness.get_by_label("Measured imprint right").rect();
     let corners = [[0.6, 0.2], [0.9, 0.2], [0.9, 0.8]].map(|[x, y]| inside(right, x, y));
     let quick = |rig: &mut Rig, at: Pos2| {
@@ -161,8 +162,8 @@ fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
 #[test]
 fn masks_are_drawn_on_the_points_of_the_3d_view() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(ViewCommand::ShowBothFingers(true));
     with_nothing_automatic(&mut rig);
     const VIEW: &str = "3D view, measured";
@@ -244,8 +245,8 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
 #[test]
 fn an_export_says_what_goes_where_before_it_writes() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(LibraryCommand::Step(1));
     rig.send(LabelsCommand::AdoptAutomatic);
@@ -281,10 +282,10 @@ fn an_export_says_what_goes_where_before_it_writes() {
 #[test]
 fn undo_and_redo_go_on_where_they_were_after_a_restart() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     with_nothing_automatic(&mut rig);
-    rig.send(SettingsCommand::SetPerson("Anna".into()));
+    rig.send(prefer(|s| s.person = "Anna".into()));
     let picture = |rig: &Rig| rig.harness.get_by_label("Measured imprint right").rect();
     let mut masks = vec![rig.mask(lab::RIGHT)];
     for way in [[[0.2, 0.2], [0.4, 0.3]], [[0.6, 0.6], [0.8, 0.7]], [[0.5, 0.1], [0.9, 0.1]]] {
@@ -335,8 +336,8 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
 #[test]
 fn masks_are_exported_as_annotations_and_imported_again_by_clicks() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     with_nothing_automatic(&mut rig);
     rig.send(LabelsCommand::AdoptAutomatic);
     let at = rig.harness.get_by_label("Measured imprint right").rect();

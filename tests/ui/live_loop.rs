@@ -2,9 +2,10 @@
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, pos2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand, ViewCommand};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{SceneLayer, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::dataset::PairId;
@@ -32,8 +33,8 @@ fn state(rig: &Rig) -> &State {
 #[test]
 fn what_the_angle_hangs_on_is_computed_while_it_is_shown_and_follows_the_mask() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     let there = |rig: &Rig| state(rig).results.influences.bytes();
     assert_eq!(there(&rig), 0, "nobody looks at it");
     rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::I);
@@ -65,8 +66,8 @@ fn what_the_angle_hangs_on_is_computed_while_it_is_shown_and_follows_the_mask() 
 #[test]
 fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     let mask = |rig: &Rig| state(rig).mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
     let angle = |rig: &Rig| state(rig).pose(MEASURED).ready().unwrap().angle_rad;
     assert!(state(&rig).ghost(MEASURED).is_none());
@@ -104,8 +105,8 @@ fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
 #[test]
 fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     let picture = rig.harness.get_by_label("Measured imprint right").rect();
     rig.harness.hover_at(picture.center());
     rig.settle();
@@ -139,9 +140,9 @@ fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
 #[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
 fn pictures_of_the_live_loop() {
     let Some(mut rig) = Rig::live(SIZE, Place::Demo) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(LibraryCommand::Select(PairId(30)));
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.dab([40.0, 50.0], [70.0, 60.0]);
     rig.shoot("live-ghost");
     let picture = rig.harness.get_by_label("Measured imprint right").rect();

@@ -2,15 +2,14 @@
 
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{
-    Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand,
-};
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::inspect::{BasinColor, InspectCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
-    LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, SceneLook, Theme, Versus, VersusMode, Workspace,
+    LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
 use touch2touch_core::dataset::PairId;
@@ -31,12 +30,12 @@ const STRAY: PlanarPose = PlanarPose { theta_rad: -0.7, y_m: 0.008, z_m: 0.0 };
 #[test]
 fn every_workspace_draws_in_both_themes() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 3) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     for theme in [Theme::Dark, Theme::Light] {
-        rig.send(SettingsCommand::SetTheme(theme));
+        rig.send(prefer(move |s| s.theme = theme));
         for workspace in [Workspace::Inspect, Workspace::Align, Workspace::Label, Workspace::Evaluate] {
-            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(prefer(move |s| s.workspace = workspace));
             rig.shoot(&format!("test-{}-{theme:?}", workspace.name()).to_lowercase());
             let image = rig.harness.render().unwrap();
             let mut colors: Vec<[u8; 4]> = image.pixels().map(|p| p.0).collect();
@@ -56,11 +55,11 @@ fn pictures_for_the_docs() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
         rig.shoot(&format!("{name}-first-start"));
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(LibraryCommand::Select(PairId(30)));
         rig.send(PredictCommand::Generate);
         rig.shoot(&format!("{name}-demo-inspect"));
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::Begin));
         rig.send(Command::Inspect(InspectCommand::Pin));
@@ -87,18 +86,18 @@ fn pictures_for_the_docs() {
         rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Pitch, 0.1)));
         rig.shoot(&format!("{name}-demo-align-hand"));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Look)));
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+        rig.send(prefer(|s| s.workspace = Workspace::Label));
         rig.shoot(&format!("{name}-demo-label"));
-        rig.send(SettingsCommand::SetMaskSource(MaskSource::Unet));
+        rig.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
         rig.shoot(&format!("{name}-demo-label-unet"));
-        rig.send(SettingsCommand::SetMaskSource(MaskSource::Cad));
+        rig.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
         rig.shoot(&format!("{name}-demo-label-cad"));
-        rig.send(SettingsCommand::SetMaskSource(MaskSource::Threshold));
-        rig.send(SettingsCommand::SetMaskTool(MaskTool::Rectangle));
+        rig.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
+        rig.send(prefer(|s| s.mask.tool = MaskTool::Rectangle));
         for (paint, from, to) in
             [(Paint::Ignore, [8.0, 8.0], [40.0, 30.0]), (Paint::Contact, [90.0, 60.0], [100.0, 90.0])]
         {
-            rig.send(SettingsCommand::SetPaint(paint));
+            rig.send(prefer(move |s| s.mask.paint = paint));
             let source = ImprintSource::Measured;
             rig.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source, at_px: from, erase: false });
             rig.send(LabelsCommand::StrokeTo(to));
@@ -106,21 +105,21 @@ fn pictures_for_the_docs() {
         }
         let mut mask = rig.harness.state().state().settings.mask.clone();
         mask.proposal = ProposalSource::CadTruth;
-        rig.send(SettingsCommand::SetMask(mask));
+        rig.send(prefer(move |s| s.mask = mask.clone()));
         rig.send(ViewCommand::Propose(true));
         rig.shoot(&format!("{name}-demo-label-propose"));
         rig.send(ViewCommand::Propose(false));
         rig.send(LabelsCommand::ResetMask);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
         for _ in 0..5 {
             rig.send(LibraryCommand::Step(7));
             rig.send(PredictCommand::Generate);
         }
         rig.shoot(&format!("{name}-demo-evaluate"));
-        rig.send(SettingsCommand::SetTheme(Theme::Light));
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Inspect));
+        rig.send(prefer(|s| s.theme = Theme::Light));
+        rig.send(prefer(|s| s.workspace = Workspace::Inspect));
         rig.shoot(&format!("{name}-demo-light"));
-        rig.send(SettingsCommand::SetTheme(Theme::Dark));
+        rig.send(prefer(|s| s.theme = Theme::Dark));
         if let Some(pairs) = std::env::var_os("TOUCH2TOUCH_REAL_PAIRS") {
             rig.send(LibraryCommand::Open(Place::Path(pairs.into())));
             rig.send(LibraryCommand::Select(PairId(7)));
@@ -142,8 +141,8 @@ fn pictures_of_the_faults() {
         write_pair(folder.path(), Layout::Test, &fault.to_string(), 0, &fault.sample()).unwrap();
     }
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(folder.path().to_owned())) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     let pairs = rig.harness.state().state().library.open.as_ref().unwrap().index().pairs.clone();
     for (id, pair) in pairs.iter().enumerate() {
         rig.send(LibraryCommand::Select(PairId(id as u32)));
@@ -163,8 +162,8 @@ fn pictures_of_the_faults() {
 fn pictures_of_the_scores() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
         rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Table)));
         rig.shoot(&format!("{name}-scores-none"));
         rig.send(Command::Evaluate(EvaluateCommand::Grasps(Some(4))));
@@ -174,7 +173,7 @@ fn pictures_of_the_scores() {
         rig.harness.get_by_label("histograms").click();
         rig.harness.step();
         rig.settle();
-        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.send(prefer(|s| s.theme = Theme::Light));
         rig.shoot(&format!("{name}-scores-light"));
     }
 }
@@ -185,25 +184,24 @@ fn pictures_of_the_scores() {
 fn pictures_of_the_3d_views() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(LibraryCommand::Select(PairId(30)));
         rig.send(PredictCommand::Generate);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::Distance)));
         rig.shoot(&format!("{name}-3d-distance"));
         let hidden = LayerLook { shown: false, ..SceneLayer::Membrane.preset() };
         let surface = LayerLook { shown: true, ..SceneLayer::Surface.preset() };
-        let look = SceneLook::default().with(SceneLayer::Membrane, hidden);
-        rig.send(SettingsCommand::SetScene(look.clone()));
+        rig.send(prefer(move |s| s.scene.set(SceneLayer::Membrane, hidden)));
         rig.shoot(&format!("{name}-3d-distance-alone"));
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
-        rig.send(SettingsCommand::SetScene(look.clone().with(SceneLayer::Surface, surface)));
+        rig.send(prefer(move |s| s.scene.set(SceneLayer::Surface, surface)));
         rig.shoot(&format!("{name}-3d-surface"));
         let section = Section { axis: SectionAxis::Tool, at_m: 0.0, flipped: false };
         rig.send(Command::Workbench(WorkbenchCommand::SetSection(Some(section))));
-        rig.send(SettingsCommand::SetScene(SceneLook { only_window: true, orthographic: true, ..look }));
+        rig.send(prefer(move |s| (s.scene.only_window, s.scene.orthographic) = (true, true)));
         rig.shoot(&format!("{name}-3d-section"));
-        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.send(prefer(|s| s.theme = Theme::Light));
         rig.shoot(&format!("{name}-3d-light"));
     }
 }
@@ -214,20 +212,21 @@ fn pictures_of_the_3d_views() {
 fn pictures_of_the_comparison() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(LibraryCommand::Select(PairId(30)));
         rig.send(PredictCommand::Generate);
         for workspace in [Workspace::Inspect, Workspace::Align] {
-            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(prefer(move |s| s.workspace = workspace));
             rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Compare)));
             for mode in VersusMode::iter() {
-                let (a, b) = ("prediction:seed=7,steps=8".parse().unwrap(), "prediction".parse().unwrap());
-                let b = if mode.is_3d() { Subject::Measured } else { b };
-                rig.send(SettingsCommand::SetVersus(Versus { a, b, mode }));
+                let a: Subject = "prediction:seed=7,steps=8".parse().unwrap();
+                let b = "prediction".parse().unwrap();
+                let b: Subject = if mode.is_3d() { Subject::Measured } else { b };
+                rig.send(prefer(move |s| *s.versus_mut() = Versus { a: a.clone(), b: b.clone(), mode }));
                 rig.shoot(&format!("{name}-compare-{workspace:?}-{mode:?}").to_lowercase());
             }
         }
-        rig.send(SettingsCommand::SetTheme(Theme::Light));
+        rig.send(prefer(|s| s.theme = Theme::Light));
         rig.shoot(&format!("{name}-compare-light"));
     }
 }

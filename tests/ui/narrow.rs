@@ -1,12 +1,13 @@
 //! A window of 1024 x 700 points: nothing stands beyond its pane, in any workspace and any pane.
 
 use std::collections::BTreeMap;
+use touch2touch::app::settings::prefer;
 
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Rect, pos2, vec2};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, Pane, PredictCommand, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{Command, Pane, PredictCommand, UiRequest, ViewCommand};
 use touch2touch::app::settings::Workspace;
 
 use super::rig::Rig;
@@ -60,15 +61,15 @@ fn beyond(rig: &Rig) -> Vec<String> {
 #[test]
 fn no_control_is_cut_off_in_a_window_of_1024_by_700() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     let mut found = Vec::new();
     for workspace in Workspace::iter() {
-        rig.send(SettingsCommand::SetWorkspace(workspace));
+        rig.send(prefer(move |s| s.workspace = workspace));
         rig.shoot(&format!("narrow-{}", workspace.name()).to_lowercase());
         for pane in Pane::of(workspace) {
             rig.send(Command::View(ViewCommand::Ui(UiRequest::ShowPane(pane))));
-            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(prefer(move |s| s.workspace = workspace));
             assert!(rig.harness.state().state().selection.panes.contains(&pane), "{workspace:?} {pane:?}");
             rig.shoot(&format!("narrow-{}-{pane:?}", workspace.name()).to_lowercase());
             let cut = beyond(&rig);

@@ -2,10 +2,11 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, SettingsCommand, TasksCommand};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::grid::Mask;
@@ -23,9 +24,9 @@ fn state(rig: &Rig) -> &State {
 }
 
 fn desk(rig: &mut Rig) {
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
-    rig.send(SettingsCommand::SetPerson("Anna".into()));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
+    rig.send(prefer(|s| s.person = "Anna".into()));
 }
 
 fn press(rig: &mut Rig, modifiers: Modifiers, key: Key) {
@@ -116,7 +117,7 @@ fn drawn(rig: &Rig) -> Option<Mask> {
 fn what_was_done_comes_back_without_its_mask_and_is_compared_with_it() {
     let Some(mut rig) = Rig::new(SIZE, 7) else { return };
     desk(&mut rig);
-    rig.send(SettingsCommand::SetRepeats(100.0));
+    rig.send(prefer(|s| s.repeats_percent = 100.0));
     let store = MaskStore::for_dataset(&Dataset::open(&rig.data).unwrap()).unwrap();
     let first = state(&rig).pair_name().to_owned();
     let mut done = 0;

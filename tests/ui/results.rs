@@ -2,10 +2,11 @@
 
 use eframe::egui::{self, Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Figure;
 
@@ -17,8 +18,8 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 2);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     assert!(rig.harness.state().state().selection.panes.contains(&Pane::Results));
     rig.shoot("results-before");
 
@@ -153,8 +154,8 @@ fn the_worst_pair_is_found_in_a_few_actions() {
 fn pictures_of_the_results() {
     for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
         let Some(mut rig) = Rig::live(size, Place::Path("test-set".into())) else { return };
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Evaluate));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
         rig.shoot(&format!("{name}-results-empty"));
         rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
         rig.shoot(&format!("{name}-fit-empty"));

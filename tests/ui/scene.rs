@@ -3,8 +3,9 @@
 use eframe::egui::{Event, Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{SettingsCommand, WorkbenchCommand};
+use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{LayerLook, SceneLayer};
 use touch2touch::app::state::State;
 use touch2touch::app::workbench::{Layer, SectionAxis};
@@ -86,8 +87,7 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     rig.click_at(dots);
     rig.shoot("test-layer-menu");
     let red = LayerLook { color: Some([250, 10, 10]), ..SceneLayer::Contact.preset() };
-    let scene = state(&rig).settings.scene.clone().with(SceneLayer::Contact, red);
-    rig.send(SettingsCommand::SetScene(scene));
+    rig.send(prefer(move |s| s.scene.set(SceneLayer::Contact, red)));
     assert!(colors(&mut rig).contains(&[250, 10, 10, 255]) || colors(&mut rig).len() > 100);
 }
 

@@ -1,8 +1,9 @@
 //! Several seeds: nothing runs out of sight; the grid, the spreads and the fan come with the predictions.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, SettingsCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand};
 use touch2touch::app::seeds::SeedsCommand;
+use touch2touch::app::settings::prefer;
 use touch2touch_core::ensemble::AngleFan;
 use touch2touch_core::rig::lab;
 
@@ -25,7 +26,7 @@ fn there(rig: &Rig) -> usize {
 #[test]
 fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     // Behind a tab: told to run, but nobody looks.
     rig.send(Command::Seeds(SeedsCommand::Run(true)));
     assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Seeds));

@@ -3,7 +3,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::SettingsCommand;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::app::state::State;
 
@@ -41,7 +41,7 @@ fn says(rig: &Rig, text: &str) -> bool {
 #[test]
 fn a_key_is_changed_by_a_click_and_a_key_and_survives_a_restart() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     press(&mut rig, Modifiers::NONE, Key::F1);
     find(&mut rig, "dark or");
     click(&mut rig, "Another key for Dark or light");
@@ -88,7 +88,7 @@ fn a_key_is_changed_by_a_click_and_a_key_and_survives_a_restart() {
 #[test]
 fn a_key_that_another_action_has_is_refused_or_taken_over() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     let keys = |rig: &Rig, action| state(rig).settings.keys.text(action);
     press(&mut rig, Modifiers::NONE, Key::F1);
     find(&mut rig, "dark or");
@@ -126,8 +126,8 @@ fn a_key_that_another_action_has_is_refused_or_taken_over() {
 fn the_sheet_begins_with_what_works_here_and_fits_the_window() {
     for size in [SIZE, [1024.0, 700.0]] {
         let Some(mut rig) = Rig::new(size, 1) else { return };
-        rig.send(SettingsCommand::DismissHint);
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         let over = rig.harness.get_by_label("3D view, measured").rect().center();
         rig.harness.hover_at(over);
         rig.harness.step();

@@ -1,9 +1,10 @@
 //! The training of the mask model in the studio: by clicks, to the same bundle as by the verb, in use without a restart.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Pane, SettingsCommand, TrainCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{Pane, TrainCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::train::TrainForm;
 use touch2touch_work::bundles::BundleKind;
@@ -19,8 +20,8 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     let data = folder.path().join("grasps");
     corrected(&data, 3);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
     let choice = TrainChoice { held_out_percent: 34, ..TrainChoice::default() };
     rig.send(TrainCommand::SetForm(TrainForm { choice, by_steps: true, steps: 12, ..TrainForm::default() }));

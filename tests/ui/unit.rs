@@ -1,9 +1,10 @@
 //! An STL in millimeters: it is said, one click accepts it, and nothing has to be opened anew.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, SettingsCommand};
+use touch2touch::app::command::{Command, LibraryCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::Workspace;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
 use touch2touch::app::tasks::Level;
 use touch2touch_work::io::dataset::ToolUnit;
@@ -25,11 +26,11 @@ fn a_click_reads_the_model_in_the_unit_that_fits() {
         stl::write(&file, &mesh).unwrap();
     }
     rig.restart(SIZE);
-    rig.send(SettingsCommand::DismissHint);
+    rig.send(prefer(|s| s.hint_dismissed = true));
     for size in [SIZE, [1024.0, 700.0]] {
         rig.harness.set_size(size.into());
         for workspace in [Workspace::Inspect, Workspace::Align] {
-            rig.send(SettingsCommand::SetWorkspace(workspace));
+            rig.send(prefer(move |s| s.workspace = workspace));
             rig.shoot(&format!("unit-{}-{}", workspace.name(), size[0]).to_lowercase());
         }
     }

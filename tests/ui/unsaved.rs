@@ -1,10 +1,10 @@
 //! Closing the window over labels that are not on the disk.
 
 use std::time::Duration;
+use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Event, Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::SettingsCommand;
 use touch2touch::app::labels::{Question, Review};
 use touch2touch::app::settings::Workspace;
 use touch2touch_work::io::dataset::Dataset;
@@ -41,8 +41,8 @@ impl Rig {
 
 /// Flags a pair whose labels cannot be written, by root neither: a file lies where their folder should be.
 fn stick(rig: &mut Rig) {
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     std::fs::write(rig.data.join(FOLDER), "in the way").unwrap();
     rig.harness.get_by_label(REVIEW).click();
     rig.settle();
@@ -119,8 +119,8 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
 #[test]
 fn a_data_set_that_is_renamed_under_the_studio_is_asked_about_and_nothing_is_made_in_its_place() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Label));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     let renamed = rig.data.with_file_name("renamed");
     std::fs::rename(&rig.data, &renamed).unwrap();
     rig.harness.get_by_label(REVIEW).click();

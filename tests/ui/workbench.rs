@@ -3,10 +3,9 @@
 use eframe::egui::{Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{
-    CameraPreset, Command, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
-};
+use touch2touch::app::command::{CameraPreset, Command, Pane, PredictCommand, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
@@ -74,10 +73,10 @@ impl Rig {
     /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
     pub(super) fn aligned() -> Option<Self> {
         let mut rig = Self::new(SIZE, 2)?;
-        rig.send(SettingsCommand::DismissHint);
+        rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(TasksCommand::LogSeen(u64::MAX));
-        rig.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
-        rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+        rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
+        rig.send(prefer(|s| s.workspace = Workspace::Align));
         rig.front("Layers");
         let middle = rig.in_view([0.5, 0.5]);
         rig.move_to(middle);
@@ -153,7 +152,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
     // After a restart it is still there.
     rig.restart(SIZE);
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
 }
 
@@ -295,12 +294,12 @@ fn layers_go_round_and_their_numbers_add_up() {
 #[test]
 fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(SettingsCommand::DismissHint);
-    rig.send(SettingsCommand::SetMaskSource(MaskSource::Truth));
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     // In Inspect there are 3D views, but neither layers nor poses per finger.
     assert!(rig.model().pose(MEASURED).ready().is_some());
     assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
-    rig.send(SettingsCommand::SetWorkspace(Workspace::Align));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
     rig.front("Layers");
     assert_eq!(rig.model().results.layers.len(), 1, "for the side in hand, not for both");
     assert!(!rig.model().selection.panes.contains(&Pane::Poses));

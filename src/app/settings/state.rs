@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::action::Bindings;
+use super::super::action::{Action, Bindings};
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::library::state::Place;
 use scene::SceneLook;
@@ -157,6 +157,11 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// What is compared with what, in the workspace in front.
+    pub fn versus_mut(&mut self) -> &mut Versus {
+        self.versus.entry(self.workspace).or_default()
+    }
+
     /// These preferences, with what is of the person and the machine as `person` has it: a case brings none of that.
     #[must_use]
     pub fn of_person(self, person: &Self) -> Self {
@@ -436,16 +441,8 @@ impl Default for MaskSettings {
 impl MaskSettings {
     /// What the tool in hand draws with, and what it makes of the pixels; `None` where it draws nothing.
     pub fn drawing(&self) -> Option<(DrawTool, Paint)> {
-        let brush = DrawTool::Brush { radius_px: self.radius_px };
-        Some(match self.tool {
-            MaskTool::Brush => (brush, self.paint),
-            MaskTool::Eraser => (brush, Paint::Free),
-            MaskTool::Lasso => (DrawTool::Lasso, self.paint),
-            MaskTool::Polygon => (DrawTool::Polygon, self.paint),
-            MaskTool::Rectangle => (DrawTool::Rectangle, self.paint),
-            MaskTool::Wand => (DrawTool::Wand { tolerance_m: self.wand_m }, self.paint),
-            MaskTool::Pan => return None,
-        })
+        let paint = if self.tool == MaskTool::Eraser { Paint::Free } else { self.paint };
+        Some((self.tool.row(self).draws?, paint))
     }
 
     /// A clean-up of a kind with the size that is set.
@@ -495,17 +492,35 @@ pub enum MaskTool {
     Pan,
 }
 
-impl MaskTool {
+/// A row of the table of tools.
+pub struct ToolRow {
     /// The name on screen.
-    pub fn name(self) -> &'static str {
+    pub name: &'static str,
+    /// The action that takes the tool in hand.
+    pub action: Action,
+    /// What it draws with; `None` = nothing.
+    pub draws: Option<DrawTool>,
+    /// How it is used; empty for a tool with a number, which stands in its place.
+    pub hint: &'static str,
+}
+
+impl MaskTool {
+    /// The table: a tool with its numbers.
+    pub fn row(self, mask: &MaskSettings) -> ToolRow {
+        let row = |name, action, draws, hint| ToolRow { name, action, draws, hint };
+        let brush = Some(DrawTool::Brush { radius_px: mask.radius_px });
+        let wand = Some(DrawTool::Wand { tolerance_m: mask.wand_m });
+        let corner = "Corner by corner; the first closes it";
         match self {
-            Self::Brush => "Brush",
-            Self::Eraser => "Eraser",
-            Self::Lasso => "Lasso",
-            Self::Polygon => "Polygon",
-            Self::Rectangle => "Rectangle",
-            Self::Wand => "Wand",
-            Self::Pan => "Pan",
+            Self::Brush => row("Brush", Action::Brush, brush, ""),
+            Self::Eraser => row("Eraser", Action::Eraser, brush, ""),
+            Self::Lasso => row("Lasso", Action::Lasso, Some(DrawTool::Lasso), "Around it in one line"),
+            Self::Polygon => row("Polygon", Action::Polygon, Some(DrawTool::Polygon), corner),
+            Self::Rectangle => {
+                row("Rectangle", Action::RectangleTool, Some(DrawTool::Rectangle), "From corner to corner")
+            }
+            Self::Wand => row("Wand", Action::Wand, wand, ""),
+            Self::Pan => row("Pan", Action::PanTool, None, "Moves the picture, draws nothing"),
         }
     }
 }

@@ -1,5 +1,6 @@
 //! The color bar under the pictures, and the offer to fit its range.
 
+use crate::app::settings::prefer;
 use eframe::egui::{Button, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use super::{map_of, scale_note};
@@ -79,10 +80,10 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
         Some(Asked::Range(r)) => {
-            cx.push(SettingsCommand::SetRange(ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..range }));
+            cx.push(prefer(move |s| s.range = ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..s.range }));
         }
         Some(Asked::Auto) => cx.push(SettingsCommand::RangeFromShown),
-        Some(Asked::Lock(locked)) => cx.push(SettingsCommand::SetRange(ColorRange { locked, ..range })),
+        Some(Asked::Lock(locked)) => cx.push(prefer(move |s| s.range.locked = locked)),
         None => {}
     }
 }

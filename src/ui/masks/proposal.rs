@@ -1,11 +1,11 @@
 //! What proposes a mask, and what becomes of the proposal.
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, Ui};
 use strum::IntoEnumIterator as _;
 
 use super::slider_mm;
 use crate::app::action::Action;
-use crate::app::command::SettingsCommand;
 use crate::app::settings::ProposalSource;
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
@@ -52,7 +52,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
         for_all(cx, ui);
     }
     if new != *settings {
-        cx.push(SettingsCommand::SetMask(new));
+        cx.push(prefer(move |s| s.mask = new.clone()));
     }
 }
 

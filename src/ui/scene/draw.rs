@@ -71,12 +71,13 @@ pub(super) fn show(
         (!modifiers.shift).then(|| LabelsCommand::BeginIn3d(Box::new(begin)))
     });
     let reach = format!("draws on {}", layers.name());
-    let tool = match state.settings.mask.tool {
-        tool @ (MaskTool::Brush | MaskTool::Eraser) => {
-            let radius_mm = f64::from(state.settings.mask.radius_px) / state.rig().depth_px_per_mm();
-            format!("{}, radius {}", tool.name(), units::text_mm(radius_mm * 1e-3))
+    let row = state.settings.mask.tool.row(&state.settings.mask);
+    let tool = match row.draws {
+        Some(DrawTool::Brush { radius_px }) => {
+            let radius_mm = f64::from(radius_px) / state.rig().depth_px_per_mm();
+            format!("{}, radius {}", row.name, units::text_mm(radius_mm * 1e-3))
         }
-        tool => tool.name().to_owned(),
+        _ => row.name.to_owned(),
     };
     let turn = "Shift + drag turns, the middle button moves";
     let font = FontId::proportional(11.0);
@@ -90,7 +91,7 @@ pub(super) fn show(
     }
     if output.pointer.is_some() {
         let point = cx.shared.readout.take().filter(|_| meant.is_some());
-        let reach = format!("{} {reach}", state.settings.mask.tool.name());
+        let reach = format!("{} {reach}", row.name);
         cx.shared.readout = Some(point.map_or(reach.clone(), |point| format!("{point}   {reach}")));
     }
 }

@@ -1,5 +1,6 @@
 //! The list of what a 3D view draws: what each color means, and switches for it; below it the bar of the color map.
 
+use crate::app::settings::prefer;
 use eframe::egui::containers::menu::MenuButton;
 use eframe::egui::{
     self, Align2, Button, Color32, DragValue, FontId, Painter, Rect, RichText, Role, Sense, Slider, Stroke, Ui,
@@ -8,7 +9,6 @@ use eframe::egui::{
 use strum::IntoEnumIterator as _;
 
 use super::{Memory, build, ghost, layers, other_side, steps};
-use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
 use crate::app::workbench::Layer;
@@ -146,13 +146,12 @@ fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
         let text =
             ui.add(text).on_hover_text("Shows or hides it; the dots at its right change color, size and opacity");
         if swatch.clicked() || text.clicked() {
-            let changed = scene.clone().with(layer, LayerLook { shown: !shown, ..look });
-            cx.push(SettingsCommand::SetScene(changed));
+            cx.push(prefer(move |s| s.scene.set(layer, LayerLook { shown: !shown, ..look })));
         }
         let dots = Button::new(RichText::new("…").size(SMALL).color(cx.p.weak)).frame(false);
         let (menu, _) = MenuButton::from_button(dots).ui(ui, |ui| {
             if let Some(changed) = change(ui, row, layer, look, cx.p.weak) {
-                cx.push(SettingsCommand::SetScene(cx.state.settings.scene.clone().with(layer, changed)));
+                cx.push(prefer(move |s| s.scene.set(layer, changed)));
             }
         });
         menu.accessible_name(format!("Look of {name}"));
@@ -256,7 +255,7 @@ pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: 
                 (mm, changed) = (1.0, true);
             }
             if changed {
-                cx.push(SettingsCommand::SetScene(SceneLook { distance_m: (mm * 1e-3) as f32, ..look.clone() }));
+                cx.push(prefer(move |s| s.scene.distance_m = (mm * 1e-3) as f32));
             }
             ui.label(caption("distance", cx.p));
         });

@@ -1,11 +1,11 @@
 //! The plane that cuts 3D views open: its axis, its place, its side.
 
+use crate::app::settings::prefer;
 use eframe::egui::{Button, RichText, Slider, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
-use crate::app::command::{Command, SettingsCommand};
+use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
-use crate::app::settings::SceneLook;
 use crate::app::workbench::{SECTION_REACH_M, Section, SectionAxis, WorkbenchCommand};
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
@@ -55,8 +55,7 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         }
         if only_window {
             ui.label(caption("GelSlim's window only", cx.p));
-            let whole = SceneLook { only_window: false, ..cx.state.settings.scene.clone() };
-            close(cx, ui, "Show all", SettingsCommand::SetScene(whole).into());
+            close(cx, ui, "Show all", prefer(|s| s.scene.only_window = false).into());
         }
     });
 }

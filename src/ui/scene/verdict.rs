@@ -1,11 +1,11 @@
 //! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
 
+use crate::app::settings::prefer;
 use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
 use crate::app::action::Action;
-use crate::app::command::SettingsCommand;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::MaskSource;
 use crate::app::state::{Absent, Lookup, State};
@@ -51,7 +51,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         }
         let tip = "Marks what is deeper than the threshold as contact, here and on the other pairs";
         if !threshold && offer("Use threshold", tip) {
-            cx.push(SettingsCommand::SetMaskSource(MaskSource::Threshold));
+            cx.push(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
         }
     }
     // The CAD model is in another unit: it is said in which, and that is all.

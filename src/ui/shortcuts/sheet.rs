@@ -1,12 +1,13 @@
 //! The sheet of all actions and their keys: what works here first, then the rest by group. A click on a key waits for
 //! another one.
 
+use crate::app::settings::prefer;
 use eframe::egui::{self, Button, Event, Key as EKey, Layout, RichText, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::key_named;
 use crate::app::action::{Action, Group, Shortcut};
-use crate::app::command::{SettingsCommand, ViewCommand};
+use crate::app::command::ViewCommand;
 use crate::app::pane::Pane;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption, section};
@@ -82,7 +83,7 @@ pub(in crate::ui) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Me
                 let changed = Action::iter().any(|action| cx.keys().is_changed(action));
                 let all = ui.add_enabled(changed, Button::new("All defaults"));
                 if all.on_hover_text("Gives all actions their default keys back").clicked() {
-                    cx.push(SettingsCommand::ResetKeys(None));
+                    cx.push(prefer(move |s| s.keys.reset(None)));
                     memory.asking = Asking::Nothing;
                 }
             });
@@ -133,7 +134,7 @@ fn listen(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
         (Some(by), _) => Asking::Used(action, shortcut, by),
         (None, Some(by)) if by != action => Asking::Held(action, place, shortcut, by),
         _ => {
-            cx.push(SettingsCommand::BindKey { action, place, shortcut: Some(shortcut) });
+            cx.push(prefer(move |s| s.keys.bind(action, place, Some(shortcut))));
             Asking::Nothing
         }
     };
@@ -153,7 +154,7 @@ fn question(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
                     let now = cx.keys().all(action).get(place).map(|key| format!(", now {key}")).unwrap_or_default();
                     ui.label(format!("Press the new key of {}{now}. Esc leaves it as it is.", action.name()));
                     if !now.is_empty() && ui.button("No key").on_hover_text("Takes this key away").clicked() {
-                        cx.push(SettingsCommand::BindKey { action, place, shortcut: None });
+                        cx.push(prefer(move |s| s.keys.bind(action, place, None)));
                         memory.asking = Asking::Nothing;
                     }
                 }
@@ -162,7 +163,7 @@ fn question(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
                     let take = format!("Give it to {}", action.name());
                     let tip = format!("{} keeps no key, or its other one", by.name());
                     if ui.button(take).on_hover_text(tip).clicked() {
-                        cx.push(SettingsCommand::BindKey { action, place, shortcut: Some(shortcut) });
+                        cx.push(prefer(move |s| s.keys.bind(action, place, Some(shortcut))));
                         memory.asking = Asking::Nothing;
                     }
                     if ui.button("Leave it").on_hover_text("Changes nothing").clicked() {
@@ -268,7 +269,7 @@ fn row(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, memory: &mut Memory) {
                 keys => format!("Back to {}, as far as no other action was given it", keys.join(", ")),
             };
             if back.accessible_name(format!("Default key of {name}")).on_hover_text(tip).clicked() {
-                cx.push(SettingsCommand::ResetKeys(Some(action)));
+                cx.push(prefer(move |s| s.keys.reset(Some(action))));
                 memory.asking = Asking::Nothing;
             }
         }

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
+use touch2touch::app::settings::prefer;
 
 use glam::{DVec3, Mat4};
 use proptest::prelude::*;
@@ -31,8 +32,8 @@ use touch2touch::app::results::ambiguity::AmbiguityKey;
 use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
-    ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource, MaskTool,
-    SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
+    Change, ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource,
+    MaskTool, SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::train::{Train, TrainForm};
@@ -124,7 +125,9 @@ fn section() -> impl Strategy<Value = Section> {
 fn scene() -> impl Strategy<Value = SceneLook> {
     (any_of::<SceneLayer>(), [number(), number(), number()], any::<bool>()).prop_map(|(layer, [a, b, c], on)| {
         let look = LayerLook { shown: on, color: None, opacity: a, size: LayerSize::Mm(b) };
-        SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() }.with(layer, look)
+        let mut scene = SceneLook { distance_m: c, eye_dome: on, ..SceneLook::default() };
+        scene.set(layer, look);
+        scene
     })
 }
 
@@ -200,6 +203,48 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
     (any_of::<MaskTool>(), any_of::<MaskSource>(), number(), number()).prop_map(|(tool, source, radius_px, percent)| {
         let choice = MaskChoice { source, top_percent: percent, ..MaskChoice::default() };
         MaskSettings { tool, radius_px, choice, ..MaskSettings::default() }
+    })
+}
+
+/// Something that a person changes about the preferences.
+fn change() -> impl Strategy<Value = Change> {
+    let range = (number(), number(), any::<bool>());
+    let range = range.prop_map(|(min_m, max_m, locked)| ColorRange { min_m, max_m, locked });
+    let person = select(vec![String::new(), " Anna ".into(), "x".repeat(200)]);
+    let key = (any_of::<Action>(), 0usize..4, proptest::option::of(shortcut()));
+    prop_oneof![
+        1 => any_of::<Theme>().prop_map(|v| prefer(move |s| s.theme = v)),
+        1 => number().prop_map(|v| prefer(move |s| s.ui_zoom = v)),
+        1 => range.prop_map(|v| prefer(move |s| s.range = v)),
+        1 => any_of::<ColorMap>().prop_map(|v| prefer(move |s| s.color_map = v)),
+        1 => shift().prop_map(|v| prefer(move |s| s.shift = v)),
+        1 => generate().prop_map(|v| prefer(move |s| s.generate = v.clone())),
+        1 => mask().prop_map(|v| prefer(move |s| s.mask = v.clone())),
+        4 => any_of::<MaskTool>().prop_map(|v| prefer(move |s| s.mask.tool = v)),
+        3 => any_of::<Paint>().prop_map(|v| prefer(move |s| s.mask.paint = v)),
+        2 => any_of::<MaskSource>().prop_map(|v| prefer(move |s| s.mask.choice.source = v)),
+        1 => number().prop_map(|v| prefer(move |s| s.mask.radius_px = v)),
+        1 => any::<[bool; 6]>().prop_map(|[visible, outline, footprint, ghosts, linked, hint]| {
+            prefer(move |s| {
+                (s.mask_visible, s.mask_outline, s.footprint_visible) = (visible, outline, footprint);
+                (s.ghosts, s.cameras_linked, s.hint_dismissed) = (ghosts, linked, hint);
+            })
+        }),
+        1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
+        1 => registration().prop_map(|v| prefer(move |s| s.pose_engine = v)),
+        1 => any_of::<EngineChoice>().prop_map(|v| prefer(move |s| s.runtime = v)),
+        1 => person.prop_map(|v| prefer(move |s| s.person = v.clone())),
+        1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
+        1 => any::<u32>().prop_map(|v| prefer(move |s| s.cache_mib = v)),
+        1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
+        1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
+        1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
+        1 => key.prop_map(|(action, place, key)| prefer(move |s| s.keys.bind(action, place, key))),
+        1 => proptest::option::of(any_of::<Action>()).prop_map(|v| prefer(move |s| s.keys.reset(v))),
+    ]
+    .prop_map(|command| match command {
+        SettingsCommand::Change(change) => change,
+        other => unreachable!("{other:?}"),
     })
 }
 
@@ -515,38 +560,9 @@ draws! {
         1 Use,
     }
     settings: SettingsCommand {
-        1 SetTheme(any_of::<Theme>()),
-        1 SetUiZoom(number()),
-        1 SetRange((number(), number(), any::<bool>())
-            .prop_map(|(min_m, max_m, locked)| ColorRange { min_m, max_m, locked })),
+        24 Change(change()),
         1 RangeFromShown,
-        1 SetColorMap(any_of::<ColorMap>()),
-        1 SetShift(shift()),
-        1 SetGenerate(generate()),
-        1 SetMask(mask()),
-        4 SetMaskTool(any_of::<MaskTool>()),
-        1 LastMaskTool,
-        3 SetPaint(any_of::<Paint>()),
-        2 SetMaskSource(any_of::<MaskSource>()),
-        1 SetBrushRadius(number()),
-        1 SetMaskVisible(any::<bool>()),
-        1 SetMaskOutline(any::<bool>()),
-        1 SetMaskOpacity(number()),
-        1 SetFootprintVisible(any::<bool>()),
-        1 SetGhosts(any::<bool>()),
-        1 SetPoseEngine(registration()),
-        1 SetRuntime(any_of::<EngineChoice>()),
-        1 SetPerson(select(vec![String::new(), " Anna ".into(), "x".repeat(200)])),
-        1 SetRepeats(number()),
-        1 SetCacheBudget(any::<u32>()),
-        1 SetCamerasLinked(any::<bool>()),
-        1 SetScene(scene()),
-        1 SetVersus(versus()),
-        1 SetWorkspace(any_of::<Workspace>()),
         1 SetLayout(any_of::<Workspace>(), Just("{}".to_owned())),
-        1 BindKey(any_of::<Action>(), 0usize..4, proptest::option::of(shortcut())),
-        1 ResetKeys(proptest::option::of(any_of::<Action>())),
-        1 DismissHint,
         1 Remember(Just(Last { pair: "nowhere".into(), finger: 7, ..Last::default() })),
         1 ResetSettings,
     }

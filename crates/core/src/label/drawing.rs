@@ -74,6 +74,18 @@ impl<'a> Ground<'a> {
 }
 
 impl Drawing {
+    /// The name in the history of a mask.
+    pub fn name(&self) -> &'static str {
+        match (self.tool, self.paint) {
+            (DrawTool::Brush { .. }, Paint::Free) => "eraser stroke",
+            (DrawTool::Brush { .. }, _) => "brush stroke",
+            (DrawTool::Lasso, _) => "lasso",
+            (DrawTool::Polygon, _) => "polygon",
+            (DrawTool::Rectangle, _) => "rectangle",
+            (DrawTool::Wand { .. }, _) => "wand",
+        }
+    }
+
     /// A drawing that begins at a point.
     pub fn begin(tool: DrawTool, at_px: [f32; 2], paint: Paint) -> Self {
         // A corner that follows the pointer until it is set.

@@ -154,15 +154,13 @@ impl SceneLook {
         self.layers.get(&layer).copied().unwrap_or_else(|| layer.preset())
     }
 
-    /// With a layer drawn otherwise.
-    #[must_use]
-    pub fn with(mut self, layer: SceneLayer, look: LayerLook) -> Self {
+    /// Has a layer drawn otherwise.
+    pub fn set(&mut self, layer: SceneLayer, look: LayerLook) {
         if look == layer.preset() {
             self.layers.remove(&layer);
         } else {
             self.layers.insert(layer, look);
         }
-        self
     }
 
     /// Numbers brought into range.
@@ -187,13 +185,15 @@ mod tests {
     #[test]
     fn what_is_not_a_number_comes_back_into_range_and_presets_are_not_stored() {
         let broken = LayerLook { opacity: f32::NAN, size: LayerSize::Mm(-3.0), ..LayerLook::default() };
-        let look = SceneLook { distance_m: f32::INFINITY, ..SceneLook::default() }.with(SceneLayer::Contact, broken);
-        let look = look.validated();
+        let mut look = SceneLook { distance_m: f32::INFINITY, ..SceneLook::default() };
+        look.set(SceneLayer::Contact, broken);
+        let mut look = look.validated();
         assert_eq!(look.layer(SceneLayer::Contact).opacity, 1.0);
         assert_eq!(look.layer(SceneLayer::Contact).size, LayerSize::Mm(0.1));
         assert_eq!(look.distance_m, 0.001);
         let text = serde_json::to_string(&look).unwrap();
         assert_eq!(serde_json::from_str::<SceneLook>(&text).unwrap(), look);
-        assert!(look.with(SceneLayer::Contact, SceneLayer::Contact.preset()).layers.is_empty());
+        look.set(SceneLayer::Contact, SceneLayer::Contact.preset());
+        assert!(look.layers.is_empty());
     }
 }
