@@ -11,7 +11,7 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::Figure;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
@@ -97,7 +97,7 @@ fn a_second_evaluation_computes_nothing_and_says_the_same() {
     let without_time = |evaluation: &Evaluation| {
         let mut still = evaluation.clone();
         for row in &mut still.rows {
-            row.groups.iter_mut().for_each(|group| group.seconds = None);
+            row.groups.iter_mut().for_each(|group| _ = group.figures.remove("seconds"));
         }
         still.scores.iter_mut().flat_map(|s| &mut s.grasps).for_each(|grasp| grasp.seconds = None);
         text(&still)
@@ -145,7 +145,7 @@ fn the_studio_shows_the_scores_of_the_last_time_at_once() {
     assert!(again.table.result.is_none());
     let values = |state: &State| {
         let sources = state.table.scores.sources.iter();
-        let of = |pair: u32| sources.clone().map(move |s| Figure::iter().map(|f| s.value(PairId(pair), f)).collect());
+        let of = |pair: u32| sources.clone().map(move |s| Metric::iter().map(|f| s.value(PairId(pair), f)).collect());
         (0..2).flat_map(of).collect::<Vec<Vec<Option<f64>>>>()
     };
     assert_eq!(values(&again), values(&made));

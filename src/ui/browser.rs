@@ -20,7 +20,7 @@ use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
 use crate::app::tasks::TaskKind;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::Figure;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::units::counted;
 use touch2touch_work::queue::QueueBy;
 
@@ -174,18 +174,18 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
 /// ordered by what is uncertain.
 fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let table = &cx.state.table;
-    let Some((by, figure)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
+    let Some((by, metric)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
     let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
     let mut next = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         let direction = 52.0;
         let width = ui.available_width() - direction - 8.0;
-        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(figure.name());
+        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(metric.name());
         let response = combo.show_ui(ui, |ui| {
-            for f in by.figures() {
-                if ui.selectable_label(f == figure, f.name()).on_hover_text(f.tip()).clicked() {
-                    next = Some(ScoreChoice { figure: Some(f), ..chosen.clone() });
+            for f in by.metrics() {
+                if ui.selectable_label(f == metric, f.name()).on_hover_text(f.tip()).clicked() {
+                    next = Some(ScoreChoice { metric: Some(f), ..chosen.clone() });
                 }
             }
         });
@@ -353,10 +353,10 @@ pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
 }
 
 /// The color of a score: by size where that means something on its own, else by how it stands among the others.
-pub(super) fn score_color(p: &Palette, source: &SourceScores, figure: Figure, value: f64) -> Color32 {
-    match (figure, source.standing(figure, value)) {
-        (Figure::Angle, _) if value.is_nan() => p.wrong,
-        (Figure::Angle, _) => error_color(p, value),
+pub(super) fn score_color(p: &Palette, source: &SourceScores, metric: Metric, value: f64) -> Color32 {
+    match (metric, source.standing(metric, value)) {
+        (Metric::Angle, _) if value.is_nan() => p.wrong,
+        (Metric::Angle, _) => error_color(p, value),
         (_, Standing::Worst) => p.wrong,
         (_, Standing::Poor) => p.caution,
         (_, Standing::Fine) => p.text,
@@ -440,17 +440,6 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     }
 }
 
-/// A figure in a word, beside its value.
-fn reason(figure: Figure) -> &'static str {
-    match figure {
-        Figure::Disagreement => "hand/model",
-        Figure::Unsure => "unsure",
-        Figure::SeedSpread => "seeds",
-        Figure::Angle => "angle",
-        other => other.name(),
-    }
-}
-
 /// A sheet with lines: the pair has a note.
 fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
     painter.rect_stroke(
@@ -474,11 +463,11 @@ fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
             rank if rank > 0.7 => cx.p.caution,
             _ => cx.p.text,
         };
-        return Some((format!("{} {}", reason(part.figure), part.figure.text(part.value)), color));
+        return Some((format!("{} {}", part.metric.short(), part.metric.text(part.value)), color));
     }
-    let (source, figure) = table.by()?;
-    let value = source.value(pair, figure)?;
-    Some((figure.text(value), score_color(cx.p, source, figure, value)))
+    let (source, metric) = table.by()?;
+    let value = source.value(pair, metric)?;
+    Some((metric.text(value), score_color(cx.p, source, metric, value)))
 }
 
 /// The picture of a pair's measured imprint, if it is there.

@@ -182,7 +182,7 @@ impl Best {
             let values: Vec<f64> = figures
                 .iter()
                 .filter(|(row, _)| competes(row))
-                .filter_map(|(_, f)| Some((column.get)(f)?.value))
+                .filter_map(|(_, f)| Some(f.get(column)?.value))
                 .collect();
             let pick = if column.larger_is_better { f64::max } else { f64::min };
             (values.len() > 1).then(|| values.into_iter().reduce(pick)).flatten()
@@ -227,7 +227,7 @@ fn line(
     };
     put(numbers[0], &figures.grasps.to_string(), cx.p.weak);
     for ((column, cell), best) in shown.iter().zip(&numbers[1..]).zip(&best.0) {
-        let Some(e) = (column.get)(figures) else {
+        let Some(e) = figures.get(column) else {
             put(*cell, "–", cx.p.weak);
             continue;
         };
@@ -240,7 +240,7 @@ fn line(
         put(*cell, &format!("{:.1$}", e.value, column.decimals), color);
     }
     let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
-    for (column, e) in all.iter().filter_map(|c| Some((c, (c.get)(figures)?))) {
+    for (column, e) in all.iter().filter_map(|c| Some((c, figures.get(c)?))) {
         let decimals = column.decimals;
         said += &format!("\n{} {:.decimals$}", column.heading, e.value);
         if let Some([low, high]) = e.interval {

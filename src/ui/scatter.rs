@@ -17,7 +17,7 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreTable, SourceScores};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::{Figure, mean};
+use touch2touch_core::evaluation::{Metric, mean};
 
 /// Room for the numbers of the axes, points.
 const MARGIN: [f32; 2] = [44.0, 30.0];
@@ -30,11 +30,11 @@ const BARS: usize = 24;
 /// Least and largest height of a tool's histogram, points.
 const STRIP: [f32; 2] = [16.0, 34.0];
 
-/// A score: a place among the sources, and a figure. Values are brought to the unit of the screen.
+/// A score: a place among the sources, and a metric. Values are brought to the unit of the screen.
 #[derive(Clone, Debug, PartialEq)]
 struct Axis {
     source: Arc<str>,
-    figure: Figure,
+    metric: Metric,
 }
 
 /// What the colors of the points mean.
@@ -43,7 +43,7 @@ enum Coloring {
     /// The tool.
     #[default]
     Tool,
-    /// The source: the two figures of every source, each in its color.
+    /// The source: the two metrics of every source, each in its color.
     Source,
 }
 
@@ -102,21 +102,21 @@ fn axes(scores: &ScoreTable, memory: &Memory) -> Option<[Axis; 2]> {
     let sources = &scores.sources;
     let first = sources.iter().find(|source| !source.upper_bound).or(sources.first())?;
     let bound = sources.iter().find(|source| source.upper_bound).unwrap_or(first);
-    let default = |source: &SourceScores, others: &[Figure]| {
-        let figure = others.iter().copied().find(|figure| source.has(*figure)).or_else(|| source.figures().next())?;
-        Some(Axis { source: source.name.clone(), figure })
+    let default = |source: &SourceScores, others: &[Metric]| {
+        let metric = others.iter().copied().find(|metric| source.has(*metric)).or_else(|| source.metrics().next())?;
+        Some(Axis { source: source.name.clone(), metric })
     };
     let there = |axis: &Option<Axis>| {
-        axis.clone().filter(|a| sources.iter().any(|source| source.name == a.source && source.has(a.figure)))
+        axis.clone().filter(|a| sources.iter().any(|source| source.name == a.source && source.has(a.metric)))
     };
-    let x = there(&memory.axes[0]).or_else(|| default(first, &[Figure::Angle, Figure::Ssim]))?;
+    let x = there(&memory.axes[0]).or_else(|| default(first, &[Metric::Angle, Metric::Ssim]))?;
     let y = there(&memory.axes[1]).or_else(|| {
-        let [same, other] = if bound.has(Figure::Angle) && bound.name != first.name {
-            [Figure::Angle, Figure::Psnr]
+        let [same, other] = if bound.has(Metric::Angle) && bound.name != first.name {
+            [Metric::Angle, Metric::Psnr]
         } else {
-            [Figure::Psnr, Figure::Ssim]
+            [Metric::Psnr, Metric::Ssim]
         };
-        default(if same == Figure::Angle { bound } else { first }, &[same, other])
+        default(if same == Metric::Angle { bound } else { first }, &[same, other])
     })?;
     Some([x, y])
 }
@@ -128,14 +128,14 @@ fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, 
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.label(caption(name, cx.p));
-            let text = format!("{}: {}", axis.figure.name(), short(scores, &axis.source));
+            let text = format!("{}: {}", axis.metric.name(), short(scores, &axis.source));
             let combo = egui::ComboBox::from_id_salt(("axis", at)).width(ui.available_width() - 8.0);
             let response = combo.selected_text(text).truncate().show_ui(ui, |ui| {
                 for source in &scores.sources {
                     ui.label(caption(&*source.name, cx.p));
-                    for figure in source.figures() {
-                        let this = Axis { source: source.name.clone(), figure };
-                        if ui.selectable_label(*axis == this, figure.name()).on_hover_text(figure.tip()).clicked() {
+                    for metric in source.metrics() {
+                        let this = Axis { source: source.name.clone(), metric };
+                        if ui.selectable_label(*axis == this, metric.name()).on_hover_text(metric.tip()).clicked() {
                             memory.axes[at] = Some(this.clone());
                             *axis = this;
                         }
@@ -152,7 +152,7 @@ fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, 
             for coloring in Coloring::iter() {
                 let tip = match coloring {
                     Coloring::Tool => "A color for each tool; the tooltip of a point names it",
-                    Coloring::Source => "The two figures of every source, in the colors of measured and predicted",
+                    Coloring::Source => "The two metrics of every source, in the colors of measured and predicted",
                 };
                 let chosen = memory.coloring == coloring;
                 if ui.selectable_label(chosen, coloring.name()).on_hover_text(tip).clicked() {
@@ -189,7 +189,7 @@ fn points(cx: &Cx<'_>, memory: &Memory, scores: &ScoreTable, axes: &[Axis; 2]) -
     let mut points = Vec::new();
     for source in series {
         for pair in &cx.state.library.order {
-            let value = |axis: usize| sources[source[axis]].value(*pair, axes[axis].figure).filter(|v| v.is_finite());
+            let value = |axis: usize| sources[source[axis]].value(*pair, axes[axis].metric).filter(|v| v.is_finite());
             let (Some(x), Some(y)) = (value(0), value(1)) else { continue };
             let color = match memory.coloring {
                 Coloring::Source if sources[source[0]].upper_bound => cx.p.truth,
@@ -200,7 +200,7 @@ fn points(cx: &Cx<'_>, memory: &Memory, scores: &ScoreTable, axes: &[Axis; 2]) -
                     at.map_or(cx.p.text, |at| tool_color(dark, at, tools.len()))
                 }
             };
-            points.push(Point { pair: *pair, at: [axes[0].figure.shown(x), axes[1].figure.shown(y)], color, source });
+            points.push(Point { pair: *pair, at: [axes[0].metric.shown(x), axes[1].metric.shown(y)], color, source });
         }
     }
     points
@@ -255,8 +255,8 @@ fn scatter(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTabl
     );
     let above = pos2(plot.left() + 4.0, plot.top() + 2.0);
     painter.text(above, Align2::LEFT_TOP, &titles[1], FontId::proportional(SMALL), p.text);
-    // One source against another by the same figure: on the line both are equal.
-    if axes[0].figure == axes[1].figure {
+    // One source against another by the same metric: on the line both are equal.
+    if axes[0].metric == axes[1].metric {
         let (low, high) = (xs[0].max(ys[0]), xs[1].min(ys[1]));
         painter.with_clip_rect(plot).line_segment([place([low, low]), place([high, high])], Stroke::new(1.0, p.line));
     }
@@ -279,9 +279,9 @@ fn scatter(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTabl
     let Some((_, point)) = near.filter(|(d, _)| *d <= NEAR).min_by(|a, b| a.0.total_cmp(&b.0)) else { return };
     painter.circle_stroke(place(point.at), 5.0, Stroke::new(1.5, p.strong));
     let value = |axis: usize| {
-        let (figure, v) = (axes[axis].figure, point.at[axis]);
+        let (metric, v) = (axes[axis].metric, point.at[axis]);
         let source = &scores.sources[point.source[axis]];
-        format!("{} {}: {:.*} {}", source.short(), figure.name(), figure.decimals(), v, figure.unit())
+        format!("{} {}: {:.*} {}", source.short(), metric.name(), metric.decimals(), v, metric.unit())
     };
     let name = cx.state.library.entry(point.pair).map_or("", |entry| &entry.name);
     let said = format!("{name}\n{}\n{}", value(0), value(1));
@@ -297,8 +297,8 @@ fn title(scores: &ScoreTable, memory: &Memory, axis: &Axis) -> String {
         Coloring::Source if !memory.by_tool => String::new(),
         Coloring::Source => format!("{} ", short(scores, &axis.source)),
     };
-    let unit = if axis.figure.unit().is_empty() { String::new() } else { format!(", {}", axis.figure.unit()) };
-    format!("{source}{}{unit}", axis.figure.name())
+    let unit = if axis.metric.unit().is_empty() { String::new() } else { format!(", {}", axis.metric.unit()) };
+    format!("{source}{}{unit}", axis.metric.name())
 }
 
 /// Numbers along the axes: the ends and the middle.
@@ -308,10 +308,10 @@ fn ticks(ui: &Ui, plot: Rect, xs: [f64; 2], ys: [f64; 2], axes: &[Axis; 2], text
     for (share, align) in [(0.0_f32, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)] {
         let value = |[low, high]: [f64; 2]| low + f64::from(share) * (high - low);
         let x = plot.left() + share * plot.width();
-        let label = tick(axes[0].figure, value(xs));
+        let label = tick(axes[0].metric, value(xs));
         painter.text(pos2(x, plot.bottom() + 2.0), align, label, font.clone(), text);
         let y = plot.bottom() - share * plot.height();
-        let label = tick(axes[1].figure, value(ys));
+        let label = tick(axes[1].metric, value(ys));
         let align = if share == 0.0 {
             Align2::RIGHT_BOTTOM
         } else if share == 1.0 {
@@ -326,8 +326,8 @@ fn ticks(ui: &Ui, plot: Rect, xs: [f64; 2], ys: [f64; 2], axes: &[Axis; 2], text
 }
 
 /// A number at an axis: nothing is no less than nothing.
-fn tick(figure: Figure, value: f64) -> String {
-    let text = format!("{value:.*}", figure.decimals());
+fn tick(metric: Metric, value: f64) -> String {
+    let text = format!("{value:.*}", metric.decimals());
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
         _ => text,
@@ -372,7 +372,7 @@ type ToolValues<'a> = (&'a str, Vec<(PairId, f64)>);
 fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
     let Some(source) = scores.sources.iter().find(|source| source.name == axis.source) else { return };
     let state = cx.state;
-    let figure = axis.figure;
+    let metric = axis.metric;
     let tools: Vec<&str> = match state.library.open.as_ref().map(|open| &open.tools) {
         Some(tools) if !tools.is_empty() => tools.iter().map(String::as_str).collect(),
         _ => vec![""],
@@ -381,18 +381,18 @@ fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
     let of = |tool: &str| {
         let pairs = (0u32..).map(PairId).zip(state.library.pairs());
         let pairs = pairs.filter(|(_, entry)| entry.tool.as_deref().unwrap_or("") == tool);
-        let value = |(pair, _)| Some((pair, figure.shown(source.value(pair, figure)?)));
+        let value = |(pair, _)| Some((pair, metric.shown(source.value(pair, metric)?)));
         pairs.filter_map(value).filter(|(_, v)| v.is_finite()).collect::<Vec<_>>()
     };
     let rows: Vec<ToolValues<'_>> = tools.iter().map(|tool| (*tool, of(tool))).filter(|(_, v)| !v.is_empty()).collect();
     let Some([low, high]) = range(rows.iter().flat_map(|(_, values)| values.iter().map(|(_, v)| *v))) else { return };
     let bar_of = |v: f64| (((v - low) / (high - low) * BARS as f64) as usize).min(BARS - 1);
-    let unit = if figure.unit().is_empty() { String::new() } else { format!(" {}", figure.unit()) };
-    let decimals = figure.decimals();
+    let unit = if metric.unit().is_empty() { String::new() } else { format!(" {}", metric.unit()) };
+    let decimals = metric.decimals();
     let line = format!(
         "{} {}: {low:.decimals$} to {high:.decimals$}{unit}; line: mean, dot: median. A click on a bar lists its pairs",
         source.short(),
-        figure.name()
+        metric.name()
     );
     ui.label(caption(line, cx.p));
     ui.spacing_mut().item_spacing.y = 2.0;

@@ -14,8 +14,9 @@ use crate::app::command::{LibraryCommand, Pane};
 use crate::app::evaluate::{ScoreChoice, SourceScores};
 use crate::app::library::{Sort, short_name};
 use crate::app::tasks::TaskKind;
+use strum::IntoEnumIterator as _;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::{Figure, mean};
+use touch2touch_core::evaluation::{Metric, mean};
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
@@ -25,26 +26,11 @@ const HEAD: f32 = 36.0;
 const NAMES: [f32; 2] = [90.0, 110.0];
 /// The least width of a number's column, points: what finds no room is left out.
 const NUMBER: f32 = 62.0;
-/// The figures that columns are made of, the most telling first.
-const FIGURES: [Figure; 11] = [
-    Figure::Angle,
-    Figure::Psnr,
-    Figure::Ssim,
-    Figure::Rms,
-    Figure::Tool,
-    Figure::PsnrNoiseFree,
-    Figure::SsimTool,
-    Figure::SsimNoiseFree,
-    Figure::Disagreement,
-    Figure::Unsure,
-    Figure::SeedSpread,
-];
-
 /// Nothing is kept between frames: the order is the list's.
 pub(super) type Memory = ();
 
 /// A column of numbers.
-type Column<'a> = (&'a SourceScores, Figure);
+type Column<'a> = (&'a SourceScores, Metric);
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
@@ -87,11 +73,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// The columns that there is room for, each source's together: the most telling figures of all sources first.
+/// The columns that there is room for, each source's together: the most telling metrics of all sources first.
 fn columns(sources: &[SourceScores], width: f32) -> Vec<Column<'_>> {
     let room = ((width - NAMES.iter().sum::<f32>() - 20.0) / NUMBER).max(1.0) as usize;
-    let telling = FIGURES.iter().flat_map(|figure| sources.iter().map(move |source| (source, *figure)));
-    let taken: Vec<Column<'_>> = telling.filter(|(source, figure)| source.has(*figure)).take(room).collect();
+    let metrics = Metric::iter().filter(|metric| *metric != Metric::Seconds);
+    let telling = metrics.flat_map(|metric| sources.iter().map(move |source| (source, metric)));
+    let taken: Vec<Column<'_>> = telling.filter(|(source, metric)| source.has(*metric)).take(room).collect();
     let of = |source: &SourceScores| {
         let name = source.name.clone();
         taken.iter().copied().filter(move |(taken, _)| taken.name == name).collect::<Vec<_>>()
@@ -129,7 +116,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
     let by = cx.state.table.by().filter(|_| cx.state.library.sort == Sort::Score);
     let best_first = cx.state.table.chosen.best_first;
     let mut above: Option<(&SourceScores, Rect)> = None;
-    for ((source, figure), cell) in columns.iter().zip(numbers) {
+    for ((source, metric), cell) in columns.iter().zip(numbers) {
         above = match above {
             Some((before, place)) if before.name == source.name => Some((before, place.union(cell))),
             before => {
@@ -137,14 +124,14 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
                 Some((source, cell))
             }
         };
-        let sorted = by.is_some_and(|(s, f)| s.name == source.name && f == *figure);
-        let response = ui.interact(cell, ui.scope_id().with((&source.name, figure)), Sense::click());
-        let name = format!("Sort by {} of {}", figure.name(), source.short());
+        let sorted = by.is_some_and(|(s, f)| s.name == source.name && f == *metric);
+        let response = ui.interact(cell, ui.scope_id().with((&source.name, metric)), Sense::click());
+        let name = format!("Sort by {} of {}", metric.name(), source.short());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &name));
         let color = if sorted || response.hovered() { p.strong } else { p.weak };
-        let text = match figure.unit() {
-            "" => heading(*figure).to_owned(),
-            unit => format!("{} {unit}", heading(*figure)),
+        let text = match metric.unit() {
+            "" => metric.short().to_owned(),
+            unit => format!("{} {unit}", metric.short()),
         };
         let right = pos2(cell.right() - 14.0, cell.center().y);
         let place = ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), color);
@@ -158,13 +145,13 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
         let tip = format!(
             "{}: {}\n{}. A click sorts the list, the worst first; another turns it round",
             source.name,
-            figure.name(),
-            figure.tip()
+            metric.name(),
+            metric.tip()
         );
         if response.on_hover_text(tip).clicked() {
             cx.push(LibraryCommand::SetScore(ScoreChoice {
                 source: Some(source.name.clone()),
-                figure: Some(*figure),
+                metric: Some(*metric),
                 best_first: sorted && !best_first,
             }));
         }
@@ -183,22 +170,6 @@ fn source_name(cx: &Cx<'_>, ui: &Ui, source: Option<(&SourceScores, Rect)>, rect
     ui.painter().text(right, Align2::RIGHT_CENTER, name, font.clone(), color);
 }
 
-/// A figure in a word.
-fn heading(figure: Figure) -> &'static str {
-    match figure {
-        Figure::Angle => "angle",
-        Figure::Rms => "RMS",
-        Figure::Tool => "tool",
-        Figure::PsnrNoiseFree => "clean",
-        Figure::SsimNoiseFree => "SSIM cl.",
-        Figure::SsimTool => "SSIM t.",
-        Figure::Disagreement => "hand/model",
-        Figure::Unsure => "unsure",
-        Figure::SeedSpread => "seeds",
-        Figure::Psnr | Figure::Ssim | Figure::Seconds => figure.name(),
-    }
-}
-
 /// The means over the pairs of the list.
 fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
@@ -206,12 +177,12 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
     let (names, numbers) = cells(rect, columns.len());
     let order = &cx.state.library.order;
     let left = pos2(names[0].left() + 6.0, rect.center().y);
-    let scored = |pair: &&PairId| columns.iter().any(|(source, figure)| source.value(**pair, *figure).is_some());
+    let scored = |pair: &&PairId| columns.iter().any(|(source, metric)| source.value(**pair, *metric).is_some());
     let what = format!("mean of {}", order.iter().filter(scored).count());
     ui.painter().text(left, Align2::LEFT_CENTER, what, FontId::proportional(SMALL), cx.p.weak);
-    for ((source, figure), cell) in columns.iter().zip(numbers) {
-        let values = order.iter().filter_map(|pair| source.value(*pair, *figure)).filter(|v| v.is_finite());
-        let text = mean(values).map_or("–".to_owned(), |mean| number(*figure, mean));
+    for ((source, metric), cell) in columns.iter().zip(numbers) {
+        let values = order.iter().filter_map(|pair| source.value(*pair, *metric)).filter(|v| v.is_finite());
+        let text = mean(values).map_or("–".to_owned(), |mean| number(*metric, mean));
         put(ui, cell, &text, cx.p.strong);
     }
     response.on_hover_text(
@@ -220,8 +191,8 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
 }
 
 /// A value without its unit, which the heading says.
-fn number(figure: Figure, value: f64) -> String {
-    if value.is_nan() { figure.text(value) } else { format!("{:.*}", figure.decimals(), figure.shown(value)) }
+fn number(metric: Metric, value: f64) -> String {
+    if value.is_nan() { metric.text(value) } else { format!("{:.*}", metric.decimals(), metric.shown(value)) }
 }
 
 fn put(ui: &Ui, cell: Rect, text: &str, color: Color32) {
@@ -253,9 +224,9 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, pair: PairId, columns: &[Column<'_>]) {
         let left = pos2(cell.left() + 6.0, cell.center().y);
         ui.painter_at(cell).text(left, Align2::LEFT_CENTER, text, font.clone(), color);
     }
-    for ((source, figure), cell) in columns.iter().zip(numbers) {
-        match source.value(pair, *figure) {
-            Some(value) => put(ui, cell, &number(*figure, value), score_color(p, source, *figure, value)),
+    for ((source, metric), cell) in columns.iter().zip(numbers) {
+        match source.value(pair, *metric) {
+            Some(value) => put(ui, cell, &number(*metric, value), score_color(p, source, *metric, value)),
             None => put(ui, cell, "–", p.weak),
         }
     }

@@ -8,7 +8,7 @@ use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::Figure;
+use touch2touch_core::evaluation::Metric;
 
 use super::rig::{Rig, write_dataset};
 
@@ -32,7 +32,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     assert_eq!((table.rows.len(), table.groups.len()), (1 + generators, 1), "the upper bound and every generator");
     let figures = &table.rows[1].groups[0];
     assert_eq!((figures.grasps, figures.images), (4, 8));
-    assert!(figures.psnr_db.unwrap().value > 15.0 && figures.success_10.is_some());
+    assert!(figures.named("psnr_db").unwrap().value > 15.0 && figures.named("success_10").is_some());
     let row = format!("{}: 4 grasps, 8 images", table.rows[1].method);
     rig.harness.get_by_label(&row);
     rig.shoot("results-after");
@@ -48,19 +48,19 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     assert!(out.join("evaluation.md").is_file());
 
     // The scores of all pairs are those of the table.
-    let value = |rig: &Rig, source: usize, pair: u32, figure: Figure| {
-        rig.harness.state().state().table.scores.sources[source].value(PairId(pair), figure)
+    let value = |rig: &Rig, source: usize, pair: u32, metric: Metric| {
+        rig.harness.state().state().table.scores.sources[source].value(PairId(pair), metric)
     };
     for (source, scores) in table.scores.iter().enumerate() {
         for grasp in &scores.grasps {
             let index = &rig.harness.state().state().library.open.as_ref().unwrap().source.clone();
             let pair = index.index().pairs.iter().position(|entry| entry.name == grasp.pair).unwrap() as u32;
-            assert_eq!(value(&rig, source, pair, Figure::Angle), grasp.angle_error_rad);
-            assert_eq!(value(&rig, source, pair, Figure::Psnr), grasp.figure(Figure::Psnr));
+            assert_eq!(value(&rig, source, pair, Metric::Angle), grasp.angle_error_rad);
+            assert_eq!(value(&rig, source, pair, Metric::Psnr), grasp.metric(Metric::Psnr));
         }
     }
-    // The worst first: by key, and the list says the figure.
-    let mut errors: Vec<f64> = (0..4).map(|pair| value(&rig, 1, pair, Figure::Angle).unwrap()).collect();
+    // The worst first: by key, and the list says the metric.
+    let mut errors: Vec<f64> = (0..4).map(|pair| value(&rig, 1, pair, Metric::Angle).unwrap()).collect();
     errors.sort_by(|a, b| b.total_cmp(a));
     for wanted in &errors[..2] {
         rig.harness.key_press_modifiers(Modifiers::NONE, Key::N);
@@ -78,7 +78,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     let heading = format!("Sort by PSNR of {generator}");
     let listed = |rig: &Rig| {
         let state = rig.harness.state().state();
-        state.library.order.iter().map(|pair| value(rig, 1, pair.0, Figure::Psnr).unwrap()).collect::<Vec<f64>>()
+        state.library.order.iter().map(|pair| value(rig, 1, pair.0, Metric::Psnr).unwrap()).collect::<Vec<f64>>()
     };
     for best_first in [false, true] {
         rig.harness.get_by_label(&heading).click();
@@ -141,9 +141,9 @@ fn the_worst_pair_is_found_in_a_few_actions() {
     act(&mut rig, &|rig| rig.harness.get_by_label("Predict all").click());
     act(&mut rig, &|rig| rig.harness.key_press_modifiers(Modifiers::NONE, Key::N));
     let state = rig.harness.state().state();
-    let (source, figure) = state.table.by().expect("everything is scored");
-    assert_eq!((source.scored, source.upper_bound, figure), (6, false, Figure::Angle));
-    let worst = (0..6).map(|pair| source.value(PairId(pair), figure).unwrap()).fold(0.0, f64::max);
+    let (source, metric) = state.table.by().expect("everything is scored");
+    assert_eq!((source.scored, source.upper_bound, metric), (6, false, Metric::Angle));
+    let worst = (0..6).map(|pair| source.value(PairId(pair), metric).unwrap()).fold(0.0, f64::max);
     assert_eq!(state.table.value(state.selection.pair.unwrap()), Some(worst));
     assert!(actions <= 8, "{actions} actions");
 }

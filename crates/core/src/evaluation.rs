@@ -7,7 +7,8 @@
 //!
 //! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay.
 
-mod figure;
+mod columns;
+mod metric;
 mod paper;
 mod write;
 
@@ -18,12 +19,14 @@ use serde::{Deserialize, Serialize};
 use super::catalog;
 use super::dataset::{PairEntry, Split};
 use super::label::Doubt;
-use super::metrics::{AngleSummary, Unstretched, frechet_distance};
+use super::metrics::{AngleSummary, Unstretched};
 use super::sample::Scale;
 
-pub use figure::{Condition, Figure};
+use columns::{COLUMNS, Of};
+pub use columns::{Column, NOTES, TableMetrics, columns, conventions};
+pub use metric::{Condition, Metric};
 pub use paper::paper_rows;
-pub use write::{Column, NOTES, columns, conventions, csv, latex, markdown, text};
+pub use write::{csv, latex, markdown, text};
 
 /// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;
@@ -173,79 +176,6 @@ pub struct Estimate {
     pub interval: Option<[f64; 2]>,
 }
 
-/// The figures of one method in one column group. `None`: cannot be there, as the notes say.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct TableMetrics {
-    /// The column group.
-    pub group: Group,
-    /// Tools averaged over.
-    pub tools: usize,
-    /// Grasps.
-    pub grasps: usize,
-    /// Images (fingers).
-    pub images: usize,
-    /// dB.
-    pub psnr_db: Option<Estimate>,
-    /// dB, against the simulator's imprint without camera noise.
-    pub psnr_noise_free_db: Option<Estimate>,
-    /// Of pictures whose scale was assumed, as they are: dB.
-    pub psnr_raw_db: Option<Estimate>,
-    /// SSIM likewise.
-    pub ssim_raw: Option<Estimate>,
-    /// Of such pictures after the straight line that fits best: dB.
-    pub psnr_line_db: Option<Estimate>,
-    /// With the range of the tool's predictions (the lab's).
-    pub ssim: Option<Estimate>,
-    /// With the range 0.0225 m.
-    pub ssim_peak: Option<Estimate>,
-    /// As `ssim`, against the simulator's imprint without camera noise.
-    pub ssim_noise_free: Option<Estimate>,
-    /// Fréchet distance to the measured imprints in the classifier's features.
-    pub frechet: Option<f64>,
-    /// Published FID: Inception features, another scale than `frechet`.
-    pub fid: Option<f64>,
-    /// Mean angle error, degrees, of the grasps that have a pose.
-    pub angle_deg: Option<Estimate>,
-    /// Grasps without a pose: failures.
-    pub without_pose: usize,
-    /// Percent of grasps within 5 degrees.
-    pub success_5: Option<Estimate>,
-    /// Percent of grasps within 10 degrees.
-    pub success_10: Option<Estimate>,
-    /// Percent of imprints whose tool the classifier names.
-    pub tool_accuracy: Option<Estimate>,
-    /// Median time to generate one image.
-    pub seconds: Option<f64>,
-}
-
-impl TableMetrics {
-    /// A group without figures.
-    pub fn empty(group: Group) -> Self {
-        Self {
-            group,
-            tools: 0,
-            grasps: 0,
-            images: 0,
-            psnr_db: None,
-            psnr_noise_free_db: None,
-            psnr_raw_db: None,
-            ssim_raw: None,
-            psnr_line_db: None,
-            ssim: None,
-            ssim_peak: None,
-            ssim_noise_free: None,
-            frechet: None,
-            fid: None,
-            angle_deg: None,
-            without_pose: 0,
-            success_5: None,
-            success_10: None,
-            tool_accuracy: None,
-            seconds: None,
-        }
-    }
-}
-
 /// A row of the table.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Row {
@@ -289,35 +219,18 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
     names.dedup();
     let tools: Vec<Vec<&GraspScore>> =
         names.iter().map(|name| grasps.iter().copied().filter(|g| g.tool.as_deref() == *name).collect()).collect();
-    let over = |figure: &dyn Fn(&[&GraspScore]) -> Option<f64>| estimate(&tools, figure, resamples);
-    let features: Vec<&[f32]> =
-        grasps.iter().flat_map(|g| &g.images).map(|i| i.features.as_slice()).filter(|f| !f.is_empty()).collect();
-    let mut seconds: Vec<f64> = grasps.iter().filter_map(|g| g.seconds).collect();
-    seconds.sort_by(f64::total_cmp);
-    let n = seconds.len();
+    let figure = |column: &Column| match &column.of {
+        Of::Tool(of) => estimate(&tools, *of, resamples),
+        Of::Group(of) => of(grasps, measured).map(|value| Estimate { value, interval: None }),
+        Of::Published => None,
+    };
     TableMetrics {
+        group,
         tools: tools.len(),
         grasps: grasps.len(),
-        images: grasps.iter().map(|g| g.images.len()).sum(),
-        psnr_db: over(&|tool| psnr(tool, |image| Some(image.error))),
-        psnr_noise_free_db: over(&|tool| psnr(tool, |image| image.noise_free)),
-        psnr_raw_db: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_raw_db))),
-        ssim_raw: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.ssim_raw))),
-        psnr_line_db: over(&|tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_line_db))),
-        ssim: over(&|tool| mean(images(tool).filter_map(|i| i.ssim))),
-        ssim_peak: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_peak))),
-        ssim_noise_free: over(&|tool| mean(images(tool).filter_map(|i| i.ssim_noise_free))),
-        frechet: frechet_distance(&features, measured),
-        fid: None,
-        angle_deg: over(&|tool| angles(tool)?.mean_deg),
+        images: images(grasps).count(),
         without_pose: grasps.iter().filter(|g| g.angle_error_rad.is_some_and(f64::is_nan)).count(),
-        success_5: over(&|tool| Some(angles(tool)?.success_5)),
-        success_10: over(&|tool| Some(angles(tool)?.success_10)),
-        tool_accuracy: over(&|tool| {
-            mean(images(tool).filter_map(|i| i.tool_right).map(|right| if right { 100.0 } else { 0.0 }))
-        }),
-        seconds: (n > 0).then(|| 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2])),
-        ..TableMetrics::empty(group)
+        figures: COLUMNS.iter().filter_map(|column| Some((column.key, figure(column)?))).collect(),
     }
 }
 
@@ -353,7 +266,7 @@ fn angles(grasps: &[&GraspScore]) -> Option<AngleSummary> {
 /// The mean over the tools of a figure of each tool's grasps, with its interval.
 fn estimate(
     tools: &[Vec<&GraspScore>],
-    figure: &dyn Fn(&[&GraspScore]) -> Option<f64>,
+    figure: fn(&[&GraspScore]) -> Option<f64>,
     resamples: usize,
 ) -> Option<Estimate> {
     let over = |tools: &[Vec<&GraspScore>]| mean(tools.iter().filter_map(|grasps| figure(grasps)));
@@ -411,18 +324,18 @@ mod tests {
     fn grasps_are_ordered_by_their_worst_figure_and_a_failure_is_the_worst() {
         let grasps = [("a", 0.002, 1.0), ("b", 0.001, 12.0), ("c", 0.009, f64::NAN), ("d", 0.003, 3.0)];
         let grasps = grasps.map(|(tool, rms_m, deg)| grasp(tool, Group::SeenTools, rms_m, deg));
-        let order = |figure: Figure| {
+        let order = |metric: Metric| {
             let mut all: Vec<&GraspScore> = grasps.iter().collect();
-            all.sort_by(|a, b| figure.worse(a.figure(figure).unwrap(), b.figure(figure).unwrap()));
+            all.sort_by(|a, b| metric.worse(a.metric(metric).unwrap(), b.metric(metric).unwrap()));
             all.iter().map(|g| g.tool.clone().unwrap()).collect::<String>()
         };
-        assert_eq!(order(Figure::Angle), "cbda");
-        assert_eq!(order(Figure::Psnr), "cdab");
+        assert_eq!(order(Metric::Angle), "cbda");
+        assert_eq!(order(Metric::Psnr), "cdab");
         // 20 log10(22.5 / 2).
-        assert!((grasps[0].figure(Figure::Psnr).unwrap() - 21.023).abs() < 1e-3);
-        assert_eq!(grasps[0].figure(Figure::Ssim), Some(0.5));
+        assert!((grasps[0].metric(Metric::Psnr).unwrap() - 21.023).abs() < 1e-3);
+        assert_eq!(grasps[0].metric(Metric::Ssim), Some(0.5));
         let bare = GraspScore { images: Vec::new(), angle_error_rad: None, ..grasps[0].clone() };
-        assert!([Figure::Angle, Figure::Psnr, Figure::Ssim].iter().all(|f| bare.figure(*f).is_none()));
+        assert!([Metric::Angle, Metric::Psnr, Metric::Ssim].iter().all(|f| bare.metric(*f).is_none()));
     }
 
     #[test]
@@ -441,16 +354,16 @@ mod tests {
         let f = &row.groups[0];
         // Tool a: 20 dB of half the squared error, 23.01; tool b: 0.
         let a = 10.0 * (0.0225f64 * 0.0225 / (0.5 * 0.00225 * 0.00225)).log10();
-        assert!((f.psnr_db.unwrap().value - 0.5 * a).abs() < 1e-9);
+        assert!((f.named("psnr_db").unwrap().value - 0.5 * a).abs() < 1e-9);
         assert_eq!((f.tools, f.grasps, f.images, f.without_pose), (2, 4, 4, 1));
         // 2° in tool a, 20° in tool b (the failure is in no mean), success 100 % and 0 %.
-        assert!((f.angle_deg.unwrap().value - 11.0).abs() < 1e-9);
-        assert!((f.success_5.unwrap().value - 50.0).abs() < 1e-9);
-        assert!((f.tool_accuracy.unwrap().value - 50.0).abs() < 1e-9);
-        let [low, high] = f.psnr_db.unwrap().interval.unwrap();
-        assert!(low <= f.psnr_db.unwrap().value && f.psnr_db.unwrap().value <= high && low < high);
-        assert_eq!(f.frechet, None);
-        assert_eq!(f.seconds, Some(0.1));
+        assert!((f.named("angle_deg").unwrap().value - 11.0).abs() < 1e-9);
+        assert!((f.named("success_5").unwrap().value - 50.0).abs() < 1e-9);
+        assert!((f.named("tool_accuracy").unwrap().value - 50.0).abs() < 1e-9);
+        let [low, high] = f.named("psnr_db").unwrap().interval.unwrap();
+        assert!(low <= f.named("psnr_db").unwrap().value && f.named("psnr_db").unwrap().value <= high && low < high);
+        assert_eq!(f.named("frechet"), None);
+        assert_eq!(f.named("seconds").map(|e| e.value), Some(0.1));
     }
 
     #[test]
@@ -460,11 +373,11 @@ mod tests {
         equal.angle_error_rad = None;
         let scores = |grasps| Scores { method: "m".into(), upper_bound: false, grasps, measured_features: Vec::new() };
         let one = row(&scores(vec![equal]), &[group], 10);
-        assert!(one.groups[0].psnr_db.is_none() && one.groups[0].angle_deg.is_none());
+        assert!(one.groups[0].named("psnr_db").is_none() && one.groups[0].named("angle_deg").is_none());
         let mut pictures = vec![grasp("a", group, 0.1, 1.0), grasp("a", group, 0.01, 1.0)];
         pictures.iter_mut().for_each(|g| g.scale = Scale::Assumed);
         let two = row(&scores(pictures), &[group], 0);
-        let psnr = two.groups[0].psnr_db.unwrap();
+        let psnr = two.groups[0].named("psnr_db").unwrap();
         assert!((psnr.value - 30.0).abs() < 1e-9 && psnr.interval.is_none());
     }
 

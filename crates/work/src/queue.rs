@@ -1,6 +1,6 @@
 //! Which pairs are worth a look first: [`queue`].
 //!
-//! A pair's uncertainty has parts, each a figure with its unit. Parts of different units are put together by how a pair
+//! A pair's uncertainty has parts, each a metric with its unit. Parts of different units are put together by how a pair
 //! stands among all that have the part.
 
 use serde::Serialize;
@@ -12,7 +12,7 @@ use super::job::JobCx;
 use super::models::Models;
 use crate::io::dataset::Dataset;
 use touch2touch_core::dataset::{Index, PairId};
-use touch2touch_core::evaluation::{Figure, Scores};
+use touch2touch_core::evaluation::{Metric, Scores};
 
 /// What a queue is ordered by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
@@ -39,22 +39,22 @@ impl QueueBy {
 
     /// The name on screen.
     pub fn name(self) -> &'static str {
-        self.figure().map_or("Overall", Figure::name)
+        self.metric().map_or("Overall", Metric::name)
     }
 
     /// What it does, in a line.
     pub fn tip(self) -> &'static str {
-        self.figure().map_or("The mean of the ranks by each figure that the pair has", Figure::tip)
+        self.metric().map_or("The mean of the ranks by each metric that the pair has", Metric::tip)
     }
 
-    /// The figure that it is; `None` for all of them.
-    pub fn figure(self) -> Option<Figure> {
+    /// The metric that it is; `None` for all of them.
+    pub fn metric(self) -> Option<Metric> {
         Some(match self {
             Self::Overall => return None,
-            Self::Disagreement => Figure::Disagreement,
-            Self::Probability => Figure::Unsure,
-            Self::Angle => Figure::Angle,
-            Self::Spread => Figure::SeedSpread,
+            Self::Disagreement => Metric::Disagreement,
+            Self::Probability => Metric::Unsure,
+            Self::Angle => Metric::Angle,
+            Self::Spread => Metric::SeedSpread,
         })
     }
 }
@@ -63,10 +63,10 @@ impl QueueBy {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
     /// What it is a value of.
-    pub figure: Figure,
-    /// The value, in the figure's own unit (radians, meters, shares).
+    pub metric: Metric,
+    /// The value, in the metric's own unit (radians, meters, shares).
     pub value: f64,
-    /// Share of the other pairs with this figure that are better, 0..1; those that are equal count half.
+    /// Share of the other pairs with this metric that are better, 0..1; those that are equal count half.
     pub rank: f64,
 }
 
@@ -81,19 +81,19 @@ pub struct Queued {
 
 impl Queued {
     /// One of its parts.
-    pub fn part(&self, figure: Figure) -> Option<&Part> {
-        self.parts.iter().find(|part| part.figure == figure)
+    pub fn part(&self, metric: Metric) -> Option<&Part> {
+        self.parts.iter().find(|part| part.metric == metric)
     }
 
     /// What it is ordered by: the greater, the earlier.
     fn weight(&self, by: QueueBy) -> Option<f64> {
-        by.figure().map_or(self.overall, |figure| self.part(figure).map(|part| part.rank))
+        by.metric().map_or(self.overall, |metric| self.part(metric).map(|part| part.rank))
     }
 
     /// The part that says most why it stands where it does.
     pub fn reason(&self, by: QueueBy) -> Option<&Part> {
-        match by.figure() {
-            Some(figure) => self.part(figure),
+        match by.metric() {
+            Some(metric) => self.part(metric),
             // The first of equal ones.
             None => self.parts.iter().rev().max_by(|a, b| a.rank.total_cmp(&b.rank)),
         }
@@ -108,22 +108,22 @@ pub struct Queue {
 }
 
 impl Queue {
-    /// Of figures that are known: those of the measured imprints.
+    /// Of metrics that are known: those of the measured imprints.
     pub fn of(index: &Index, scores: &[Scores]) -> Self {
         let mut pairs = vec![Queued::default(); index.pairs.len()];
         let Some(measured) = scores.iter().find(|scores| scores.upper_bound) else { return Self { pairs } };
         let places: std::collections::BTreeMap<&str, usize> =
             index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
-        for figure in QueueBy::iter().filter_map(QueueBy::figure) {
+        for metric in QueueBy::iter().filter_map(QueueBy::metric) {
             let value = |grasp: &touch2touch_core::evaluation::GraspScore| {
-                Some((*places.get(grasp.pair.as_str())?, grasp.figure(figure)?))
+                Some((*places.get(grasp.pair.as_str())?, grasp.metric(metric)?))
             };
             let values: Vec<(usize, f64)> = measured.grasps.iter().filter_map(value).collect();
-            let mut sorted: Vec<f64> = values.iter().map(|(_, value)| figure.badness(*value)).collect();
+            let mut sorted: Vec<f64> = values.iter().map(|(_, value)| metric.badness(*value)).collect();
             sorted.sort_by(f64::total_cmp);
             for (at, value) in values {
-                let rank = rank(&sorted, figure.badness(value));
-                pairs[at].parts.push(Part { figure, value, rank });
+                let rank = rank(&sorted, metric.badness(value));
+                pairs[at].parts.push(Part { metric, value, rank });
             }
         }
         for pair in &mut pairs {
@@ -211,18 +211,18 @@ impl Queue {
     pub fn lines(&self, index: &Index, by: QueueBy, review: impl Fn(&str) -> super::labels::Review) -> Vec<Line> {
         let line = |id: PairId| {
             let (entry, queued) = (index.get(id)?, self.pairs.get(id.0 as usize)?);
-            let value = |figure: Figure| queued.part(figure).map(|part| part.value);
-            let shown = |figure: Figure| value(figure).map(|v| figure.shown(v)).filter(|v| v.is_finite());
+            let value = |metric: Metric| queued.part(metric).map(|part| part.value);
+            let shown = |metric: Metric| value(metric).map(|v| metric.shown(v)).filter(|v| v.is_finite());
             Some(Line {
                 pair: entry.name.clone(),
                 tool: entry.tool.clone(),
                 review: review(&entry.name).stored(),
                 overall: queued.overall,
-                disagreement: value(Figure::Disagreement),
-                unsure: value(Figure::Unsure),
-                angle_error_deg: shown(Figure::Angle),
-                no_pose: value(Figure::Angle).is_some_and(f64::is_nan),
-                seed_spread_mm: shown(Figure::SeedSpread),
+                disagreement: value(Metric::Disagreement),
+                unsure: value(Metric::Unsure),
+                angle_error_deg: shown(Metric::Angle),
+                no_pose: value(Metric::Angle).is_some_and(f64::is_nan),
+                seed_spread_mm: shown(Metric::SeedSpread),
                 why: queued.reason(by).map_or_else(String::new, Part::text),
             })
         };
@@ -231,9 +231,9 @@ impl Queue {
 }
 
 impl Part {
-    /// The value with its figure and unit, e.g. `Model unsure 4.1 %`.
+    /// The value with its metric and unit, e.g. `Model unsure 4.1 %`.
     pub fn text(&self) -> String {
-        format!("{} {}", self.figure.name(), self.figure.text(self.value))
+        format!("{} {}", self.metric.name(), self.metric.text(self.value))
     }
 }
 

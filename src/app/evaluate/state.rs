@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use super::super::state::State;
 use touch2touch_core::dataset::{Index, PairId};
-use touch2touch_core::evaluation::{Condition, Figure, GraspScore, Row, Scores, paper_rows};
+use touch2touch_core::evaluation::{Condition, GraspScore, Metric, Row, Scores, paper_rows};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::evaluate::{Evaluation, Setup};
 use touch2touch_work::queue::{Queue, QueueBy};
@@ -22,7 +22,7 @@ pub struct TableState {
     pub left_out: BTreeSet<Arc<str>>,
     /// At most so many grasps of each tool.
     pub grasps_per_tool: Option<usize>,
-    /// Whether published figures are shown as well.
+    /// Whether published metrics are shown as well.
     pub published: bool,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
@@ -59,8 +59,8 @@ impl Default for TableState {
 pub struct ScoreChoice {
     /// The source, by name; `None` for the first generator.
     pub source: Option<Arc<str>>,
-    /// The figure; `None` for the first that is there: the angle, if any is known.
-    pub figure: Option<Figure>,
+    /// The metric; `None` for the first that is there: the angle, if any is known.
+    pub metric: Option<Metric>,
     /// Whether the best come first.
     pub best_first: bool,
 }
@@ -85,9 +85,9 @@ pub struct SourceScores {
     pub scored: usize,
     /// By pair.
     grasps: Vec<Option<GraspScore>>,
-    /// The figures that some pair has, each with the badness beyond which a value is among the worst tenth, and beyond
+    /// The metrics that some pair has, each with the badness beyond which a value is among the worst tenth, and beyond
     /// which among the next two.
-    figures: BTreeMap<Figure, [f64; 2]>,
+    metrics: BTreeMap<Metric, [f64; 2]>,
 }
 
 /// How a value stands among those of all pairs.
@@ -107,25 +107,25 @@ impl SourceScores {
         self.name.split(" (").next().unwrap_or(&self.name)
     }
 
-    /// The figures that some pair has.
-    pub fn figures(&self) -> impl Iterator<Item = Figure> {
-        self.figures.keys().copied()
+    /// The metrics that some pair has.
+    pub fn metrics(&self) -> impl Iterator<Item = Metric> {
+        self.metrics.keys().copied()
     }
 
-    /// Whether some pair has a figure.
-    pub fn has(&self, figure: Figure) -> bool {
-        self.figures.contains_key(&figure)
+    /// Whether some pair has a metric.
+    pub fn has(&self, metric: Metric) -> bool {
+        self.metrics.contains_key(&metric)
     }
 
-    /// A figure of a pair; `None` where it was not scored.
-    pub fn value(&self, pair: PairId, figure: Figure) -> Option<f64> {
-        self.grasps.get(pair.0 as usize)?.as_ref()?.figure(figure)
+    /// A metric of a pair; `None` where it was not scored.
+    pub fn value(&self, pair: PairId, metric: Metric) -> Option<f64> {
+        self.grasps.get(pair.0 as usize)?.as_ref()?.metric(metric)
     }
 
-    /// How a value of a figure stands among those of all pairs.
-    pub fn standing(&self, figure: Figure, value: f64) -> Standing {
-        let bad = figure.badness(value);
-        match self.figures.get(&figure) {
+    /// How a value of a metric stands among those of all pairs.
+    pub fn standing(&self, metric: Metric, value: f64) -> Standing {
+        let bad = metric.badness(value);
+        match self.metrics.get(&metric) {
             _ if value.is_nan() => Standing::Worst,
             Some([worst, _]) if bad > *worst => Standing::Worst,
             Some([_, poor]) if bad > *poor => Standing::Poor,
@@ -148,16 +148,16 @@ impl ScoreTable {
                     grasps[*place] = Some(grasp);
                 }
             }
-            let figures = Figure::iter().filter_map(|figure| {
-                let values = grasps.iter().flatten().filter_map(|grasp| grasp.figure(figure));
-                let mut badness: Vec<f64> = values.map(|value| figure.badness(value)).collect();
+            let metrics = Metric::iter().filter_map(|metric| {
+                let values = grasps.iter().flatten().filter_map(|grasp| grasp.metric(metric));
+                let mut badness: Vec<f64> = values.map(|value| metric.badness(value)).collect();
                 badness.sort_by(f64::total_cmp);
                 let at = |tenths: usize| badness.get((badness.len() * tenths / 10).checked_sub(1)?).copied();
-                (!badness.is_empty()).then(|| (figure, [9, 7].map(|tenths| at(tenths).unwrap_or(f64::INFINITY))))
+                (!badness.is_empty()).then(|| (metric, [9, 7].map(|tenths| at(tenths).unwrap_or(f64::INFINITY))))
             });
-            let (name, upper_bound, figures) = (scores.method.as_str().into(), scores.upper_bound, figures.collect());
+            let (name, upper_bound, metrics) = (scores.method.as_str().into(), scores.upper_bound, metrics.collect());
             let scored = grasps.iter().flatten().count();
-            SourceScores { name, upper_bound, scored, grasps, figures }
+            SourceScores { name, upper_bound, scored, grasps, metrics }
         };
         Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect(), queue }
     }
@@ -176,19 +176,19 @@ impl ScoreTable {
 }
 
 impl TableState {
-    /// The source and the figure that the list is ordered by; `None` while nothing is scored.
-    pub fn by(&self) -> Option<(&SourceScores, Figure)> {
+    /// The source and the metric that the list is ordered by; `None` while nothing is scored.
+    pub fn by(&self) -> Option<(&SourceScores, Metric)> {
         let sources = &self.scores.sources;
         let named = self.chosen.source.as_ref().and_then(|name| sources.iter().find(|source| source.name == *name));
         let source = named.or_else(|| sources.iter().find(|source| !source.upper_bound)).or(sources.first())?;
-        let chosen = self.chosen.figure.filter(|figure| source.has(*figure));
-        Some((source, chosen.or_else(|| source.figures().next())?))
+        let chosen = self.chosen.metric.filter(|metric| source.has(*metric));
+        Some((source, chosen.or_else(|| source.metrics().next())?))
     }
 
     /// The value of a pair that the list is ordered by.
     pub fn value(&self, pair: PairId) -> Option<f64> {
-        let (source, figure) = self.by()?;
-        source.value(pair, figure)
+        let (source, metric) = self.by()?;
+        source.value(pair, metric)
     }
 
     /// Whether a pair meets a condition; one that was not scored does not.
@@ -197,7 +197,7 @@ impl TableState {
             "" => self.by().map(|(source, _)| source),
             name => self.scores.source(name),
         };
-        source.and_then(|source| source.value(pair, condition.figure)).is_some_and(|value| condition.passes(value))
+        source.and_then(|source| source.value(pair, condition.metric)).is_some_and(|value| condition.passes(value))
     }
 }
 

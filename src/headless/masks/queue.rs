@@ -9,7 +9,7 @@ use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::{MappingArgs, RuntimeArg};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
-use touch2touch_core::evaluation::Figure;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::evaluate::Setup;
 use touch2touch_work::infer::bundle::{Bundle, Origin, find_all};
@@ -46,7 +46,7 @@ pub(in super::super) struct QueueArgs {
     /// The engine that runs the models.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
-    /// Neither look for figures that were computed before (by the studio, too), nor keep those computed now.
+    /// Neither look for metrics that were computed before (by the studio, too), nor keep those computed now.
     #[arg(long)]
     no_cache: bool,
     #[command(flatten)]
@@ -118,7 +118,7 @@ pub(super) fn run(args: &QueueArgs) -> VerbResult {
                 line.pair
             ));
         }
-        let by = args.by.figure().map_or("all figures together", Figure::name).to_lowercase();
+        let by = args.by.metric().map_or("all metrics together", Metric::name).to_lowercase();
         lines.push(format!("{} pairs by {by}, the most uncertain first", report.pairs.len()));
         lines.join("\n")
     })?;

@@ -41,7 +41,7 @@ use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::evaluation::Figure;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::hand::{HandAxis, HandPose};
@@ -411,8 +411,8 @@ draws! {
         1 SetFilter(select(vec![String::new(), "tool_a".into(), "is:todo".into(), "angle>5".into(), "nothing like it".into()])),
         1 SetToolFilter(proptest::option::of(Just("tool_b".to_owned()))),
         1 SetSort(any_of::<Sort>()),
-        1 SetScore((any::<bool>(), proptest::option::of(any_of::<Figure>())).prop_map(|(best_first, figure)| ScoreChoice {
-            figure,
+        1 SetScore((any::<bool>(), proptest::option::of(any_of::<Metric>())).prop_map(|(best_first, metric)| ScoreChoice {
+            metric,
             best_first,
             ..ScoreChoice::default()
         })),

@@ -1,134 +1,7 @@
 //! The table as text, Markdown, LaTeX and CSV.
 
+use super::columns::{COLUMNS, Column, columns};
 use super::{Estimate, Group, Row, TableMetrics};
-use crate::sample::Scale;
-
-/// A column of the table.
-#[derive(Clone, Copy)]
-pub struct Column {
-    /// With the unit.
-    pub heading: &'static str,
-    /// What it shows.
-    pub tip: &'static str,
-    /// Digits after the point.
-    pub decimals: usize,
-    /// Whether more of it is better.
-    pub larger_is_better: bool,
-    /// Its figure.
-    pub get: fn(&TableMetrics) -> Option<Estimate>,
-    /// Its name in files.
-    key: &'static str,
-}
-
-fn plain(value: Option<f64>) -> Option<Estimate> {
-    value.map(|value| Estimate { value, interval: None })
-}
-
-const fn column(
-    heading: &'static str,
-    key: &'static str,
-    decimals: usize,
-    larger_is_better: bool,
-    get: fn(&TableMetrics) -> Option<Estimate>,
-    tip: &'static str,
-) -> Column {
-    Column { heading, tip, decimals, larger_is_better, get, key }
-}
-
-/// The columns of a group, in the paper's order.
-const COLUMNS: [Column; 15] = [
-    column("PSNR dB", "psnr_db", 1, true, |f| f.psnr_db, "Against the measured imprint, decibels; peak 22.5 mm"),
-    column(
-        "clean dB",
-        "psnr_noise_free_db",
-        1,
-        true,
-        |f| f.psnr_noise_free_db,
-        "PSNR against the simulator's imprint before camera noise, decibels",
-    ),
-    column("SSIM", "ssim", 2, true, |f| f.ssim, "Structural similarity; range of the tool's predictions (the lab's)"),
-    column(
-        "raw dB",
-        "psnr_raw_db",
-        1,
-        true,
-        |f| f.psnr_raw_db,
-        "PSNR of pictures as they are, in the assumed meters and not stretched to 0..1, decibels",
-    ),
-    column("raw SSIM", "ssim_raw", 2, true, |f| f.ssim_raw, "Structural similarity of pictures as they are"),
-    column(
-        "line dB",
-        "psnr_line_db",
-        1,
-        true,
-        |f| f.psnr_line_db,
-        "PSNR of pictures after the straight line that fits best: the worth of the shape alone, decibels",
-    ),
-    column("SSIM 22.5", "ssim_peak", 2, true, |f| f.ssim_peak, "Structural similarity with the range 22.5 mm"),
-    column(
-        "clean SSIM",
-        "ssim_noise_free",
-        2,
-        true,
-        |f| f.ssim_noise_free,
-        "SSIM against the simulator's imprint before camera noise, range of the tool's predictions",
-    ),
-    column(
-        "FD",
-        "frechet_classifier",
-        2,
-        false,
-        |f| plain(f.frechet),
-        "Fréchet distance in the features of the tool classifier: not to be compared with a published FID",
-    ),
-    column("FID", "fid", 0, false, |f| plain(f.fid), "As published, with the features of an Inception network"),
-    column("angle °", "angle_deg", 1, false, |f| f.angle_deg, "Mean error of the in-hand angle, degrees"),
-    column("≤5° %", "success_5", 1, true, |f| f.success_5, "Share of grasps within 5 degrees, percent"),
-    column("≤10° %", "success_10", 1, true, |f| f.success_10, "Share of grasps within 10 degrees, percent"),
-    column(
-        "tool %",
-        "tool_accuracy",
-        1,
-        true,
-        |f| f.tool_accuracy,
-        "Share of imprints whose tool the classifier names, percent",
-    ),
-    column("s/image", "seconds_per_image", 3, false, |f| plain(f.seconds), "Median time to generate an image, seconds"),
-];
-
-/// What the columns mean, a line each.
-pub const NOTES: [&str; 7] = [
-    "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
-    "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
-     imprints says how much that noise costs",
-    "raw, line: of pictures whose scale was assumed, as they are and after the straight line that fits best; PSNR itself \
-     stretches both pictures to 0..1, where no noise-free picture passes 20 dB",
-    "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
-     cannot be compared with a published FID, nor between groups of different size",
-    "FID: published, with the features of an Inception network",
-    "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
-    "tool: share of imprints whose tool the classifier names",
-];
-
-/// What PSNR and SSIM mean.
-pub fn conventions(scale: Scale) -> &'static str {
-    match scale {
-        Scale::Measured => {
-            "PSNR: squared error pooled over a tool's images, peak 22.5 mm; SSIM: 11 x 11 window, zero padding, range of \
-             the tool's predictions (the lab's conventions), and with the range 22.5 mm; against the measured imprint"
-        }
-        Scale::Assumed => {
-            "PSNR and SSIM: each image stretched to 0..1 on its own, peak and range 1, then the mean (the source lost \
-             its scale)"
-        }
-    }
-}
-
-/// The columns that some row fills.
-pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
-    let any = |column: &&Column| rows.iter().flat_map(|r| &r.groups).any(|f| (column.get)(f).is_some());
-    COLUMNS.iter().filter(any).collect()
-}
 
 fn groups(rows: &[Row]) -> Vec<Group> {
     let mut groups: Vec<Group> =
@@ -165,7 +38,7 @@ pub fn text(rows: &[Row]) -> String {
         let name = present.iter().map(|(r, _)| r.method.chars().count()).max().unwrap_or(0).max(8);
         let cells: Vec<Vec<String>> = present
             .iter()
-            .map(|(_, f)| columns.iter().map(|c| with_interval((c.get)(f), c.decimals)).collect())
+            .map(|(_, f)| columns.iter().map(|c| with_interval(f.get(c), c.decimals)).collect())
             .collect();
         let width = |i: usize| {
             cells.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).max(columns[i].heading.chars().count())
@@ -206,16 +79,13 @@ pub fn markdown(rows: &[Row]) -> String {
         out += &format!("| {}{star} |", row.method.replace('|', "/"));
         for group in &groups {
             for column in &columns {
-                out += &format!(" {} |", number(of(row, *group).and_then(column.get), column.decimals));
+                out += &format!(" {} |", number(of(row, *group).and_then(|f| f.get(column)), column.decimals));
             }
         }
         out.push('\n');
     }
     out
 }
-
-/// The paper's columns, as far as some row fills them.
-const IN_PAPER: [&str; 7] = ["psnr_db", "ssim", "frechet_classifier", "fid", "angle_deg", "success_5", "success_10"];
 
 /// Text for LaTeX: what it takes for commands is escaped, signs that its fonts lack are written out.
 fn tex(text: &str) -> String {
@@ -240,7 +110,7 @@ fn tex(text: &str) -> String {
 /// The table in the paper's form as a LaTeX document that compiles by itself: its columns side by side for each group,
 /// the best of what was computed here in bold. The lines between `tabular` can be taken into another document.
 pub fn latex(rows: &[Row]) -> String {
-    let columns: Vec<&Column> = columns(rows).into_iter().filter(|c| IN_PAPER.contains(&c.key)).collect();
+    let columns: Vec<&Column> = columns(rows).into_iter().filter(|c| c.in_paper).collect();
     let groups = groups(rows);
     let mut out = String::from(
         "\\documentclass{article}\n\\usepackage[utf8]{inputenc}\n\\usepackage[T1]{fontenc}\n\
@@ -261,7 +131,7 @@ pub fn latex(rows: &[Row]) -> String {
         out += &format!(" & {} {arrow}", tex(column.heading));
     }
     out += " \\\\\n\\hline\n";
-    let figure = |row: &Row, group: Group, column: &Column| of(row, group).and_then(column.get);
+    let figure = |row: &Row, group: Group, column: &Column| of(row, group).and_then(|f| f.get(column));
     let best = |group: Group, column: &Column| {
         let ours = rows.iter().filter(|row| !row.published && !row.upper_bound);
         let values = ours.filter_map(|row| figure(row, group, column)).map(|e| e.value).filter(|v| v.is_finite());
@@ -285,7 +155,7 @@ pub fn latex(rows: &[Row]) -> String {
 /// One line per method and column group with every figure and its interval.
 pub fn csv(rows: &[Row]) -> String {
     let mut out = String::from("method,published,group,tools,grasps,images,without_pose");
-    for name in COLUMNS.map(|c| c.key) {
+    for name in COLUMNS.iter().map(|c| c.key) {
         out += &format!(",{name},{name}_low,{name}_high");
     }
     out.push('\n');
@@ -298,7 +168,7 @@ pub fn csv(rows: &[Row]) -> String {
                 row.published, f.tools, f.grasps, f.images, f.without_pose
             );
             for column in &COLUMNS {
-                let estimate = (column.get)(f);
+                let estimate = f.get(column);
                 let text = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
                 let interval = estimate.and_then(|e| e.interval);
                 out += &format!(

@@ -1,0 +1,336 @@
+//! [`Metric`]: the table of metrics of a grasp, which lists and pictures of many grasps are made of.
+
+use std::cmp::Ordering;
+
+use serde::{Deserialize, Serialize};
+
+use super::{GraspScore, mean, psnr};
+use crate::sample::Scale;
+
+/// A metric of a grasp: a row of [`Metric::row`]. Lists, filters and pictures follow; the most telling first.
+#[derive(
+    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, Serialize, Deserialize,
+)]
+#[serde(rename_all = "snake_case")]
+pub enum Metric {
+    /// Error of the in-hand angle, radians.
+    #[default]
+    Angle,
+    /// Of the imprints against the measured ones, pooled over the fingers, dB.
+    Psnr,
+    /// Mean over the fingers, range 0.0225 m (pictures without scale: both stretched to 0..1).
+    Ssim,
+    /// Root of the mean squared error, pooled over the fingers, meters.
+    Rms,
+    /// Share of the imprints whose tool the classifier names, 0..1.
+    Tool,
+    /// As [`Metric::Psnr`] against the simulator's imprints without camera noise.
+    PsnrNoiseFree,
+    /// SSIM with the lab's range: that of the tool's predictions.
+    SsimTool,
+    /// SSIM against these, range of the tool's predictions.
+    SsimNoiseFree,
+    /// One minus the Dice of the mask drawn by hand and the mask model's, of the worse finger, 0..1.
+    Disagreement,
+    /// Share of the pixels whose probability of contact is near one half, of the worse finger, 0..1.
+    Unsure,
+    /// Distance between predictions with different seeds, meters.
+    SeedSpread,
+    /// Time to generate one image, seconds.
+    Seconds,
+}
+
+/// A row of the table of metrics.
+struct Row {
+    name: &'static str,
+    short: &'static str,
+    key: &'static str,
+    tip: &'static str,
+    unit: &'static str,
+    /// Factor from the value to the unit on screen.
+    factor: f64,
+    decimals: usize,
+    larger_is_better: bool,
+    of: fn(&GraspScore) -> Option<f64>,
+}
+
+impl Metric {
+    fn row(self) -> Row {
+        let row = Row {
+            name: "",
+            short: "",
+            key: "",
+            tip: "",
+            unit: "",
+            factor: 1.0,
+            decimals: 3,
+            larger_is_better: true,
+            of: |_| None,
+        };
+        let percent = Row { unit: "%", factor: 100.0, decimals: 1, ..row };
+        let db = Row { unit: "dB", decimals: 1, ..row };
+        let mm = Row { unit: "mm", factor: 1e3, decimals: 2, larger_is_better: false, ..row };
+        match self {
+            Self::Angle => Row {
+                name: "Angle error",
+                short: "angle",
+                key: "angle",
+                tip: "Error of the in-hand angle from the contact of both fingers, degrees",
+                unit: "°",
+                factor: 1f64.to_degrees(),
+                decimals: 1,
+                larger_is_better: false,
+                of: |grasp| grasp.angle_error_rad,
+            },
+            Self::Psnr => Row {
+                name: "PSNR",
+                short: "PSNR",
+                key: "psnr",
+                tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
+                of: |grasp| psnr(&[grasp], |image| Some(image.error)),
+                ..db
+            },
+            Self::Ssim => Row {
+                name: "SSIM",
+                short: "SSIM",
+                key: "ssim",
+                tip: "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed",
+                // Stretched pictures have one range only.
+                of: |grasp| match grasp.scale {
+                    Scale::Assumed => mean(grasp.images.iter().filter_map(|image| image.ssim)),
+                    Scale::Measured => mean(grasp.images.iter().filter_map(|image| image.ssim_peak)),
+                },
+                ..row
+            },
+            Self::Rms => Row {
+                name: "RMS error",
+                short: "RMS",
+                key: "rms",
+                tip: "Root mean square error of all fingers against the measured imprints, mm",
+                of: |grasp| {
+                    let errors = grasp.images.iter().map(|image| image.error);
+                    let (sum, pixels) = errors.fold((0.0, 0), |(sum, n), e| (sum + e.sum, n + e.pixels));
+                    (grasp.scale == Scale::Measured && pixels > 0).then(|| (sum / pixels as f64).sqrt())
+                },
+                ..mm
+            },
+            Self::Tool => Row {
+                name: "Tool named",
+                short: "tool",
+                key: "named",
+                tip: "Share of the imprints whose tool the classifier names, percent",
+                decimals: 0,
+                of: |grasp| {
+                    mean(grasp.images.iter().filter_map(|i| i.tool_right).map(|right| f64::from(u8::from(right))))
+                },
+                ..percent
+            },
+            Self::PsnrNoiseFree => Row {
+                name: "PSNR noise-free",
+                short: "clean",
+                key: "psnr-clean",
+                tip: "Against the simulator's imprint without camera noise, dB",
+                of: |grasp| psnr(&[grasp], |image| image.noise_free),
+                ..db
+            },
+            Self::SsimTool => Row {
+                name: "SSIM tool's range",
+                short: "SSIM t.",
+                key: "ssim-tool",
+                tip: "Structural similarity with the lab's range: that of the tool's predictions",
+                of: |grasp| {
+                    let measured = grasp.scale == Scale::Measured;
+                    mean(grasp.images.iter().filter_map(|image| image.ssim)).filter(|_| measured)
+                },
+                ..row
+            },
+            Self::SsimNoiseFree => Row {
+                name: "SSIM noise-free",
+                short: "SSIM cl.",
+                key: "ssim-clean",
+                tip: "Against the simulator's imprint without camera noise; range of the tool's predictions",
+                of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim_noise_free)),
+                ..row
+            },
+            Self::Disagreement => Row {
+                name: "Hand against model",
+                short: "hand/model",
+                key: "disagreement",
+                tip: "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent",
+                larger_is_better: false,
+                of: |grasp| grasp.doubt.disagreement,
+                ..percent
+            },
+            Self::Unsure => Row {
+                name: "Model unsure",
+                short: "unsure",
+                key: "unsure",
+                tip: "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent",
+                larger_is_better: false,
+                of: |grasp| grasp.doubt.unsure,
+                ..percent
+            },
+            Self::SeedSpread => Row {
+                name: "Seed spread",
+                short: "seeds",
+                key: "spread",
+                tip: "Standard deviation between kept predictions with different seeds, mean over the pixels, mm",
+                of: |grasp| grasp.seed_spread_m,
+                ..mm
+            },
+            Self::Seconds => Row {
+                name: "Time",
+                short: "Time",
+                key: "time",
+                tip: "Time to generate one image, seconds",
+                unit: "s",
+                larger_is_better: false,
+                of: |grasp| grasp.seconds,
+                ..row
+            },
+        }
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// The name in a word, for the head of a column.
+    pub fn short(self) -> &'static str {
+        self.row().short
+    }
+
+    /// The word in the filter of the list.
+    pub fn key(self) -> &'static str {
+        self.row().key
+    }
+
+    /// The meaning, in a line.
+    pub fn tip(self) -> &'static str {
+        self.row().tip
+    }
+
+    /// The unit on screen; empty for a number without one.
+    pub fn unit(self) -> &'static str {
+        self.row().unit
+    }
+
+    /// The decimals on screen.
+    pub fn decimals(self) -> usize {
+        self.row().decimals
+    }
+
+    /// A value in the unit of the screen.
+    pub fn shown(self, value: f64) -> f64 {
+        value * self.row().factor
+    }
+
+    /// A value with its unit.
+    pub fn text(self, value: f64) -> String {
+        if value.is_nan() {
+            return if self == Self::Angle { "no pose".into() } else { "–".into() };
+        }
+        let space = if matches!(self.unit(), "" | "°") { "" } else { " " };
+        format!("{:.*}{space}{}", self.decimals(), self.shown(value), self.unit())
+    }
+
+    /// True where a larger value is a better one.
+    pub fn larger_is_better(self) -> bool {
+        self.row().larger_is_better
+    }
+
+    /// Whether `a` is worse than `b`: then it is less. A metric that is not a number (no pose was found) is the worst.
+    pub fn worse(self, a: f64, b: f64) -> Ordering {
+        self.badness(b).total_cmp(&self.badness(a))
+    }
+
+    /// A number that grows as the value gets worse.
+    pub fn badness(self, value: f64) -> f64 {
+        match (value.is_nan(), self.larger_is_better()) {
+            (true, _) => f64::INFINITY,
+            (false, true) => -value,
+            (false, false) => value,
+        }
+    }
+}
+
+impl GraspScore {
+    /// One of the metrics; `None` where it cannot be there, NaN where it failed.
+    pub fn metric(&self, metric: Metric) -> Option<f64> {
+        (metric.row().of)(self)
+    }
+}
+
+/// A condition on a metric, as it is typed: `angle>5`, `psnr<=20`, `measured:angle>2`. Numbers are in the units of the
+/// screen.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Condition {
+    /// A part of the source's name, in lower case; empty for the one chosen.
+    pub source: String,
+    /// The metric.
+    pub metric: Metric,
+    /// The bound, in the unit of the screen.
+    bound: f64,
+    /// Which side of it passes.
+    passes: [Ordering; 2],
+}
+
+impl Condition {
+    /// The condition that a word states; `None` for a word that states none.
+    pub fn parse(word: &str) -> Option<Self> {
+        use strum::IntoEnumIterator as _;
+        let at = word.find(['<', '>'])?;
+        let (left, rest) = word.split_at(at);
+        let side = if rest.starts_with('<') { Ordering::Less } else { Ordering::Greater };
+        let (or_equal, number) = match rest[1..].strip_prefix('=') {
+            Some(number) => (Ordering::Equal, number),
+            None => (side, &rest[1..]),
+        };
+        let (source, key) = left.rsplit_once(':').unwrap_or(("", left));
+        let metric = Metric::iter().find(|metric| metric.key() == key)?;
+        let bound: f64 = number.trim_end_matches(['°', '%']).parse().ok().filter(|b: &f64| !b.is_nan())?;
+        Some(Self { source: source.to_owned(), metric, bound, passes: [side, or_equal] })
+    }
+
+    /// Whether a value passes. What failed is worse than any number.
+    pub fn passes(&self, value: f64) -> bool {
+        let worst = if self.metric.larger_is_better() { f64::NEG_INFINITY } else { f64::INFINITY };
+        let shown = if value.is_nan() { worst } else { self.metric.shown(value) };
+        self.passes.contains(&shown.total_cmp(&self.bound))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use strum::IntoEnumIterator as _;
+
+    use super::*;
+
+    #[test]
+    fn conditions_are_read_and_nothing_else_is_one() {
+        let passes = |word: &str, value: f64| Condition::parse(word).unwrap().passes(value);
+        assert!(passes("angle>5", 0.1) && !passes("angle>5", 0.05) && passes("angle>5", f64::NAN));
+        assert!(passes("psnr<20", 19.9) && !passes("psnr<20", 20.0) && passes("psnr<=20", 20.0));
+        assert!(passes("rms>0.5", 0.000_6) && passes("named<100%", 0.5) && !passes("angle<5", f64::NAN));
+        let of = Condition::parse("measured:angle>=2").unwrap();
+        assert_eq!((of.source.as_str(), of.metric), ("measured", Metric::Angle));
+        for word in ["angle", "tool:rod", "angle>", "angle>x", "size>3", ">5", "angle>nan", "", "a:b:angle"] {
+            assert_eq!(Condition::parse(word), None, "{word}");
+        }
+        for metric in Metric::iter() {
+            assert_eq!(Condition::parse(&format!("{}>0", metric.key())).map(|c| c.metric), Some(metric));
+        }
+    }
+
+    #[test]
+    fn the_worst_is_what_failed_then_what_is_far_off() {
+        let order = |metric: Metric, mut values: Vec<f64>| {
+            values.sort_by(|a, b| metric.worse(*a, *b));
+            values.iter().map(|v| metric.text(*v)).collect::<Vec<_>>()
+        };
+        assert_eq!(order(Metric::Angle, vec![0.0, 1.0, f64::NAN]), ["no pose", "57.3°", "0.0°"]);
+        assert_eq!(order(Metric::Psnr, vec![30.0, 12.0]), ["12.0 dB", "30.0 dB"]);
+        assert_eq!(order(Metric::Rms, vec![0.001, 0.002]), ["2.00 mm", "1.00 mm"]);
+    }
+}
