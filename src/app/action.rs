@@ -396,7 +396,7 @@ actions!(define);
 
 impl Action {
     /// Whether it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
-    pub fn is_nudge(self) -> bool {
+    pub(crate) fn is_nudge(self) -> bool {
         matches!(
             self,
             Self::NudgeLeft | Self::NudgeRight | Self::NudgeUp | Self::NudgeDown | Self::TurnLeft | Self::TurnRight

@@ -2,7 +2,9 @@
 
 pub mod state;
 
-pub use state::{AdaptPairs, AdaptState, TUNING_STEPS};
+pub use state::AdaptPairs;
+pub(crate) use state::AdaptState;
+pub(crate) use state::TUNING_STEPS;
 
 use std::sync::Arc;
 

@@ -27,7 +27,11 @@ pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
         Command::Dial(command) => dial::step(state, command, &mut effects),
         Command::Adapt(command) => adapt::step(state, command, &mut effects),
         Command::Train(command) => train::step(state, command, &mut effects),
-        Command::Settings(command) => settings::step(state, command, &mut effects),
+        Command::Settings(command) => {
+            let before = state.settings.workspace;
+            settings::step(state, command, &mut effects);
+            view::follow_workspace(state, before, &mut effects);
+        }
         Command::Tasks(command) => tasks::step(state, command, &mut effects),
         Command::Answer(answer) => answers::step(state, answer, &mut effects),
     }

@@ -2,7 +2,8 @@
 
 pub mod state;
 
-pub use state::{DialPairs, DialState};
+pub use state::DialPairs;
+pub(crate) use state::DialState;
 
 use std::sync::Arc;
 

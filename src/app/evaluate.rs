@@ -2,7 +2,9 @@
 
 pub mod state;
 
-pub use state::{GRASPS, ScoreChoice, ScoreTable, SourceScores, Standing, TableState};
+pub(crate) use state::GRASPS;
+pub use state::ScoreChoice;
+pub(crate) use state::{ScoreTable, SourceScores, Standing};
 
 use std::path::PathBuf;
 use std::sync::Arc;

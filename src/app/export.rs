@@ -3,7 +3,9 @@
 mod command;
 pub mod state;
 
-pub use state::{CaseView, ExportState, FigureForm, ImportForm, MOST_PAIRS, Output, PairExport, SCALES};
+pub(crate) use state::{CaseView, ImportForm};
+pub use state::{FigureForm, Output};
+pub(crate) use state::{MOST_PAIRS, SCALES};
 
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -204,7 +204,7 @@ impl History {
     }
 
     /// Takes in what was done to a pair, and taken back, before its labels were read.
-    pub fn restore(&mut self, pair: &str, done: &[Past], undone: &[Past]) {
+    pub(crate) fn restore(&mut self, pair: &str, done: &[Past], undone: &[Past]) {
         if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair() == pair) {
             return;
         }
@@ -252,7 +252,7 @@ impl History {
     }
 
     /// What redo would do.
-    pub fn next_redo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
+    pub(crate) fn next_redo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
         Self::position(&self.undone, pair, shown).map(|at| &self.undone[at])
     }
 

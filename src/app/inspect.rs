@@ -2,7 +2,8 @@
 
 pub mod state;
 
-pub use state::{BasinColor, Inspect, Inspected, Inspection, Pin};
+pub use state::{BasinColor, Inspect, Pin};
+pub(crate) use state::{Inspected, Inspection};
 
 use super::keys::{ImprintSource, Request};
 use super::state::State;

@@ -29,7 +29,7 @@ impl Lane {
 }
 
 /// The body of a job.
-pub type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>;
+pub(crate) type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>;
 
 /// A job that answers with a `T`. It holds its inputs: it needs the state no more.
 pub struct Job<T> {

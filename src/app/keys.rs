@@ -8,16 +8,16 @@ pub use touch2touch_work::labels::{ImprintSource, Revision};
 pub use touch2touch_work::mask::MaskRecipe;
 
 pub use super::results::Request;
-pub use super::results::basin::BasinKey;
-pub use super::results::cloud::CloudKey;
-pub use super::results::ensemble::EnsembleKey;
-pub use super::results::imprint::{ImprintKey, MetersKey};
-pub use super::results::influence::InfluenceKey;
-pub use super::results::mask::{MaskKey, MaskVersion};
+pub(crate) use super::results::cloud::CloudKey;
+pub(crate) use super::results::ensemble::EnsembleKey;
+pub use super::results::imprint::ImprintKey;
+pub(crate) use super::results::imprint::MetersKey;
+pub(crate) use super::results::mask::MaskKey;
+pub use super::results::mask::MaskVersion;
 pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
-pub use super::results::run::RunKey;
-pub use super::results::versus::{ApartKey, VersusKey};
+pub(crate) use super::results::run::RunKey;
+pub(crate) use super::results::versus::{ApartKey, VersusKey};
 pub use touch2touch_core::pose::{Registration, RegistrationChoice};
 
 use touch2touch_core::dataset::PairId;
@@ -54,7 +54,7 @@ pub struct TouchKey {
 }
 
 /// What a range mapping does, for its tooltip.
-pub fn shift_tooltip(mode: ShiftMode) -> &'static str {
+pub(crate) fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => {
             "The prediction as the released script saves it: its range is mapped twice, so depths come out as \

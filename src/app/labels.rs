@@ -8,9 +8,8 @@ pub(super) mod unsaved;
 
 pub use batch::{ImportMasks, ProposeAll};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
-pub use state::{
-    Changed, Document, HandMask, MaskPlace, Merged, PairLabels, Question, Repeating, Review, Stored, Stroke,
-};
+pub(crate) use state::{Changed, Merged};
+pub use state::{Document, HandMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 pub use unsaved::UnsavedCommand;
 
 use std::borrow::Cow;
@@ -196,7 +195,7 @@ impl State {
 
     /// Half the width of the brush in a 3D picture, pixels: as many millimeters as on the image, at the depth of a point
     /// (meters, grasp frame).
-    pub fn brush_px(&self, sight: &Sight, size_at: DVec3) -> f32 {
+    pub(crate) fn brush_px(&self, sight: &Sight, size_at: DVec3) -> f32 {
         let radius_m = f64::from(self.settings.mask.radius_px) / self.rig().depth_px_per_mm() * 1e-3;
         sight.px_per_m(size_at).map_or(0.0, |scale| (radius_m * scale) as f32)
     }

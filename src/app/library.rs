@@ -2,7 +2,8 @@
 
 pub mod state;
 
-pub use state::{Follow, Library, OpenDataset, Place, Sort, short_name};
+pub(crate) use state::OpenDataset;
+pub use state::{Follow, Library, Place, Sort, short_name};
 
 use std::collections::BTreeSet;
 use std::ops::Range;

@@ -27,7 +27,7 @@ pub enum Kind {
 
 /// Where a pane lies in a workspace at first. Panes of one dock are its tabs, the one of the earlier row in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Dock {
+pub(crate) enum Dock {
     /// The column at the left.
     Left,
     /// In the upper row of the middle, counted from the left.
@@ -272,7 +272,7 @@ impl Pane {
     }
 
     /// Where it lies at first in a workspace that has it.
-    pub fn dock(self, workspace: Workspace) -> Option<Dock> {
+    pub(crate) fn dock(self, workspace: Workspace) -> Option<Dock> {
         self.places().iter().find(|(of, _)| *of == workspace).map(|(_, dock)| *dock)
     }
 
@@ -285,7 +285,7 @@ impl Pane {
     }
 
     /// Whether it shows something of the selected pair.
-    pub fn is_of_pair(self) -> bool {
+    pub(crate) fn is_of_pair(self) -> bool {
         let of_all = |need: &Need| matches!(need, Need::Thumbnails | Need::Scores | Need::LabelStats | Need::Training);
         self.needs().iter().any(|need| !of_all(need))
     }

@@ -46,7 +46,7 @@ pub mod tool;
 pub mod train_plan;
 pub mod versus;
 
-pub use cache::Cache;
+pub(crate) use cache::Cache;
 pub use preview::Preview;
 
 /// A recipe that says how its result is computed. Equal recipes have equal results: it is the key of the result.
@@ -72,7 +72,7 @@ pub trait Computes: Clone + Ord + Send + 'static {
 }
 
 /// A recipe whose result is kept in a cache of its own.
-pub trait Cached: Computes + Into<Request> {
+pub(crate) trait Cached: Computes + Into<Request> {
     /// The cache.
     fn cache(results: &Results) -> &Cache<Self, Self::Value>;
 }

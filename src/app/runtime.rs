@@ -30,7 +30,7 @@ use touch2touch_work::job::{Cancel, Progress};
 type LatestPreviews = BTreeMap<TouchKey, (Ticket, Arc<Preview>)>;
 
 /// Called from any thread when there is something for [`Runtime::tick`] to do.
-pub type Wake = Arc<dyn Fn() + Send + Sync>;
+pub(crate) type Wake = Arc<dyn Fn() + Send + Sync>;
 
 /// The name of a job: a newer one of the same name replaces one that waits.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -304,4 +304,4 @@ pub trait Services: Send + Sync {
 }
 
 /// Shared services.
-pub type SharedServices = Arc<dyn Services>;
+pub(crate) type SharedServices = Arc<dyn Services>;

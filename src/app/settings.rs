@@ -4,9 +4,10 @@ pub mod state;
 
 pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
 pub use state::versus::{Versus, VersusMode};
+pub(crate) use state::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
 pub use state::{
-    BRUSH_RADIUS_PX, CLEAN_MM, ColorMap, ColorRange, GenerateSettings, Last, MAX_CACHE_MIB, MAX_RECENT, MaskChoice,
-    MaskSettings, MaskSource, MaskTool, ProposalSource, SETTINGS_VERSION, STEPS, Settings, Theme, ToolRow, Workspace,
+    ColorMap, ColorRange, GenerateSettings, Last, MaskChoice, MaskSettings, MaskSource, MaskTool, ProposalSource,
+    Settings, Theme, ToolRow, Workspace,
 };
 
 use std::fmt;
@@ -17,7 +18,6 @@ use serde_json::Value;
 use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::state::State;
-use super::view::{self, ViewCommand};
 
 /// What can happen to the preferences.
 #[derive(Clone, Debug)]
@@ -62,7 +62,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
     match command {
         SettingsCommand::Change(change) => {
             (change.0)(settings);
-            follow(state, &before, effects);
+            follow(state, &before);
         }
         SettingsCommand::RangeFromShown => range_from_shown(state),
         SettingsCommand::SetLayout(workspace, layout) => {
@@ -82,7 +82,7 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
 }
 
 /// Brings about what follows from a change.
-fn follow(state: &mut State, before: &Settings, effects: &mut Vec<Effect>) {
+fn follow(state: &mut State, before: &Settings) {
     let settings = &mut state.settings;
     // Whoever changes a number of a preset has left it.
     let generate = &mut settings.generate;
@@ -95,12 +95,8 @@ fn follow(state: &mut State, before: &Settings, effects: &mut Vec<Effect>) {
     if !settings.range.is_valid() {
         settings.range = before.range;
     }
-    let workspace = settings.workspace;
     if settings.range != before.range {
         follow_range(state);
-    }
-    if workspace != before.workspace {
-        view::step(state, ViewCommand::ShowBothFingers(workspace == Workspace::Label), effects);
     }
 }
 

@@ -76,7 +76,7 @@ impl State {
     }
 
     /// The finger after the active one.
-    pub fn other_finger(&self) -> PadId {
+    pub(crate) fn other_finger(&self) -> PadId {
         PadId::new((self.selection.finger.index() + 1) % self.rig().pads().len().max(1))
     }
 

@@ -4,7 +4,8 @@ pub mod state;
 
 use std::path::PathBuf;
 
-pub use state::{Entry, Level, Log, Task, TaskKind, Tasks, Ticket};
+pub(crate) use state::Task;
+pub use state::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 
 use super::effect::{Access, Effect, Errand, Started};
 use super::jobs::Lane;

@@ -2,7 +2,9 @@
 
 pub mod state;
 
-pub use state::{MINUTES, STEPS, TrainForm, TrainState};
+pub use state::TrainForm;
+pub(crate) use state::TrainState;
+pub(crate) use state::{MINUTES, STEPS};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;

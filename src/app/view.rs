@@ -2,7 +2,7 @@
 
 pub mod state;
 
-pub use state::{CameraPreset, Hover, Selection, UiRequest};
+pub use state::{CameraPreset, Hover, UiRequest};
 
 use std::collections::BTreeSet;
 
@@ -12,6 +12,7 @@ use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::labels;
 use super::pane::Pane;
+use super::settings::state::Workspace;
 use super::state::State;
 use touch2touch_core::rig::PadId;
 
@@ -42,6 +43,14 @@ pub enum ViewCommand {
     SetShortcutSheet(bool),
     /// Something only the window can do.
     Ui(UiRequest),
+}
+
+/// Shows both fingers where masks are drawn, one elsewhere, as another workspace than `before` comes to the front.
+pub(super) fn follow_workspace(state: &mut State, before: Workspace, effects: &mut Vec<Effect>) {
+    let now = state.settings.workspace;
+    if now != before {
+        step(state, ViewCommand::ShowBothFingers(now == Workspace::Label), effects);
+    }
 }
 
 pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Effect>) {

@@ -9,7 +9,7 @@ use super::results::{Cached, Request};
 use super::state::State;
 
 /// Neighbors loaded ahead on each side of the selection.
-pub const PREFETCH: usize = 4;
+pub(crate) const PREFETCH: usize = 4;
 
 impl State {
     /// What the visible panes need, is not there, and can be computed from what is there; most urgent first.

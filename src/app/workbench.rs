@@ -2,7 +2,8 @@
 
 pub mod state;
 
-pub use state::{HandTry, Layer, Picked, PoseOf, SECTION_REACH_M, SceneTool, Section, SectionAxis, Workbench};
+pub(crate) use state::SECTION_REACH_M;
+pub use state::{HandTry, Layer, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 

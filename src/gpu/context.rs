@@ -8,7 +8,7 @@ use super::{GpuError, wgpu};
 /// sRGB-encoded bytes behind a plain format: the window toolkit samples its images so, and blends so.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
-pub const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
 
 /// A device with its queue, and what the renderer needs to know about them. Cheap to clone.
 #[derive(Clone, Debug)]
@@ -120,7 +120,7 @@ impl Gpu {
 ///
 /// # Errors
 /// [`GpuError::NoAdapter`].
-pub fn adapter_in_words() -> Result<String, GpuError> {
+pub(crate) fn adapter_in_words() -> Result<String, GpuError> {
     let info = best_adapter()?.get_info();
     let kind = match info.device_type {
         wgpu::DeviceType::Cpu => "software",

@@ -46,23 +46,6 @@ pub fn scale_bar(start: DVec3, along: DVec3, mark: DVec3, length: f64, rgba: [u8
     [[start, end], [start - half, start + half], [end - half, end + half]].map(|ends| Segment { ends, rgba }).to_vec()
 }
 
-/// The twelve edges of the box `[smallest, largest]`.
-pub fn box_edges([lo, hi]: [DVec3; 2], rgba: [u8; 4]) -> Vec<Segment> {
-    let corner = |i: usize| {
-        let at = |axis: usize| if i >> axis & 1 == 0 { lo[axis] } else { hi[axis] };
-        DVec3::new(at(0), at(1), at(2))
-    };
-    let mut out = Vec::with_capacity(12);
-    for i in 0..8 {
-        for axis in 0..3 {
-            if i >> axis & 1 == 0 {
-                out.push(Segment { ends: [corner(i), corner(i | 1 << axis)], rgba });
-            }
-        }
-    }
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -79,9 +62,6 @@ mod tests {
         assert_eq!(lines.len(), 18);
         assert!(lines.iter().all(|s| (length(s) - 0.04).abs() < 1e-15 && s.ends[0].z == 0.0));
         assert!(grid(DVec3::ZERO, [DVec3::X, DVec3::Y], f64::NAN, 4, [90; 3]).is_empty());
-        let edges = box_edges([DVec3::ZERO, DVec3::new(1.0, 2.0, 3.0)], [255; 4]);
-        assert_eq!(edges.len(), 12);
-        assert!((edges.iter().map(length).sum::<f64>() - 24.0).abs() < 1e-12);
         assert_eq!(axes(DVec3::ZERO, 0.02).iter().filter(|s| s.ends[0] == DVec3::ZERO).count(), 3);
     }
 }

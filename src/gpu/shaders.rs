@@ -6,7 +6,7 @@
 use super::{Gpu, GpuError, wgpu};
 
 /// Every file of `shaders/`: its path below that folder, and its text.
-pub const SHADERS: &[(&str, &str)] = &[
+pub(crate) const SHADERS: &[(&str, &str)] = &[
     ("common/color.wgsl", include_str!("../../shaders/common/color.wgsl")),
     ("common/edl.wgsl", include_str!("../../shaders/common/edl.wgsl")),
     ("common/stroke.wgsl", include_str!("../../shaders/common/stroke.wgsl")),
@@ -67,7 +67,7 @@ pub struct Resolved {
 
 impl Resolved {
     /// `file:line` of line `line` (counted from 1) of [`Self::source`].
-    pub fn locate(&self, line: usize) -> String {
+    pub(crate) fn locate(&self, line: usize) -> String {
         match line.checked_sub(1).and_then(|i| self.lines.get(i)) {
             Some(&(file, line)) => format!("{}:{line}", self.files[file]),
             None => format!("{}:end", self.files.last().map_or("", String::as_str)),

@@ -232,7 +232,7 @@ impl Sheet {
     }
 
     /// Writes a part of a texture at `place`; returns whether there is such a texture.
-    pub fn set_part(&mut self, gpu: &Gpu, key: u64, place: [u32; 2], size: [u32; 2], rgba: &[u8]) -> bool {
+    pub(crate) fn set_part(&mut self, gpu: &Gpu, key: u64, place: [u32; 2], size: [u32; 2], rgba: &[u8]) -> bool {
         let Some(texture) = self.textures.get_mut(&key) else { return false };
         let Some(own) = &texture.own else { return false };
         texture.opaque = false;
@@ -252,7 +252,7 @@ impl Sheet {
     }
 
     /// Whether nothing shows through a texture.
-    pub fn is_opaque(&self, key: u64) -> bool {
+    pub(crate) fn is_opaque(&self, key: u64) -> bool {
         self.textures.get(&key).is_some_and(|t| t.opaque)
     }
 

@@ -49,7 +49,7 @@ impl Preset {
 
 /// A half line in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ray {
+pub(crate) struct Ray {
     /// Where it starts, meters.
     pub origin: DVec3,
     /// Unit vector into the scene.
@@ -58,7 +58,7 @@ pub struct Ray {
 
 impl Ray {
     /// Where it meets the plane through `point` with `normal`; `None` if it is parallel or points away.
-    pub fn meets_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
+    pub(crate) fn meets_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
         let along = self.direction.dot(normal);
         let t = (point - self.origin).dot(normal) / along;
         (along.abs() > 1e-12 && t >= 0.0).then(|| self.origin + self.direction * t)
@@ -66,7 +66,7 @@ impl Ray {
 }
 
 /// Planes that can cut at a time.
-pub const MAX_PLANES: usize = 8;
+pub(crate) const MAX_PLANES: usize = 8;
 /// What is nearer to the eye is not drawn, as a share of the distance.
 const NEAR: f64 = 0.02;
 /// Depths of a parallel projection: so many distances to both sides of the target.
@@ -141,13 +141,13 @@ impl Camera {
     }
 
     /// Moves by a drag of `px` pixels (y down) in a view of `size` pixels: the target's plane follows the pointer.
-    pub fn pan(&mut self, px: DVec2, size: [u32; 2]) {
+    pub(crate) fn pan(&mut self, px: DVec2, size: [u32; 2]) {
         let [right, up, _] = self.axes();
         self.target += (up * px.y - right * px.x) / self.px_per_m(size);
     }
 
     /// Divides the distance by `factor` (> 1 = closer); what is under `anchor` (pixels) stays there if given.
-    pub fn zoom(&mut self, factor: f64, anchor: Option<DVec2>, size: [u32; 2]) {
+    pub(crate) fn zoom(&mut self, factor: f64, anchor: Option<DVec2>, size: [u32; 2]) {
         if !(factor.is_finite() && factor > 0.0) {
             return;
         }
@@ -180,7 +180,7 @@ impl Camera {
     }
 
     /// Whether every number is one that can be drawn with: stored state is outside data.
-    pub fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         self.target.is_finite()
             && DISTANCE.contains(&self.distance)
             && self.yaw_rad.is_finite()
@@ -194,7 +194,7 @@ impl Camera {
     }
 
     /// The matrix from world to clip coordinates (depth reversed: 1 near, 0 far).
-    pub fn clip_from_world(&self, size: [u32; 2]) -> DMat4 {
+    pub(crate) fn clip_from_world(&self, size: [u32; 2]) -> DMat4 {
         let [right, up, back] = self.axes();
         let eye = self.eye();
         let row = |axis: DVec3| axis.extend(-axis.dot(eye));
@@ -221,7 +221,7 @@ impl Camera {
     }
 
     /// The ray through pixel position `px` (from the upper left corner; the middle of the first pixel is 0.5, 0.5).
-    pub fn ray(&self, px: DVec2, size: [u32; 2]) -> Ray {
+    pub(crate) fn ray(&self, px: DVec2, size: [u32; 2]) -> Ray {
         let [right, up, back] = self.axes();
         let [width, height] = size.map(|s| f64::from(s.max(1)));
         let half = (0.5 * self.fov_rad).tan();
@@ -235,7 +235,7 @@ impl Camera {
     }
 
     /// The unit vector towards the key light, world: above the eye, to its left.
-    pub fn key_light(&self) -> DVec3 {
+    pub(crate) fn key_light(&self) -> DVec3 {
         let [right, up, back] = self.axes();
         (back + 0.55 * up - 0.45 * right).normalize()
     }

@@ -168,7 +168,7 @@ impl LimitArgs {
     }
 
     /// The position of the pair that is named, else those that are taken of all.
-    pub fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
+    pub(crate) fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
         match pair {
             Some(name) => Ok(vec![super::find_pair(dataset, name)?.0 as usize]),
             None => Ok(self.spread(dataset.index.pairs.len())),

@@ -36,7 +36,7 @@ impl ModelArgs {
     }
 
     /// The engine's name for people.
-    pub fn engine_label(&self) -> anyhow::Result<&'static str> {
+    pub(crate) fn engine_label(&self) -> anyhow::Result<&'static str> {
         Ok(resolve(self.engine())?.label())
     }
 

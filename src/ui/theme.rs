@@ -14,22 +14,22 @@ use eframe::egui::{
 use touch2touch_work::verdict::Grade;
 
 /// The grid that every distance is a multiple of, points.
-pub const UNIT: f32 = 4.0;
+pub(crate) const UNIT: f32 = 4.0;
 /// Small type: captions, ticks, units.
 pub const SMALL: f32 = 11.0;
 /// Body type.
-pub const BODY: f32 = 13.0;
+pub(crate) const BODY: f32 = 13.0;
 /// Headings.
-pub const HEADING: f32 = 16.0;
+pub(crate) const HEADING: f32 = 16.0;
 
 /// The colors of the mask and of contact points, everywhere: apart from every color of the maps.
-pub const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
+pub(crate) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 /// The color of proposals.
-pub const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
+pub(crate) const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
 /// The color of ignored pixels.
 pub const IGNORED: Color32 = Color32::from_rgb(0xff, 0xc8, 0x3d);
 /// The color of what was before the last change of a mask.
-pub const GHOST: Color32 = Color32::from_rgb(0xc9, 0xb0, 0xff);
+pub(crate) const GHOST: Color32 = Color32::from_rgb(0xc9, 0xb0, 0xff);
 
 /// The colors of one theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,7 +73,7 @@ pub struct Palette {
 }
 
 /// Light on dark.
-pub const DARK: Palette = Palette {
+pub(crate) const DARK: Palette = Palette {
     canvas: Color32::from_gray(14),
     frame: Color32::from_gray(22),
     panel: Color32::from_gray(29),
@@ -95,7 +95,7 @@ pub const DARK: Palette = Palette {
 };
 
 /// Dark on light, with the same steps of contrast.
-pub const LIGHT: Palette = Palette {
+pub(crate) const LIGHT: Palette = Palette {
     canvas: Color32::from_gray(228),
     frame: Color32::from_gray(236),
     panel: Color32::from_gray(247),
@@ -124,7 +124,7 @@ impl Palette {
 }
 
 /// The family of half-bold type, for titles.
-pub fn medium() -> FontFamily {
+pub(crate) fn medium() -> FontFamily {
     FontFamily::Name("medium".into())
 }
 
@@ -139,7 +139,7 @@ pub fn section(text: &str, palette: &Palette) -> RichText {
 }
 
 /// A caption: small and weak.
-pub fn caption(text: impl Into<String>, palette: &Palette) -> RichText {
+pub(crate) fn caption(text: impl Into<String>, palette: &Palette) -> RichText {
     RichText::new(text).size(SMALL).color(palette.weak)
 }
 
@@ -237,12 +237,12 @@ fn restyle(style: &mut egui::Style, p: &Palette, dark: bool) {
 }
 
 /// The frame around the controls of a pane.
-pub fn pane_frame(palette: &Palette) -> egui::Frame {
+pub(crate) fn pane_frame(palette: &Palette) -> egui::Frame {
     egui::Frame::new().fill(palette.panel).inner_margin(Margin::same(8))
 }
 
 /// The color of a grade.
-pub fn grade_color(p: &Palette, grade: Grade) -> Color32 {
+pub(crate) fn grade_color(p: &Palette, grade: Grade) -> Color32 {
     match grade {
         Grade::Open => p.strong,
         Grade::Good => p.good,

@@ -38,18 +38,19 @@ use serde::{Deserialize, Serialize};
 use super::frames::PlanarPose;
 
 pub use directions::{Directions, Distances};
-pub use icp::IcpConfig;
-pub use influence::{InfluenceError, influence};
+pub(crate) use icp::IcpConfig;
+pub use influence::influence;
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
-pub use observability::{DEGENERATE_BELOW, MotionEllipse, Observability, observability};
+pub(crate) use observability::DEGENERATE_BELOW;
+pub use observability::{Observability, observability};
 pub use planar::align;
-pub use refine::RefineConfig;
+pub(crate) use refine::RefineConfig;
 pub use register::{Ask, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///
 /// It is the lever arm of typical contact points, so that both halves of a step move points about equally far.
-pub const ANGLE_SCALE_M: f64 = 0.02;
+pub(crate) const ANGLE_SCALE_M: f64 = 0.02;
 /// Fewest points a pose is computed from.
 pub const MIN_POINTS: usize = 32;
 

@@ -4,7 +4,7 @@ use super::grid::Grid;
 
 /// The image blurred with a Gaussian of this deviation, pixels; the border repeats. With a deviation of zero or less the
 /// image itself.
-pub fn gaussian(image: &Grid<f64>, sigma_px: f64) -> Grid<f64> {
+pub(crate) fn gaussian(image: &Grid<f64>, sigma_px: f64) -> Grid<f64> {
     if sigma_px.is_nan() || sigma_px <= 0.0 || image.is_empty() {
         return image.clone();
     }

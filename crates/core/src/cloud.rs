@@ -86,7 +86,7 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
 }
 
 /// The point of one pixel, meters, grasp frame; `None` outside the images and where the depth is unusable.
-pub fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
+pub(crate) fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
     let reference = *camera.depth_reference.get(x, y)?;
     let depth = reference - imprint.get(x, y)?;
     if !(reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0) {

@@ -108,7 +108,7 @@ pub fn without_grain(imprint: &DepthMap, radius_px: usize) -> DepthMap {
 /// An imprint that rises less than this holds no contact: a bubble that is touched at all gives way by more.
 pub const FLAT_M: f32 = 0.000_5;
 /// An imprint that rises by this holds contact somewhere, whatever a model says.
-pub const CLEAR_M: f32 = 0.002;
+pub(crate) const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
 const CONTACT_SHARE: f32 = 0.6;
 

@@ -9,7 +9,7 @@ use glam::DVec2;
 use super::mesh::TriMesh;
 
 /// Cell size, meters.
-pub const CELL_M: f64 = 0.25e-3;
+pub(crate) const CELL_M: f64 = 0.25e-3;
 /// Border around the silhouette, meters: the prior's shift plus what a scene adds before it counts as lost anyway.
 const MARGIN_M: f64 = 0.012;
 /// Why a mesh has no field.

@@ -62,7 +62,7 @@ impl HandAxis {
     }
 
     /// Whether it turns.
-    pub fn is_turn(self) -> bool {
+    pub(crate) fn is_turn(self) -> bool {
         matches!(self, Self::Theta | Self::Pitch | Self::Yaw)
     }
 

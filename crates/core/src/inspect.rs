@@ -33,7 +33,7 @@ pub fn basin_map(
 }
 
 /// Whether the registration compares with the silhouette's field rather than with model points.
-pub fn uses_field(engine: Registration) -> bool {
+pub(crate) fn uses_field(engine: Registration) -> bool {
     matches!(engine, Registration::DistanceField | Registration::Certified)
 }
 

@@ -28,17 +28,16 @@ pub use agreement::{Agreement, agreement, iou};
 pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
 pub use coco::{coco_runs, coco_runs_of, coco_text, mask_of_coco_runs};
-pub use doubt::{Doubt, UNSURE, unsure_share};
+pub use doubt::{Doubt, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};
 pub use gate::Gate;
 pub use grow::grow_from;
 pub use marks::Marks;
 pub use merge::merge;
-pub use morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
+pub use morphology::{fill_holes, grow, islands, largest_island, shrink};
 pub use packed::{PackError, PackedMask};
 pub use paint::Paint;
 pub use provenance::{CadPose, Provenance};
-pub use rle::{RleError, decode_runs, encode_runs};
 pub use sight::{Layers, Seen, Sight};
 
 /// A rectangle of pixels; `x`, `y` is its top-left one.

@@ -5,7 +5,7 @@ pub mod sampling;
 
 use glam::DVec3;
 
-pub use distance::MeshDistance;
+pub(crate) use distance::MeshDistance;
 
 /// An indexed triangle mesh.
 #[derive(Clone, Debug, Default, PartialEq)]

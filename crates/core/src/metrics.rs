@@ -13,8 +13,8 @@ mod unstretched;
 
 pub use angle::AngleSummary;
 pub use color::{LEVELS, color, planes};
-pub use frechet::frechet_distance;
-pub use image::{MetricError, Psnr, PsnrMean, mse, psnr, psnr_of_mse, unit_range};
+pub(crate) use frechet::frechet_distance;
+pub use image::{MetricError, Psnr, mse, psnr, unit_range};
 pub use joint::{Joint, Line, line};
 pub use split::{PixelMetrics, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim, ssim_ranges};

@@ -33,7 +33,7 @@ fn toned(image: &RgbGrid, gain: f32, center: f32) -> Rgb8 {
 
 /// The gain that spreads a difference over the gray levels: 1 at the usual contrast, more for faint touches, and for
 /// values on a 0..1 scale. 1 for an empty or constant image.
-pub fn difference_gain(image: &RgbGrid) -> f32 {
+pub(crate) fn difference_gain(image: &RgbGrid) -> f32 {
     let mut sizes: Vec<f32> =
         image.as_slice().iter().flat_map(|p| p.iter().map(|v| v.abs())).filter(|v| v.is_finite()).collect();
     if sizes.is_empty() {

@@ -127,7 +127,7 @@ pub fn register(
 ///
 /// # Errors
 /// As [`register`], and for a start that is not finite.
-pub fn register_from(
+pub(crate) fn register_from(
     points: &[DVec3],
     tool: &ToolModel,
     engine: impl Into<RegistrationChoice>,

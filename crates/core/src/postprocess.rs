@@ -23,7 +23,7 @@ pub use correction::{Correction, CorrectionPart, CorrectionParts, Response};
 pub use flags::{Flag, FlagKind, Severity};
 pub use ledger::{ChainReading, Ledger, correlation, ledger, readings};
 pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
-pub use refit::{BundleTag, RefitShift, ShiftFit};
+pub use refit::{RefitShift, ShiftFit};
 
 use super::grid::{DepthMap, Grid};
 use super::resample::{self, Resampling};

@@ -129,7 +129,7 @@ impl fmt::Display for ReadAs {
 }
 
 /// The keys, for people.
-pub const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
+pub(crate) const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
                         includes the depth without contact), scale-camera=FACTOR, negate-theta, image-swap-fingers, \
                         image-mirror-columns, image-mirror-rows, image-turn, image-swap-reference, image-unwrap, \
                         image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped)";

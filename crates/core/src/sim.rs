@@ -27,13 +27,14 @@ mod training;
 
 use glam::{DAffine3, DQuat, DVec3};
 
-pub use condition::{Condition, MISALIGNMENT_M, TEST_GRASPS, test_grasp};
-pub use config::{BubbleConfig, GelSlimConfig, SimConfig};
-pub use depth_camera::CONTACT_DISTANCE_M;
+pub use condition::{Condition, TEST_GRASPS, test_grasp};
+pub use config::SimConfig;
+pub(crate) use config::{BubbleConfig, GelSlimConfig};
 pub use faults::Fault;
-pub use grasp::{GRID_GRASPS, Grasp, POSITION_RANGE_M, THETA_RANGE_RAD, grid_grasp, random_grasp};
+pub use grasp::{Grasp, grid_grasp, random_grasp};
 pub use membrane::{Dome, Membrane};
-pub use rig::{INTRINSICS, RANGE_M, gelslim_pixel, gelslim_yz, grasp_from_camera, outward};
+pub(crate) use rig::INTRINSICS;
+pub use rig::{RANGE_M, gelslim_yz, grasp_from_camera, outward};
 pub use spoil::{Spoil, spoil_mask};
 pub use training::{Drawn, Mix, training_touch};
 
@@ -53,7 +54,13 @@ pub fn simulate(tool: &ToolSpec, grasp: Grasp, seed: u64, config: &SimConfig) ->
 }
 
 /// As [`simulate`], with the GelSlims at `gelslims` and the bubbles, whose pose is the truth, at `bubbles`.
-pub fn simulate_apart(tool: &ToolSpec, gelslims: Grasp, bubbles: Grasp, seed: u64, config: &SimConfig) -> Sample {
+pub(crate) fn simulate_apart(
+    tool: &ToolSpec,
+    gelslims: Grasp,
+    bubbles: Grasp,
+    seed: u64,
+    config: &SimConfig,
+) -> Sample {
     let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
     // the tool and the rig mirror each other, so one membrane serves both fingers
     let membrane = Membrane::press(&config.bubble, tool, bubbles);

@@ -11,9 +11,9 @@ use super::mesh::distance::MeshError;
 use super::mesh::{MeshDistance, TriMesh};
 
 /// Points of the surface that registrations compare with: as many as the lab samples.
-pub const SURFACE_POINTS: usize = 5000;
+pub(crate) const SURFACE_POINTS: usize = 5000;
 /// Seed of those points, so that every run compares with the same ones.
-pub const SURFACE_SEED: u64 = 0;
+pub(crate) const SURFACE_SEED: u64 = 0;
 
 /// Why a CAD model cannot be used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]

@@ -30,7 +30,7 @@ pub fn text_deg(radians: f64) -> String {
 }
 
 /// `1.3 %`: shares are shown with one decimal; one that is not zero never reads `0.0 %`.
-pub fn text_percent(share: f64) -> String {
+pub(crate) fn text_percent(share: f64) -> String {
     if share > 0.0 && share < 0.0005 { "< 0.1 %".into() } else { format!("{} %", fixed(100.0 * share, 1)) }
 }
 

@@ -38,7 +38,7 @@ pub use config::{Config, Trained};
 pub use error::{Error, Result};
 pub use masks::{Cast, MaskConfig, MaskStart, MaskTouch, MaskTuner, Sensors};
 pub use pair::Pair;
-pub use trainer::{Descent, StepReport};
+pub use trainer::Descent;
 pub use tuner::{NoiseSchedule, Query, Sampler, Start, Tuned, Tuner};
 
 #[cfg(test)]

@@ -15,16 +15,21 @@ mod place;
 mod product;
 mod unet;
 
-pub use arithmetic::{add, add_each, blend, line, mul, rescaled, silu};
+pub use arithmetic::{add, blend, line};
+pub(crate) use arithmetic::{add_each, mul, rescaled, silu};
 pub use arrange::{beside, channels, doubled, repeated, swapped};
-pub use attention::attention;
-pub use contact::contact_loss;
-pub use conv::conv2d;
+pub(crate) use attention::attention;
+pub(crate) use contact::contact_loss;
+pub(crate) use conv::conv2d;
 pub use distance::distance;
-pub use linear::{Weights, linear};
-pub use norm::{Activation, GROUPS, group_norm, layer_norm};
+pub(crate) use linear::Weights;
+pub use linear::linear;
+pub(crate) use norm::Activation;
+pub(crate) use norm::{GROUPS, group_norm, layer_norm};
 pub use place::placed;
-pub use unet::{Margins, cropped, halved, padded, relu};
+pub(crate) use unet::Margins;
+pub(crate) use unet::{cropped, relu};
+pub use unet::{halved, padded};
 
 #[cfg(test)]
 mod tests;

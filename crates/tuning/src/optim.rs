@@ -7,7 +7,7 @@ use crate::params::Params;
 
 /// How fast one array learns.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rate {
+pub(crate) struct Rate {
     /// Step size at the height of the ramp.
     pub rate: f32,
     /// Pull toward zero, per unit of step size.
@@ -38,7 +38,7 @@ impl Ramp {
 
 /// AdamW over plain vectors. Moments exist for what is trained.
 #[derive(Clone, Debug)]
-pub struct AdamW {
+pub(crate) struct AdamW {
     pub(crate) moments: Vec<Option<Moments>>,
     pub(crate) steps: u32,
 }
@@ -55,7 +55,7 @@ const EPSILON: f32 = 1e-8;
 
 impl AdamW {
     /// Before the first step, for arrays of which those with a rate are trained.
-    pub fn new(params: &Params, rates: &[Option<Rate>]) -> Self {
+    pub(crate) fn new(params: &Params, rates: &[Option<Rate>]) -> Self {
         let zeros = |count: usize| Moments { first: vec![0.0; count], second: vec![0.0; count] };
         let moments = params.entries().iter().zip(rates).map(|(entry, rate)| rate.map(|_| zeros(entry.values.len())));
         Self { moments: moments.collect(), steps: 0 }
@@ -63,7 +63,7 @@ impl AdamW {
 
     /// One step against the gradient, which is shortened to a length of `clip` over all arrays. All rates are multiplied
     /// by `factor`; `start` is where anchors pull to.
-    pub fn step(
+    pub(crate) fn step(
         &mut self,
         params: &mut Params,
         start: &Params,
@@ -94,7 +94,7 @@ impl AdamW {
 }
 
 /// Length of a gradient over all arrays.
-pub fn norm(gradient: &[Option<Vec<f32>>]) -> f64 {
+pub(crate) fn norm(gradient: &[Option<Vec<f32>>]) -> f64 {
     gradient.iter().flatten().flatten().map(|&value| f64::from(value).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -128,7 +128,7 @@ impl Average {
     }
 
     /// The mean.
-    pub fn params(&self) -> &Params {
+    pub(crate) fn params(&self) -> &Params {
         &self.values
     }
 }

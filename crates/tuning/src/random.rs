@@ -7,7 +7,7 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 /// A stream of numbers.
 #[derive(Clone, Debug)]
-pub struct Random {
+pub(crate) struct Random {
     rng: ChaCha8Rng,
     spare: Option<f64>,
 }
@@ -27,7 +27,7 @@ pub enum Purpose {
 
 impl Random {
     /// The stream of a seed for a purpose, at a step, for an item.
-    pub fn new(seed: u64, purpose: Purpose, step: usize, item: usize) -> Self {
+    pub(crate) fn new(seed: u64, purpose: Purpose, step: usize, item: usize) -> Self {
         let mut key = [0; 32];
         for (to, part) in key.chunks_exact_mut(8).zip([seed, purpose as u64, step as u64, item as u64]) {
             to.copy_from_slice(&part.to_le_bytes());
@@ -36,32 +36,32 @@ impl Random {
     }
 
     /// The stream from which the studio's sampler draws its noise.
-    pub fn sampler(seed: u64) -> Self {
+    pub(crate) fn sampler(seed: u64) -> Self {
         Self { rng: ChaCha8Rng::seed_from_u64(seed), spare: None }
     }
 
     /// Uniform in [0, 1).
-    pub fn uniform(&mut self) -> f64 {
+    pub(crate) fn uniform(&mut self) -> f64 {
         (self.rng.next_u64() >> 11) as f64 * (1.0 / (1u64 << 53) as f64)
     }
 
     /// Uniform in [−1, 1).
-    pub fn signed(&mut self) -> f64 {
+    pub(crate) fn signed(&mut self) -> f64 {
         2.0 * self.uniform() - 1.0
     }
 
     /// Whether something of this probability happens.
-    pub fn happens(&mut self, probability: f64) -> bool {
+    pub(crate) fn happens(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }
 
     /// A whole number below `count`, which must not be 0.
-    pub fn below(&mut self, count: usize) -> usize {
+    pub(crate) fn below(&mut self, count: usize) -> usize {
         ((self.uniform() * count as f64) as usize).min(count - 1)
     }
 
     /// Standard normal (Box-Muller; both numbers of a pair are used, cosine first).
-    pub fn normal(&mut self) -> f64 {
+    pub(crate) fn normal(&mut self) -> f64 {
         if let Some(spare) = self.spare.take() {
             return spare;
         }
@@ -73,12 +73,12 @@ impl Random {
     }
 
     /// Standard normal numbers.
-    pub fn normals(&mut self, count: usize) -> Vec<f32> {
+    pub(crate) fn normals(&mut self, count: usize) -> Vec<f32> {
         (0..count).map(|_| self.normal() as f32).collect()
     }
 
     /// The numbers below `count` in a random order.
-    pub fn order(&mut self, count: usize) -> Vec<usize> {
+    pub(crate) fn order(&mut self, count: usize) -> Vec<usize> {
         let mut order: Vec<usize> = (0..count).collect();
         for last in (1..count).rev() {
             order.swap(last, self.below(last + 1));

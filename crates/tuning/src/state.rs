@@ -20,12 +20,12 @@ pub struct Origin([u8; DIGEST]);
 
 /// Collects what an [`Origin`] depends on.
 #[derive(Clone, Debug, Default)]
-pub struct OriginBuilder(Sha256);
+pub(crate) struct OriginBuilder(Sha256);
 
 impl OriginBuilder {
     /// Adds bytes.
     #[must_use]
-    pub fn bytes(mut self, bytes: &[u8]) -> Self {
+    pub(crate) fn bytes(mut self, bytes: &[u8]) -> Self {
         self.0.update((bytes.len() as u64).to_le_bytes());
         self.0.update(bytes);
         self
@@ -33,26 +33,26 @@ impl OriginBuilder {
 
     /// Adds numbers.
     #[must_use]
-    pub fn numbers(self, numbers: &[f32]) -> Self {
+    pub(crate) fn numbers(self, numbers: &[f32]) -> Self {
         let bytes: Vec<u8> = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
         self.bytes(&bytes)
     }
 
     /// Adds anything that tells all its values by [`std::fmt::Debug`].
     #[must_use]
-    pub fn told(self, value: &impl std::fmt::Debug) -> Self {
+    pub(crate) fn told(self, value: &impl std::fmt::Debug) -> Self {
         self.bytes(format!("{value:?}").as_bytes())
     }
 
     /// The digest.
-    pub fn finish(self) -> Origin {
+    pub(crate) fn finish(self) -> Origin {
         Origin(self.0.finalize().into())
     }
 }
 
 impl<O: Objective> Trainer<O> {
     /// The state, to be kept where it survives the program.
-    pub fn to_bytes(&self, origin: Origin) -> Vec<u8> {
+    pub(crate) fn to_bytes(&self, origin: Origin) -> Vec<u8> {
         let mut bytes = MAGIC.to_vec();
         bytes.extend(VERSION.to_le_bytes());
         bytes.extend(origin.0);
@@ -69,7 +69,7 @@ impl<O: Objective> Trainer<O> {
     ///
     /// # Errors
     /// [`Error::State`] if the bytes are damaged, of another version or another run; the trainer is then as before.
-    pub fn restore(&mut self, origin: Origin, bytes: &[u8]) -> Result<()> {
+    pub(crate) fn restore(&mut self, origin: Origin, bytes: &[u8]) -> Result<()> {
         let count: usize = self.kept().iter().map(|values| values.len()).sum();
         let mut reader = Reader(bytes);
         if reader.take(MAGIC.len())? != MAGIC {

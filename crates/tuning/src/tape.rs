@@ -24,7 +24,7 @@ struct Node {
 
 /// What was computed, in order.
 #[derive(Default)]
-pub struct Tape {
+pub(crate) struct Tape {
     steps: RefCell<Vec<Option<Backward>>>,
 }
 
@@ -55,7 +55,7 @@ impl Tensor {
 
     /// The same array as a leaf of a tape: its slope is kept.
     #[must_use]
-    pub fn tracked(mut self, tape: &Rc<Tape>) -> Self {
+    pub(crate) fn tracked(mut self, tape: &Rc<Tape>) -> Self {
         self.node = Some(Node { tape: tape.clone(), place: tape.push(None) });
         self
     }
@@ -80,7 +80,7 @@ impl Tensor {
 
     /// The same values in another shape.
     #[must_use]
-    pub fn reshaped(mut self, shape: &[usize]) -> Self {
+    pub(crate) fn reshaped(mut self, shape: &[usize]) -> Self {
         assert_eq!(shape.iter().product::<usize>(), self.values.len(), "{:?} as {shape:?}", self.shape);
         self.shape = shape.to_vec();
         self
@@ -88,7 +88,7 @@ impl Tensor {
 
     /// The same values, no longer followed.
     #[must_use]
-    pub fn detached(mut self) -> Self {
+    pub(crate) fn detached(mut self) -> Self {
         self.node = None;
         self
     }
@@ -116,8 +116,9 @@ impl Tensor {
         self.values.clone()
     }
 
-    /// Whether it is followed.
-    pub fn is_tracked(&self) -> bool {
+    /// True where gradients follow it.
+    #[cfg(test)]
+    pub(crate) fn is_tracked(&self) -> bool {
         self.node.is_some()
     }
 }

@@ -15,7 +15,7 @@ use crate::tape::{Tensor, backward};
 pub(crate) const PARTS: usize = 4;
 
 /// What is to be made small.
-pub trait Objective: Sync {
+pub(crate) trait Objective: Sync {
     /// A part of a batch, ready to be run.
     type Part: Send;
 
@@ -77,7 +77,7 @@ pub struct Plan {
 
 /// Weights on their way down.
 #[derive(Debug)]
-pub struct Trainer<O> {
+pub(crate) struct Trainer<O> {
     objective: O,
     plan: Plan,
     rates: Vec<Option<Rate>>,
@@ -93,7 +93,7 @@ type Gradient = Vec<Option<Vec<f32>>>;
 
 impl<O: Objective> Trainer<O> {
     /// Before the first step.
-    pub fn new(objective: O, start: Params, plan: Plan) -> Self {
+    pub(crate) fn new(objective: O, start: Params, plan: Plan) -> Self {
         let rates: Vec<Option<Rate>> = start.entries().iter().map(|entry| objective.rate(&entry.name)).collect();
         let (optimizer, average) = (AdamW::new(&start, &rates), Average::new(&start));
         let workers = Workers::new(plan.threads);
@@ -101,22 +101,22 @@ impl<O: Objective> Trainer<O> {
     }
 
     /// What is made small.
-    pub fn objective(&self) -> &O {
+    pub(crate) fn objective(&self) -> &O {
         &self.objective
     }
 
     /// The running mean of the weights: what the descent is for.
-    pub fn average(&self) -> &Params {
+    pub(crate) fn average(&self) -> &Params {
         self.average.params()
     }
 
     /// The weights before the first step.
-    pub fn start(&self) -> &Params {
+    pub(crate) fn start(&self) -> &Params {
         &self.start
     }
 
     /// Steps done.
-    pub fn steps_done(&self) -> usize {
+    pub(crate) fn steps_done(&self) -> usize {
         self.step
     }
 
@@ -125,7 +125,7 @@ impl<O: Objective> Trainer<O> {
     /// # Errors
     /// [`Error::Done`] after the last one, and [`Error::Diverged`] where the loss is not a number. The weights are then
     /// those of the step before.
-    pub fn step(&mut self) -> Result<StepReport> {
+    pub(crate) fn step(&mut self) -> Result<StepReport> {
         if self.step >= self.plan.ramp.steps {
             return Err(Error::Done(self.plan.ramp.steps));
         }
@@ -162,7 +162,7 @@ impl<O: Objective> Trainer<O> {
     }
 
     /// Runs the numbers below `count` on the threads of the steps; results come in the order of the numbers.
-    pub fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
+    pub(crate) fn side_by_side<T: Send>(&self, count: usize, act: impl Fn(usize) -> T + Sync) -> Vec<T> {
         self.workers.run(count, act)
     }
 }

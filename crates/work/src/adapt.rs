@@ -37,12 +37,14 @@ use touch2touch_core::units::counted;
 
 pub use super::error::Remark;
 pub use super::tuning::Tuning;
-pub use adapted::{Adapted, HeldBack, MOST_SHOWN, PadSummary};
+pub(crate) use adapted::MOST_SHOWN;
+pub(crate) use adapted::PadSummary;
+pub use adapted::{Adapted, HeldBack};
 use gather::{Touch, gather};
 pub use score::Scored;
 #[cfg(feature = "tune")]
 use tune::tune;
-pub use write::Unwritten;
+pub(crate) use write::Unwritten;
 
 const WHAT: &str = "Fit the model to pairs";
 /// Fewer pairs leave ghosts of the training shapes in the predictions.

@@ -12,7 +12,7 @@ use crate::io::{atomic, images};
 use touch2touch_core::grid::{Grid, RgbGrid};
 
 /// Family of the letters; a viewer of the SVG takes its own.
-pub const FAMILY: &str = "sans-serif";
+pub(crate) const FAMILY: &str = "sans-serif";
 /// Pixels of the drawing per pixel of the PNG along one side: their mean smooths edges, which the backend does not.
 const FINE: usize = 2;
 

@@ -60,7 +60,11 @@ impl FingerCloud {
 ///
 /// # Errors
 /// If the sizes differ or the camera's numbers cannot be right.
-pub fn finger_cloud(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Result<FingerCloud, TaskError> {
+pub(crate) fn finger_cloud(
+    imprint: &DepthMap,
+    camera: &DepthCamera,
+    mask: Option<&Mask>,
+) -> Result<FingerCloud, TaskError> {
     let lifted = cloud::lift(imprint, camera, None).map_err(|err| TaskError::from_error(WHAT, &err))?;
     if let Some(mask) = mask.filter(|mask| mask.size() != imprint.size()) {
         let why = format!("the mask has {:?} pixels, the imprint {:?}", mask.size(), imprint.size());

@@ -81,7 +81,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
 ///
 /// # Errors
 /// As [`compare`].
-pub fn compare_parts(
+pub(crate) fn compare_parts(
     predicted: &DepthMap,
     measured: &DepthMap,
     scale: Scale,
@@ -135,7 +135,7 @@ pub fn beside(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<B
 }
 
 /// An imprint as the picture of its sensor shows it: turned as that lies, and as large (`[width, height]`).
-pub fn as_tile(imprint: &DepthMap, rig: &Rig, [width, height]: [usize; 2]) -> DepthMap {
+pub(crate) fn as_tile(imprint: &DepthMap, rig: &Rig, [width, height]: [usize; 2]) -> DepthMap {
     bilinear(&turned(imprint, rig), width, height)
 }
 

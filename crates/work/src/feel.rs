@@ -72,12 +72,12 @@ impl Felt {
     }
 
     /// Predictions that were made together with others.
-    pub fn of_predictions(recipe: &Recipe, made: PerPad<Prediction>) -> Self {
+    pub(crate) fn of_predictions(recipe: &Recipe, made: PerPad<Prediction>) -> Self {
         Self { predictions: Arc::new(made), reached: Some(Stage::Prediction), ..Self::new(recipe) }
     }
 
     /// Imprints of a recipe that were made together with others.
-    pub fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+    pub(crate) fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
         Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(recipe) }
     }
 
@@ -123,7 +123,7 @@ impl Felt {
     ///
     /// # Errors
     /// As [`feel`].
-    pub fn reach_asking(
+    pub(crate) fn reach_asking(
         mut self,
         touch: Touch<'_>,
         stage: Stage,

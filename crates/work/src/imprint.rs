@@ -70,7 +70,7 @@ pub fn imprints_of(
 ///
 /// # Errors
 /// As [`imprint`].
-pub fn picture_of(
+pub(crate) fn picture_of(
     prediction: &Prediction,
     shift: ShiftMode,
     sample: &Sample,
@@ -115,7 +115,7 @@ pub fn in_meters(chain: &DepthChain, raw: &RawPrediction, size: [usize; 2]) -> R
 ///
 /// # Errors
 /// As [`chain`].
-pub fn chain_of_pad(
+pub(crate) fn chain_of_pad(
     prediction: &Prediction,
     shift: ShiftMode,
     sample: &Sample,

@@ -57,7 +57,7 @@ impl Progress {
 }
 
 /// Receives progress.
-pub type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
+pub(crate) type ProgressSink = Arc<dyn Fn(Progress) + Send + Sync>;
 
 /// A prediction as it looks on the way.
 #[derive(Clone, Debug)]

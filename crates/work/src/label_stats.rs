@@ -60,7 +60,7 @@ pub struct PairWork {
     pub tool: Option<String>,
     /// Who did the last of it.
     pub person: String,
-    /// Time from the first deed to the last, without pauses longer than [`super::labels::PAUSE_S`].
+    /// Time from the first deed to the last, without pauses longer than a minute.
     pub seconds: u64,
     /// Masks drawn by hand that there are at the end.
     pub masks: usize,

@@ -9,7 +9,10 @@ mod stored;
 
 pub(crate) use accepted::{by_imprint, of_imprints};
 pub use journal::{Act, Change, Deed, Past, Told};
-pub use record::{Base, MaskRecord, PAUSE_S, Record, working_seconds};
+#[cfg(test)]
+pub(crate) use record::MaskRecord;
+pub use record::Record;
+pub(crate) use record::working_seconds;
 pub use recovery::{Recovered, Unsaved, recover, take_in};
 pub use stored::Labels;
 

@@ -123,7 +123,7 @@ impl Default for MaskChoice {
 impl MaskChoice {
     /// The same without the numbers of other sources.
     #[must_use]
-    pub fn of_its_source(&self) -> Self {
+    pub(crate) fn of_its_source(&self) -> Self {
         let Self { source, threshold_m, probability, top_percent, cad_distance_m } = *self;
         // + 0.0 turns -0 into 0, which means the same.
         let threshold_m = threshold_m + 0.0;

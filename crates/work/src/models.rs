@@ -196,7 +196,7 @@ impl Models {
 
     /// The same, where a picture that fails, or makes a model panic, does not take the others with it. `None` once told to
     /// stop.
-    pub fn predict_each(
+    pub(crate) fn predict_each(
         &self,
         bundle: &BundleInfo,
         engine: EngineChoice,
@@ -400,7 +400,7 @@ impl Models {
     ///
     /// # Errors
     /// If the bundle cannot be opened, or is of another kind.
-    pub fn least_probability(&self, bundle: &BundleInfo) -> Result<f32, TaskError> {
+    pub(crate) fn least_probability(&self, bundle: &BundleInfo) -> Result<f32, TaskError> {
         let what = format!("Open {}", bundle.name);
         let opened = bundle.open(&what)?;
         let spec = opened.mask_unet().ok_or_else(|| TaskError::new(&what, "it is no mask model"))?;

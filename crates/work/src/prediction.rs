@@ -8,7 +8,7 @@ use touch2touch_core::fit::Fitted;
 use touch2touch_core::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 
 /// Per range mapping the steps to meters, or why it cannot be done.
-pub type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
+pub(crate) type Chains = Arc<BTreeMap<ShiftMode, Result<DepthChain, String>>>;
 
 /// A prediction: the decoder's picture, with the ways to meters.
 #[derive(Clone, Debug)]

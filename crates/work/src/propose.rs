@@ -149,7 +149,7 @@ const GRAIN_MM: f64 = 1.7;
 
 /// The imprint as distances to the CAD model are measured from it: what was measured without its grain, a prediction, which
 /// has none, as it is.
-pub fn smooth_imprint<'a>(imprint: &'a DepthMap, of: ImprintSource, rig: &Rig) -> Cow<'a, DepthMap> {
+pub(crate) fn smooth_imprint<'a>(imprint: &'a DepthMap, of: ImprintSource, rig: &Rig) -> Cow<'a, DepthMap> {
     let radius_px = (GRAIN_MM * rig.depth_px_per_mm()).round();
     match of {
         ImprintSource::Measured if radius_px >= 1.0 => Cow::Owned(without_grain(imprint, radius_px as usize)),

@@ -20,7 +20,7 @@ use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
 
-pub use words::{Words, meters, millimeters, quoted, shift_words};
+pub use words::{Words, meters, millimeters, quoted};
 
 /// Version of [`Recipe::id`].
 const VERSION: &str = "r1";
@@ -154,7 +154,7 @@ impl<M> Default for Recipe<M> {
 
 impl<M> Recipe<M> {
     /// The same with other models; `None` where one has no counterpart.
-    pub fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
+    pub(crate) fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
         let generator = match self.generator {
             Some((model, config)) => Some((find(model)?, config)),
             None => None,

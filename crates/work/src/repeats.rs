@@ -16,7 +16,7 @@ use crate::io::digest::sha256;
 /// The share of pairs that come back where nothing else was chosen.
 pub const SHARE: f64 = 0.05;
 /// So many other pairs were marked done by the person before one comes back.
-pub const APART: usize = 10;
+pub(crate) const APART: usize = 10;
 
 /// A mask drawn twice by one person.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -39,7 +39,7 @@ pub struct Repeats {
 }
 
 /// Whether a pair of a person comes back, where a share of them does: the same answer every time.
-pub fn comes_back(pair: &str, person: &str, share: f64) -> bool {
+pub(crate) fn comes_back(pair: &str, person: &str, share: f64) -> bool {
     let digest = sha256(format!("{person}\n{pair}").as_bytes());
     let draw = digest.get(..12).and_then(|digits| u64::from_str_radix(digits, 16).ok());
     draw.is_some_and(|draw| (draw as f64) < share.clamp(0.0, 1.0) * (1_u64 << 48) as f64)

@@ -34,7 +34,7 @@ use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 
 pub use dial::{Dial, MOST_VALUES, Setting};
-pub use outcome::{Failure, Outcome, Point, Series, Summary};
+pub use outcome::{Outcome, Point, Series, Summary};
 
 /// What it is called in errors.
 const WHAT: &str = "Dial";

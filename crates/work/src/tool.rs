@@ -183,7 +183,7 @@ impl<'a> Tools<'a> {
     }
 
     /// What was odd about the files that were read.
-    pub fn into_notes(self) -> Vec<Problem> {
+    pub(crate) fn into_notes(self) -> Vec<Problem> {
         self.notes
     }
 

@@ -27,18 +27,18 @@ use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::units::counted;
 
 pub use super::error::Remark;
-pub use trained::{HeldOut, Told, Trained};
+pub use trained::{Told, Trained};
 
 /// What it is called in errors.
 const WHAT: &str = "Train the mask model";
 /// Fewer masks leave much to chance.
-pub const ENOUGH_MASKS: usize = 20;
+pub(crate) const ENOUGH_MASKS: usize = 20;
 /// Fewer than this of a tool are hardly that tool's shape.
 const ENOUGH_OF_A_TOOL: usize = 3;
 /// Most masks in memory; more are left out.
 const MOST_MASKS: usize = 5000;
 /// Pairs of tools that nobody named.
-pub const NO_TOOL: &str = "no tool named";
+pub(crate) const NO_TOOL: &str = "no tool named";
 
 /// How pairs are divided into those that are learned from and those that are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -39,7 +39,7 @@ impl Grade {
     }
 
     /// The grade of a difference of poses.
-    pub fn of_difference(off: PoseDifference) -> Self {
+    pub(crate) fn of_difference(off: PoseDifference) -> Self {
         Self::of_angle_error(off.angle_rad).max(Self::of(off.position_m, PLACE_M))
     }
 }

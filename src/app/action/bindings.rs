@@ -70,7 +70,7 @@ impl Bindings {
     }
 
     /// Whether a person chose the keys of an action, or took one from it.
-    pub fn is_changed(&self, action: Action) -> bool {
+    pub(crate) fn is_changed(&self, action: Action) -> bool {
         self.all(action) != action.defaults()
     }
 

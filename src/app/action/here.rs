@@ -6,7 +6,7 @@ use super::{Action, Group};
 
 impl Action {
     /// Whether it is about a workspace, or about a pane in it.
-    pub fn is_of(self, workspace: Workspace, pane: Option<Pane>) -> bool {
+    pub(crate) fn is_of(self, workspace: Workspace, pane: Option<Pane>) -> bool {
         pane.is_some_and(|pane| self.is_of_pane(pane)) || self.is_of_workspace(workspace)
     }
 

@@ -116,17 +116,17 @@ impl Key {
     }
 
     /// Whether it is typed with Shift on most keyboards, so that Shift says nothing about the shortcut.
-    pub fn is_shifted(self) -> bool {
+    pub(crate) fn is_shifted(self) -> bool {
         matches!(self, Self::Questionmark | Self::Exclamationmark)
     }
 
     /// Whether it writes nothing, so that it means its action while text is being typed.
-    pub fn is_function(self) -> bool {
+    pub(crate) fn is_function(self) -> bool {
         (Self::F1..=Self::F12).contains(&self)
     }
 
     /// Whether a text box has its own use for it together with Ctrl: undo, copy, whole words.
-    pub fn is_for_text(self) -> bool {
+    pub(crate) fn is_for_text(self) -> bool {
         use Key as K;
         let moves = (K::ArrowLeft..=K::ArrowDown).contains(&self);
         let edits = matches!(self, K::A | K::C | K::V | K::X | K::Y | K::Z | K::Backspace | K::Delete | K::Enter);
@@ -181,7 +181,7 @@ impl FromStr for Shortcut {
 impl Shortcut {
     /// The same without Shift where the key itself is typed with it.
     #[must_use]
-    pub fn plainly(self) -> Self {
+    pub(crate) fn plainly(self) -> Self {
         match self.key {
             Key::Slash if self.shift => Self { shift: false, key: Key::Questionmark, ..self },
             Key::Num1 if self.shift => Self { shift: false, key: Key::Exclamationmark, ..self },
@@ -190,7 +190,7 @@ impl Shortcut {
     }
 
     /// Who else uses it, so that it cannot be an action's: the desktop around the window, text boxes, or a pane itself.
-    pub fn used_by(self) -> Option<&'static str> {
+    pub(crate) fn used_by(self) -> Option<&'static str> {
         use Key as K;
         let arrow = (K::ArrowLeft..=K::ArrowDown).contains(&self.key);
         Some(match self {

@@ -17,7 +17,7 @@ use touch2touch_work::recipe::Recipe;
 const FOLDS: usize = 3;
 
 /// Steps of tuning that can be asked for.
-pub const TUNING_STEPS: RangeInclusive<u32> = 30..=5000;
+pub(crate) const TUNING_STEPS: RangeInclusive<u32> = 30..=5000;
 
 /// Which pairs are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
@@ -65,7 +65,7 @@ impl Default for AdaptState {
 
 impl State {
     /// The pairs that a fit started now would take.
-    pub fn adapt_pairs(&self) -> Box<dyn Iterator<Item = PairId> + '_> {
+    pub(crate) fn adapt_pairs(&self) -> Box<dyn Iterator<Item = PairId> + '_> {
         let Some(open) = &self.library.open else { return Box::new(std::iter::empty()) };
         let pairs = &open.source.index().pairs;
         let all = (0..pairs.len() as u32).map(PairId);
@@ -88,7 +88,7 @@ impl State {
     }
 
     /// Whether there is something to fit, and pairs to fit it to.
-    pub fn can_adapt(&self) -> bool {
+    pub(crate) fn can_adapt(&self) -> bool {
         self.to_be_fitted().is_some() && self.adapt_pairs().next().is_some()
     }
 
@@ -111,7 +111,7 @@ impl State {
     }
 
     /// How the tuning goes, or how the last one went.
-    pub fn tuning_curves(&self) -> &[Curve] {
+    pub(crate) fn tuning_curves(&self) -> &[Curve] {
         match (self.running(TaskKind::Fit), &self.adapt.result) {
             (Some((_, task)), _) => &task.progress.curves,
             (None, Some(result)) => &result.curves,
@@ -128,13 +128,13 @@ impl State {
     }
 
     /// Whether that is what predicts now.
-    pub fn uses_fit(&self) -> bool {
+    pub(crate) fn uses_fit(&self) -> bool {
         let now = self.bundle(BundleKind::Generator).ok().map(|bundle| &bundle.id);
         self.fitted().is_some_and(|fitted| Some(&fitted.id) == now)
     }
 
     /// The last fit, where it was not written because of what speaks against it.
-    pub fn refused_fit(&self) -> Option<&Arc<Adapted>> {
+    pub(crate) fn refused_fit(&self) -> Option<&Arc<Adapted>> {
         self.adapt.result.as_ref().filter(|adapted| adapted.unwritten.is_some())
     }
 

@@ -61,13 +61,13 @@ impl Default for DialState {
 
 impl State {
     /// The recipe that the dial changes; without a generator where the predictions are left out.
-    pub fn dial_recipe(&self) -> Recipe {
+    pub(crate) fn dial_recipe(&self) -> Recipe {
         let recipe = self.in_force(ImprintSource::Measured);
         Recipe { generator: recipe.generator.filter(|_| self.dial.predictions), ..recipe }
     }
 
     /// The pairs that a dial turned now would go over.
-    pub fn dial_pairs(&self) -> Vec<PairId> {
+    pub(crate) fn dial_pairs(&self) -> Vec<PairId> {
         let len = self.library.open.as_ref().map_or(0, |open| open.source.index().pairs.len());
         match self.dial.pairs {
             DialPairs::Spread(count) => pairs::spread(len, Some(count)).map(|at| PairId(at as u32)).collect(),
@@ -80,7 +80,7 @@ impl State {
     ///
     /// # Errors
     /// Why it cannot be turned, in words.
-    pub fn sweep_setup(&self) -> Result<SweepSetup, String> {
+    pub(crate) fn sweep_setup(&self) -> Result<SweepSetup, String> {
         let DialState { dial, range: [first, last], count, .. } = self.dial;
         if self.library.open.is_none() {
             return Err("No data set is open".into());
@@ -103,14 +103,14 @@ impl State {
     }
 
     /// Whether a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.
-    pub fn is_dialed(&self, value: Setting, at: bool) -> bool {
+    pub(crate) fn is_dialed(&self, value: Setting, at: bool) -> bool {
         let now = self.dial_recipe();
         let then = self.dial.result.as_ref().map(|result| &result.in_force);
         value.put(&now).as_ref() == Ok(&now) || (at && then == Some(&now))
     }
 
     /// Whether something other than the dial was changed since it was turned.
-    pub fn is_dial_outdated(&self) -> bool {
+    pub(crate) fn is_dial_outdated(&self) -> bool {
         let Some(result) = &self.dial.result else { return false };
         let value = result.series.first().and_then(|series| series.points.first()?.value);
         value.is_some_and(|value| value.put(&self.dial_recipe()) != value.put(&result.in_force))

@@ -13,7 +13,7 @@ use touch2touch_work::evaluate::{Evaluation, Setup};
 use touch2touch_work::queue::{Queue, QueueBy};
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
-pub const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
+pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
 
 /// The table and how it is asked for.
 #[derive(Clone, Debug)]
@@ -92,7 +92,7 @@ pub struct SourceScores {
 
 /// How a value stands among those of all pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Standing {
+pub(crate) enum Standing {
     /// Among the better seven tenths.
     Fine,
     /// Among the three worst tenths.
@@ -123,7 +123,7 @@ impl SourceScores {
     }
 
     /// How a value of a metric stands among those of all pairs.
-    pub fn standing(&self, metric: Metric, value: f64) -> Standing {
+    pub(crate) fn standing(&self, metric: Metric, value: f64) -> Standing {
         let bad = metric.badness(value);
         match self.metrics.get(&metric) {
             _ if value.is_nan() => Standing::Worst,
@@ -213,7 +213,7 @@ impl State {
     }
 
     /// What an evaluation started now would do; `None` without data or with nothing to score.
-    pub fn evaluation_setup(&self) -> Option<Setup> {
+    pub(crate) fn evaluation_setup(&self) -> Option<Setup> {
         self.library.open.as_ref()?;
         let origin = |kind| self.bundle(kind).ok().map(|b| b.origin.clone());
         let bundles: Vec<_> = self.evaluated().filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
@@ -231,7 +231,7 @@ impl State {
     }
 
     /// The rows to show: those of the table, and the published ones if wanted.
-    pub fn table_rows(&self) -> Vec<Row> {
+    pub(crate) fn table_rows(&self) -> Vec<Row> {
         let Some(result) = &self.table.result else { return Vec::new() };
         let mut rows = result.rows.clone();
         if self.table.published {

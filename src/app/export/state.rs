@@ -30,9 +30,9 @@ use touch2touch_work::recipe::{ModelName, Recipe};
 use touch2touch_work::tool::NamedTool;
 
 /// Pairs of the list that a figure may take.
-pub const MOST_PAIRS: usize = 50;
+pub(crate) const MOST_PAIRS: usize = 50;
 /// Scales that are offered.
-pub const SCALES: [u8; 4] = [1, 2, 4, 8];
+pub(crate) const SCALES: [u8; 4] = [1, 2, 4, 8];
 
 /// What a person chose about the next figure. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
@@ -128,7 +128,7 @@ impl State {
     }
 
     /// What is imported as the form says, while it is open.
-    pub fn import_setup(&self) -> Option<ImportSetup> {
+    pub(crate) fn import_setup(&self) -> Option<ImportSetup> {
         let form = self.export.importing.as_ref()?;
         let (from, over_hand, person) = (form.from.clone(), form.over_hand, self.known_person());
         Some(ImportSetup { from, format: None, over_hand, person })
@@ -183,7 +183,7 @@ impl Output {
 
 /// How the studio showed a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct CaseView {
+pub(crate) struct CaseView {
     /// The preferences, with the arrangement of the panes.
     pub settings: Settings,
     /// Where 3D views look from, in the window's own format.
@@ -234,7 +234,7 @@ impl PairExport {
 }
 
 /// A pair of a figure with the predictions that it needs.
-pub type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
+pub(crate) type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
 
 impl Pane {
     /// The name that a picture of it is offered under.
@@ -244,7 +244,7 @@ impl Pane {
     }
 
     /// The column of a figure that shows the same; `None` for panes that are no pictures.
-    pub fn in_figure(self) -> Option<FigurePane> {
+    pub(crate) fn in_figure(self) -> Option<FigurePane> {
         Some(match (self, self.kind()) {
             (Self::GelDifference, _) => FigurePane::GelSlim,
             (Self::GelRaw, _) => FigurePane::Raw,
@@ -269,7 +269,7 @@ impl State {
     }
 
     /// What the form describes, before anything is drawn.
-    pub fn figure_setup(&self) -> FigureSetup {
+    pub(crate) fn figure_setup(&self) -> FigureSetup {
         let form = &self.export.form;
         let pairs = match form.first {
             Some(n) => self.library.order.iter().copied().take(n).collect(),
@@ -281,7 +281,7 @@ impl State {
     }
 
     /// One pane of the selected pair, with the fingers that it shows.
-    pub fn picture_setup(&self, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
+    pub(crate) fn picture_setup(&self, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
         let shown = self.fingers();
         let fingers = self.rig().pads().filter(|finger| shown.contains(finger)).collect();
         let scale = f64::from(scale.unwrap_or(1));
@@ -309,7 +309,7 @@ impl State {
     }
 
     /// The predictions that a figure shows: the one shown for a touch, else what the settings would make of it.
-    pub fn figure_recipes(&self, setup: &FigureSetup) -> Recipes {
+    pub(crate) fn figure_recipes(&self, setup: &FigureSetup) -> Recipes {
         let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
         let Some(open) = self.library.open.as_ref().filter(|_| predicted) else { return Vec::new() };
         let of = |pair: &PairId| {
@@ -361,7 +361,7 @@ impl State {
     }
 
     /// What goes into a case of the selected pair; `camera` is where 3D views look from, as the window says it.
-    pub fn case_setup(&self, camera: &str) -> Option<CaseSetup> {
+    pub(crate) fn case_setup(&self, camera: &str) -> Option<CaseSetup> {
         let pair = self.selection.pair?;
         let chosen = self.chosen(self.selection.finger).or_else(|| self.rig().pads().find_map(|pad| self.chosen(pad)));
         let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone().into(), key.config())));
@@ -382,7 +382,7 @@ impl State {
     }
 
     /// Whether a figure of the open pairs can be drawn.
-    pub fn can_draw(&self) -> bool {
+    pub(crate) fn can_draw(&self) -> bool {
         let open = self.library.open.as_ref();
         open.is_some_and(|open| open.source.as_dataset().is_some()) && self.entry().is_some()
     }

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PairKey, PoseBits, RegistrationChoice};
 use super::super::pane::Need;
-pub use super::super::results::inspection::Inspection;
+pub(crate) use super::super::results::inspection::Inspection;
 use super::super::state::State;
 use super::super::workbench::state::Layer;
 use touch2touch_core::align::TraceStep;
@@ -126,13 +126,13 @@ impl State {
     }
 
     /// Whether something on screen shows a step of an imprint's registration.
-    pub fn shows_steps(&self, source: ImprintSource) -> bool {
+    pub(crate) fn shows_steps(&self, source: ImprintSource) -> bool {
         let lines = self.workbench.layer == Layer::Correspondences && self.needs(Need::Scene(source));
         self.inspect.source == source && (lines || self.needs(Need::Steps))
     }
 
     /// The step that the 3D view of a side shows instead of the registered pose.
-    pub fn inspected_in(&self, source: ImprintSource) -> Option<Inspected<'_>> {
+    pub(crate) fn inspected_in(&self, source: ImprintSource) -> Option<Inspected<'_>> {
         if self.shows_steps(source) { self.inspected() } else { None }
     }
 

@@ -17,7 +17,7 @@ use touch2touch_work::propose::{self, Batch, BatchSetup, ProposeSetup};
 
 impl State {
     /// Whether masks can be proposed for the listed pairs.
-    pub fn can_propose_all(&self) -> bool {
+    pub(crate) fn can_propose_all(&self) -> bool {
         let predicts = self.worked_on(self.selection.finger) == ImprintSource::Predicted;
         let has_model = !predicts || self.bundle(BundleKind::Generator).is_ok();
         !self.library.order.is_empty() && has_model && self.running(TaskKind::Propose).is_none()

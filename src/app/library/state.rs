@@ -164,7 +164,7 @@ impl Library {
     }
 
     /// The row of `pair` in the list, if it passes the filter.
-    pub fn row_of(&self, pair: PairId) -> Option<usize> {
+    pub(crate) fn row_of(&self, pair: PairId) -> Option<usize> {
         self.order.iter().position(|p| *p == pair)
     }
 
@@ -175,7 +175,7 @@ impl Library {
 
     /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind; nothing in
     /// place of what the open case names and this machine lacks.
-    pub fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
+    pub(crate) fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
         let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
         // What was made for one's own data is used where it is chosen.
         let first = of_kind.clone().find(|bundle| !bundle.is_own()).or_else(|| of_kind.clone().next());

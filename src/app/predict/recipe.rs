@@ -32,7 +32,7 @@ impl State {
 
     /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or
     /// pose of them (unless the settings say otherwise).
-    pub fn fingers_to_generate(&self) -> Vec<PadId> {
+    pub(crate) fn fingers_to_generate(&self) -> Vec<PadId> {
         let (_, cloud) = self.shows_cloud(ImprintSource::Predicted);
         if cloud && self.settings.generate.both_fingers {
             return self.rig().pad_list();
@@ -87,7 +87,7 @@ impl State {
     }
 
     /// Whether something can be generated for a finger of the selected pair, which is loaded.
-    pub fn can_start(&self, finger: PadId) -> bool {
+    pub(crate) fn can_start(&self, finger: PadId) -> bool {
         self.sample().ready().is_some_and(|sample| self.has_input(sample, finger))
     }
 }

@@ -10,7 +10,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_work::prediction::Prediction;
 
 /// What a prediction may cost to be made without being asked for, seconds.
-pub const CHEAP_S: f64 = 1.0;
+pub(crate) const CHEAP_S: f64 = 1.0;
 /// How often it is looked whether the pair is still on screen, before its prediction begins.
 const LOOK: Duration = Duration::from_millis(10);
 

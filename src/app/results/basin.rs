@@ -44,7 +44,7 @@ impl State {
     ///
     /// # Errors
     /// Why there can be none.
-    pub fn basin_key(&self) -> Result<Option<BasinKey>, Absent> {
+    pub(crate) fn basin_key(&self) -> Result<Option<BasinKey>, Absent> {
         let pose = self.pose_key(self.inspect.source)?;
         Ok(pose.map(|pose| BasinKey { pose, plane: self.inspect.plane }))
     }

@@ -64,7 +64,7 @@ impl State {
     ///
     /// # Errors
     /// Why there can be none.
-    pub fn cloud_key(&self, source: ImprintSource) -> Result<Option<CloudKey>, Absent> {
+    pub(crate) fn cloud_key(&self, source: ImprintSource) -> Result<Option<CloudKey>, Absent> {
         let sample = match self.sample() {
             Lookup::Ready(sample) => sample,
             Lookup::Absent(absent) => return Err(absent),

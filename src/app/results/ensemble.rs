@@ -1,6 +1,6 @@
 //! Mean and spreads of several predictions of one touch.
 
-pub use super::imprint::EnsembleKey;
+pub(crate) use super::imprint::EnsembleKey;
 use super::imprint::MetersKey;
 use super::prediction::PredictionKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State};

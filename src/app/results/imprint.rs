@@ -188,7 +188,7 @@ impl State {
     }
 
     /// An imprint of the selected pair by its recipe, meters, raw bubble orientation.
-    pub fn imprint_of(&self, key: ImprintKey) -> Lookup<'_, DepthMap> {
+    pub(crate) fn imprint_of(&self, key: ImprintKey) -> Lookup<'_, DepthMap> {
         match key {
             ImprintKey::Measured(touch) => self.bubble(touch.finger).and_then(Absent::NoBubble, |b| Some(&b.imprint)),
             ImprintKey::Predicted(recipe, shift) => self.look(MetersKey(recipe, shift)).value(),

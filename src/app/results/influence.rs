@@ -37,12 +37,12 @@ impl Computes for InfluenceKey {
 
 impl State {
     /// Whether the influence of the pixels is shown over an imprint.
-    pub fn shows_influence(&self, source: ImprintSource) -> bool {
+    pub(crate) fn shows_influence(&self, source: ImprintSource) -> bool {
         self.selection.influence && self.needs(Need::Imprint(source))
     }
 
     /// The recipe of the influence; `None` while, or where, there is no pose.
-    pub fn influence_key(&self, source: ImprintSource) -> Option<InfluenceKey> {
+    pub(crate) fn influence_key(&self, source: ImprintSource) -> Option<InfluenceKey> {
         Some(InfluenceKey(self.pose_key(source).ok()??))
     }
 

@@ -78,7 +78,7 @@ impl Inspection {
     }
 
     /// Steps of a start, the applied start included.
-    pub fn num_steps(&self, run: usize) -> usize {
+    pub(crate) fn num_steps(&self, run: usize) -> usize {
         self.runs.get(run).map_or(0, Vec::len)
     }
 
@@ -131,7 +131,7 @@ impl State {
     ///
     /// # Errors
     /// Why there can be none.
-    pub fn inspection_key(&self) -> Result<Option<RunKey>, Absent> {
+    pub(crate) fn inspection_key(&self) -> Result<Option<RunKey>, Absent> {
         let pose = self.pose_key(self.inspect.source)?;
         Ok(pose.map(|pose| RunKey { pose, start: self.inspect.start }))
     }

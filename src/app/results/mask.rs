@@ -137,7 +137,7 @@ impl State {
     ///
     /// # Errors
     /// Why the source that the settings ask for cannot give one for this finger.
-    pub fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
+    pub(crate) fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
         let recipe = self.automatic_recipe()?;
         match recipe {
             MaskRecipe::Cad(_) => {
@@ -166,7 +166,7 @@ impl State {
     }
 
     /// The automatic mask of one finger's imprint.
-    pub fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
+    pub(crate) fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
         if self.imprint(source, finger).ready().is_none() {
             return self.imprint(source, finger).without();
         }
@@ -174,7 +174,7 @@ impl State {
     }
 
     /// Where a mask that is drawn on one finger's imprint belongs; `None` while there is no such imprint.
-    pub fn mask_place(&self, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
+    pub(crate) fn mask_place(&self, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
         Some(MaskPlace { pad: finger, of: self.imprint_key(source, finger).ok()?.of()? })
     }
 
@@ -229,7 +229,7 @@ impl State {
     }
 
     /// Whether what the gate needs to know of the CAD model is there.
-    pub fn gate_is_known(&self, source: ImprintSource, finger: PadId) -> bool {
+    pub(crate) fn gate_is_known(&self, source: ImprintSource, finger: PadId) -> bool {
         self.gate_key(source, finger).is_none_or(|key| self.results.masks.get(&key).is_some())
     }
 
@@ -254,15 +254,10 @@ impl State {
     }
 
     /// Where the pixels of an automatic mask come from.
-    pub fn automatic_provenance(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> Provenance {
+    pub(crate) fn automatic_provenance(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> Provenance {
         let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
         let found = key.ok().and_then(|key| self.results.masks.get(&key));
         recipe.provenance(self.model_of(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
-    }
-
-    /// An automatic source in words, with its number.
-    pub fn mask_label(&self, recipe: &MaskRecipe) -> String {
-        recipe.label(self.model_of(recipe))
     }
 
     /// The name of the mask model that a recipe takes; empty where it takes none.

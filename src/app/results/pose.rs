@@ -136,7 +136,7 @@ impl State {
     ///
     /// # Errors
     /// Why there can be none.
-    pub fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
+    pub(crate) fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
         let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
         if let PoseOf::Finger(finger) = of {
             let part = key.cloud.parts[finger].take();

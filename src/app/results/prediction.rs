@@ -60,7 +60,7 @@ impl PredictionKey {
     }
 
     /// The recipes that differ from it in their seeds alone: `count` of them, from its own on.
-    pub fn with_seeds(&self, count: usize) -> Vec<Self> {
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
         seeds(self.seed, count).into_iter().map(|seed| Self { seed, ..self.clone() }).collect()
     }
 
@@ -192,7 +192,7 @@ impl Wanted<'_> {
 }
 
 /// Predictions with their keys.
-pub type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;
+pub(crate) type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;
 
 /// Makes `recipes`, all of one pair and bundle. A finger without a GelSlim image is left out where another has one.
 /// `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.

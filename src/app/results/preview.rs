@@ -20,7 +20,7 @@ pub struct Preview {
 }
 
 /// Receives pictures on the way.
-pub type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
+pub(crate) type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
 
 /// What of a prediction under way would be looked at now. The runtime keeps it up to date while jobs run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

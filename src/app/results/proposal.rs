@@ -200,7 +200,7 @@ impl State {
     }
 
     /// The pair whose mask would be carried to the selected one.
-    pub fn carries_from(&self) -> Option<PairKey> {
+    pub(crate) fn carries_from(&self) -> Option<PairKey> {
         let (open, to) = (self.library.open.as_ref()?, self.selection.pair?);
         let from = propose::carries_from(open.source.index(), to, |name| self.document.review(name))?;
         Some(open.key(from))

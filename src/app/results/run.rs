@@ -34,7 +34,7 @@ impl Computes for RunKey {
 
 impl State {
     /// The recorded registration from the engine's own starts; `None` while its inputs are not there.
-    pub fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
+    pub(crate) fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
         Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
     }
 }

@@ -46,7 +46,7 @@ impl Computes for ScoresKey {
 
 impl State {
     /// How all pairs of the open data set are scored: as the results table does it, without leaving grasps out.
-    pub fn setup_of_all(&self) -> Option<Setup> {
+    pub(crate) fn setup_of_all(&self) -> Option<Setup> {
         Some(Setup { grasps_per_tool: None, ..self.evaluation_setup()? })
     }
 

@@ -64,7 +64,7 @@ pub enum Why {
 
 impl Why {
     /// Whether it is meant to be shown.
-    pub fn is_meant(self) -> bool {
+    pub(crate) fn is_meant(self) -> bool {
         matches!(self, Self::Picked | Self::Held)
     }
 }
@@ -131,7 +131,7 @@ impl State {
     }
 
     /// The name of the model that made a prediction.
-    pub fn model_name(&self, recipe: &PredictionKey) -> &str {
+    pub(crate) fn model_name(&self, recipe: &PredictionKey) -> &str {
         let bundle = self.library.bundle(&recipe.bundle).map(|bundle| &*bundle.name);
         let lacking = self.library.lacking.as_ref().filter(|(id, _)| *id == recipe.bundle).map(|(_, name)| &**name);
         bundle.or(lacking).unwrap_or("a model that is not there any more")

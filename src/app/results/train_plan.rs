@@ -44,7 +44,7 @@ impl Computes for TrainPlanKey {
 
 impl State {
     /// The plan of the training that the pane describes.
-    pub fn train_plan_key(&self) -> Option<TrainPlanKey> {
+    pub(crate) fn train_plan_key(&self) -> Option<TrainPlanKey> {
         let open = self.library.open.as_ref()?;
         let revision = Revision(self.document.last_revision);
         Some(TrainPlanKey { dataset: open.seq, choice: self.train.form.choice, revision })

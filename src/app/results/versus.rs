@@ -254,7 +254,7 @@ impl State {
     }
 
     /// The surface points of a subject, where they are there, with their recipe.
-    pub fn subject_points(&self, subject: &Subject) -> Option<(CloudKey, &Arc<Clouds>)> {
+    pub(crate) fn subject_points(&self, subject: &Subject) -> Option<(CloudKey, &Arc<Clouds>)> {
         let key = self.subject_cloud(subject).ok()?;
         let found = self.results.clouds.get(&key)?;
         Some((key, found))

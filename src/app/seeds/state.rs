@@ -71,7 +71,7 @@ impl State {
     }
 
     /// The fingers whose seeds make a pose: both, or only the active one, as in generating.
-    pub fn seed_fingers(&self) -> Vec<PadId> {
+    pub(crate) fn seed_fingers(&self) -> Vec<PadId> {
         match self.settings.generate.both_fingers {
             true => self.rig().pads().filter(|f| self.seed_recipes(*f).is_ok()).collect(),
             false => vec![self.selection.finger],
@@ -99,7 +99,7 @@ impl State {
     }
 
     /// Why the seeds have no poses, if they cannot have any.
-    pub fn seed_pose_absent(&self) -> Option<Absent> {
+    pub(crate) fn seed_pose_absent(&self) -> Option<Absent> {
         if let Err(absent) = self.tool_name() {
             return Some(absent);
         }
@@ -109,7 +109,7 @@ impl State {
     }
 
     /// Seeds that are still to come.
-    pub fn seeds_to_come(&self) -> usize {
+    pub(crate) fn seeds_to_come(&self) -> usize {
         self.tasks.demanded.iter().filter(|r| matches!(r, Request::Seed(_))).count()
     }
 }

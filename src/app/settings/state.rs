@@ -24,18 +24,18 @@ use touch2touch_work::repeats;
 use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
-pub const SETTINGS_VERSION: u32 = 1;
+pub(crate) const SETTINGS_VERSION: u32 = 1;
 /// How many recent places are kept.
-pub const MAX_RECENT: usize = 12;
+pub(crate) const MAX_RECENT: usize = 12;
 /// Brush radii that can be chosen, pixels.
-pub const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
+pub(crate) const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
 /// Sizes of clean-ups, millimeters.
-pub const CLEAN_MM: std::ops::RangeInclusive<f32> = 0.1..=20.0;
+pub(crate) const CLEAN_MM: std::ops::RangeInclusive<f32> = 0.1..=20.0;
 /// Denoising steps that can be chosen.
-pub const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
+pub(crate) const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
 
 /// Largest budget of kept predictions, MiB: a terabyte.
-pub const MAX_CACHE_MIB: u32 = 1 << 20;
+pub(crate) const MAX_CACHE_MIB: u32 = 1 << 20;
 
 /// All preferences.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -164,7 +164,7 @@ impl Settings {
 
     /// These preferences, with what is of the person and the machine as `person` has it: a case brings none of that.
     #[must_use]
-    pub fn of_person(self, person: &Self) -> Self {
+    pub(crate) fn of_person(self, person: &Self) -> Self {
         Self {
             theme: person.theme,
             ui_zoom: person.ui_zoom,
@@ -260,7 +260,7 @@ impl Default for ColorRange {
 
 impl ColorRange {
     /// Whether colors can be looked up with it.
-    pub fn is_valid(self) -> bool {
+    pub(crate) fn is_valid(self) -> bool {
         self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
     }
 }
@@ -382,7 +382,7 @@ impl GenerateSettings {
     }
 
     /// Whether the numbers that a preset stands for are the same.
-    pub fn same_numbers(&self, other: &Self) -> bool {
+    pub(crate) fn same_numbers(&self, other: &Self) -> bool {
         let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
         numbers(self) == numbers(other)
     }

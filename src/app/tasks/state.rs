@@ -27,7 +27,7 @@ macro_rules! kinds {
             }
 
             /// Where it runs.
-            pub fn lane(self) -> Lane {
+            pub(crate) fn lane(self) -> Lane {
                 match self { $( Self::$kind => Lane::$lane, )* }
             }
         }
@@ -97,7 +97,7 @@ impl Tasks {
     }
 
     /// A task that makes predictions.
-    pub fn any_generating(&self) -> Option<(Ticket, &Task)> {
+    pub(crate) fn any_generating(&self) -> Option<(Ticket, &Task)> {
         self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
     }
 
@@ -189,7 +189,7 @@ impl Log {
     }
 
     /// Says of the last line which place it is about.
-    pub fn place_last(&mut self, place: PathBuf) {
+    pub(crate) fn place_last(&mut self, place: PathBuf) {
         if let Some(entry) = self.entries.back_mut() {
             entry.place = Some(place);
         }

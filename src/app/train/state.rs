@@ -13,11 +13,11 @@ use touch2touch_work::train::{TrainChoice, TrainSetup, Trained};
 use touch2touch_work::tuning::Tuning;
 
 /// Minutes that can be asked for.
-pub const MINUTES: RangeInclusive<u32> = 1..=600;
+pub(crate) const MINUTES: RangeInclusive<u32> = 1..=600;
 /// Steps that can be asked for.
-pub const STEPS: RangeInclusive<u32> = 1..=100_000;
+pub(crate) const STEPS: RangeInclusive<u32> = 1..=100_000;
 /// Most percent of the pairs that can be left out.
-pub const MOST_HELD_OUT: u8 = 90;
+pub(crate) const MOST_HELD_OUT: u8 = 90;
 
 /// What a person chose about the next training. Not kept between runs of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -71,7 +71,7 @@ pub struct TrainState {
 impl State {
     /// What a training started now would do; `None` without data or a mask model. Where the new bundle lies is not the
     /// state's to say.
-    pub fn train_setup(&self) -> Option<TrainSetup> {
+    pub(crate) fn train_setup(&self) -> Option<TrainSetup> {
         self.library.open.as_ref()?;
         let generators = self.library.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator);
         Some(TrainSetup {
@@ -86,7 +86,7 @@ impl State {
     }
 
     /// How the training goes, or how the last one went.
-    pub fn training_curves(&self) -> &[Curve] {
+    pub(crate) fn training_curves(&self) -> &[Curve] {
         match (self.running(TaskKind::Train), &self.train.result) {
             (Some((_, task)), _) => &task.progress.curves,
             (None, Some(result)) => &result.curves,

@@ -126,7 +126,7 @@ pub struct Section {
 }
 
 /// How far from the middle of the grasp a plane can stand, meters.
-pub const SECTION_REACH_M: f64 = 0.06;
+pub(crate) const SECTION_REACH_M: f64 = 0.06;
 
 /// A point that was clicked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -247,7 +247,7 @@ impl State {
     }
 
     /// The imprint that a pose is made from, where all fingers show the same.
-    pub fn shown_imprint(&self, source: ImprintSource) -> Option<ImprintOf> {
+    pub(crate) fn shown_imprint(&self, source: ImprintSource) -> Option<ImprintOf> {
         let rig = self.rig();
         let mut of = rig.pads().filter_map(|pad| self.mask_place(source, pad)).map(|place| place.of);
         let first = of.next()?;
@@ -285,7 +285,7 @@ impl State {
     }
 
     /// Whether something on screen shows the layers of an imprint.
-    pub fn shows_layers(&self, source: ImprintSource) -> bool {
+    pub(crate) fn shows_layers(&self, source: ImprintSource) -> bool {
         let bench = &self.workbench;
         let in_scene = self.needs(Need::Scene(source))
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
@@ -294,12 +294,12 @@ impl State {
     }
 
     /// Whether a 3D view shows the distances between an imprint and the model.
-    pub fn shows_deviation(&self, source: ImprintSource) -> bool {
+    pub(crate) fn shows_deviation(&self, source: ImprintSource) -> bool {
         self.workbench.layer == Layer::Distance && self.needs(Need::Scene(source))
     }
 
     /// How far the registered poses of measurement and prediction are apart, where both are there.
-    pub fn sides_apart(&self) -> Option<PoseDifference> {
+    pub(crate) fn sides_apart(&self) -> Option<PoseDifference> {
         let pose = |source| Some(self.pose(source).ready()?.grasp_from_object);
         Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))
     }

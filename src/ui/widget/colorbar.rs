@@ -10,14 +10,14 @@ use crate::ui::widget::texture::Histogram;
 use touch2touch_core::colormap::{ColorMap, Range};
 
 /// Height of the whole bar, points.
-pub const HEIGHT: f32 = 36.0;
+pub(crate) const HEIGHT: f32 = 36.0;
 /// Width of the numbers at the ends, points.
 const END: f32 = 42.0;
 /// From this width on the buttons stand beside the bar instead of in a menu, points.
 const WIDE: f32 = 340.0;
 
 /// A bar to be shown. Values are in millimeters.
-pub struct Colorbar<'a> {
+pub(crate) struct Colorbar<'a> {
     /// The name for screen readers and tests, e.g. `Depth range`.
     pub label: &'a str,
     /// The colors.
@@ -49,7 +49,7 @@ pub enum Asked {
 
 impl Colorbar<'_> {
     /// Shows the bar over the width of `ui`; `range` is in millimeters.
-    pub fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
+    pub(crate) fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
         let p = Palette::of(ui);
         let mut asked = None;
         ui.allocate_ui(vec2(ui.available_width(), HEIGHT), |ui| {

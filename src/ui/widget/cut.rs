@@ -1,7 +1,7 @@
 //! Texts that are too long for their place.
 
 /// A text that is no wider than there is room, with what had to go left out of its middle: names differ at their ends.
-pub fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
+pub(crate) fn cut_in_the_middle(text: &str, room: f32, width: impl Fn(&str) -> f32) -> String {
     if width(text) <= room {
         return text.to_owned();
     }

@@ -6,7 +6,7 @@ use crate::app::action::Bindings;
 use crate::ui::theme::{Palette, SMALL, caption};
 
 /// Mouse controls of every image pane.
-pub const IMAGE: &[(&str, &str)] = &[
+pub(crate) const IMAGE: &[(&str, &str)] = &[
     ("Wheel", "zoom at the pointer"),
     ("Drag, middle drag or Space + drag", "move all linked images"),
     ("Double-click or [[fit]]", "fit"),
@@ -14,7 +14,7 @@ pub const IMAGE: &[(&str, &str)] = &[
 ];
 
 /// Controls of the comparison of any two imprints.
-pub const VERSUS: &[(&str, &str)] = &[
+pub(crate) const VERSUS: &[(&str, &str)] = &[
     ("Click on A or B", "choose what it is"),
     ("[[swap_compared]]", "swap A and B"),
     ("[[compare_mode]]", "side by side, wipe, difference, 3D"),
@@ -25,7 +25,7 @@ pub const VERSUS: &[(&str, &str)] = &[
 ];
 
 /// Mouse controls of an image that can be painted on.
-pub const PAINT: &[(&str, &str)] = &[
+pub(crate) const PAINT: &[(&str, &str)] = &[
     ("Drag", "paint with the tool in hand"),
     ("Ctrl + drag or right drag", "erase"),
     ("[[brush_smaller]] and [[brush_larger]], or Shift + wheel", "brush size"),
@@ -35,7 +35,7 @@ pub const PAINT: &[(&str, &str)] = &[
 ];
 
 /// Mouse controls of the 3D panes.
-pub const SCENE: &[(&str, &str)] = &[
+pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Left drag", "orbit"),
     ("Right or middle drag", "move"),
     ("Wheel", "zoom at the pointer"),
@@ -50,7 +50,7 @@ pub const SCENE: &[(&str, &str)] = &[
 ];
 
 /// Controls of the time machine.
-pub const STEPS: &[(&str, &str)] = &[
+pub(crate) const STEPS: &[(&str, &str)] = &[
     ("Drag in the curves", "scrub"),
     ("Click on a curve", "show that start and step"),
     ("[[step_back]] and [[step_forward]]", "previous and next step"),
@@ -60,7 +60,7 @@ pub const STEPS: &[(&str, &str)] = &[
 ];
 
 /// Mouse controls of the basin map.
-pub const BASIN: &[(&str, &str)] = &[
+pub(crate) const BASIN: &[(&str, &str)] = &[
     ("Hover", "the start asked for, the one applied, and the end"),
     ("Click", "load that run into the time machine"),
     ("[[cancel_jobs]]", "give up what is being computed"),

@@ -7,7 +7,7 @@ use eframe::egui::{
 
 /// What part of an image is seen. Shared by all canvases of a group, whatever their sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ViewTransform {
+pub(crate) struct ViewTransform {
     /// The point of the image in the middle of the pane, as a share of its width and height.
     pub center: [f32; 2],
     /// Magnification; 1 fits the image to the pane.
@@ -32,7 +32,7 @@ impl ViewTransform {
 
 /// Between image pixels and the screen. (0, 0) is the center of the top-left pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CanvasMap {
+pub(crate) struct CanvasMap {
     /// Where the whole image lies on the screen.
     pub image_rect: Rect,
     /// Points per image pixel.
@@ -45,7 +45,7 @@ pub struct CanvasMap {
 
 impl CanvasMap {
     /// The place of `view` of an image of `size` pixels in `rect`.
-    pub fn new(rect: Rect, size: [usize; 2], view: ViewTransform, rotated: bool) -> Self {
+    pub(crate) fn new(rect: Rect, size: [usize; 2], view: ViewTransform, rotated: bool) -> Self {
         let image = vec2(size[0].max(1) as f32, size[1].max(1) as f32);
         let fit = (rect.width() / image.x).min(rect.height() / image.y).max(1e-3);
         let scale = fit * view.zoom;
@@ -55,24 +55,24 @@ impl CanvasMap {
     }
 
     /// The screen position of an image pixel.
-    pub fn to_screen(&self, px: [f32; 2]) -> Pos2 {
+    pub(crate) fn to_screen(self, px: [f32; 2]) -> Pos2 {
         let p = vec2(px[0] + 0.5, px[1] + 0.5) * self.scale;
         if self.rotated { self.image_rect.max - p } else { self.image_rect.min + p }
     }
 
     /// The image pixel at a screen position; may lie outside the image.
-    pub fn to_image(&self, pos: Pos2) -> [f32; 2] {
+    pub(crate) fn to_image(self, pos: Pos2) -> [f32; 2] {
         let p = if self.rotated { self.image_rect.max - pos } else { pos - self.image_rect.min } / self.scale;
         [p.x - 0.5, p.y - 0.5]
     }
 
     /// Whether the pixel lies in the image.
-    pub fn contains(&self, px: [f32; 2]) -> bool {
+    pub(crate) fn contains(&self, px: [f32; 2]) -> bool {
         px[0] >= -0.5 && px[1] >= -0.5 && px[0] < self.size[0] as f32 - 0.5 && px[1] < self.size[1] as f32 - 0.5
     }
 
     /// The column and row of a position in the image.
-    pub fn pixel(&self, px: [f32; 2]) -> Option<(usize, usize)> {
+    pub(crate) fn pixel(&self, px: [f32; 2]) -> Option<(usize, usize)> {
         self.contains(px).then(|| (px[0].round().max(0.0) as usize, px[1].round().max(0.0) as usize))
     }
 }
@@ -87,7 +87,7 @@ pub enum Primary {
 }
 
 /// A picture to be shown.
-pub struct ImageCanvas<'a> {
+pub(crate) struct ImageCanvas<'a> {
     /// The name for screen readers and tests.
     pub label: &'a str,
     /// Columns and rows of the picture.
@@ -101,7 +101,7 @@ pub struct ImageCanvas<'a> {
 }
 
 /// What happened on a canvas, and what is needed to draw on it.
-pub struct CanvasOutput {
+pub(crate) struct CanvasOutput {
     /// The pane's response.
     pub response: Response,
     /// Between pixels and the screen.
@@ -117,7 +117,7 @@ pub struct CanvasOutput {
 impl ImageCanvas<'_> {
     /// Takes all the space left in `ui`, moves `view` by what the pointer does, and paints the background.
     /// The caller then paints the picture with [`CanvasOutput::paint`] and what lies over it.
-    pub fn show(self, ui: &mut Ui, view: &mut ViewTransform) -> CanvasOutput {
+    pub(crate) fn show(self, ui: &mut Ui, view: &mut ViewTransform) -> CanvasOutput {
         let size = ui.available_size().max(Vec2::splat(8.0));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
         let label = self.label.to_owned();
@@ -167,13 +167,13 @@ impl ImageCanvas<'_> {
 }
 
 /// Whether pixels are large enough on screen to be shown as squares.
-pub fn shows_squares(map: &CanvasMap, pixels_per_point: f32) -> bool {
+pub(crate) fn shows_squares(map: &CanvasMap, pixels_per_point: f32) -> bool {
     map.scale * pixels_per_point >= 4.0
 }
 
 impl CanvasOutput {
     /// Paints a texture over the whole image.
-    pub fn paint(&self, texture: TextureId, tint: Color32) {
+    pub(crate) fn paint(&self, texture: TextureId, tint: Color32) {
         let uv = if self.map.rotated {
             Rect::from_min_max(pos2(1.0, 1.0), pos2(0.0, 0.0))
         } else {
@@ -183,7 +183,7 @@ impl CanvasOutput {
     }
 
     /// Paints a cross-hair through an image position: thin, with a gap so that the pixel stays visible.
-    pub fn crosshair(&self, px: [f32; 2], color: Color32) {
+    pub(crate) fn crosshair(&self, px: [f32; 2], color: Color32) {
         let c = self.map.to_screen(px);
         let rect = self.painter.clip_rect();
         if !rect.contains(c) {
@@ -200,7 +200,7 @@ impl CanvasOutput {
     }
 
     /// Paints a dashed rectangle given by its center and size in image pixels.
-    pub fn dashed_rect(&self, [cx, cy, w, h]: [f64; 4], color: Color32) {
+    pub(crate) fn dashed_rect(&self, [cx, cy, w, h]: [f64; 4], color: Color32) {
         let corner = |sx: f64, sy: f64| self.map.to_screen([(cx + sx * w * 0.5) as f32, (cy + sy * h * 0.5) as f32]);
         let path = [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0), corner(-1.0, -1.0)];
         let dark = Stroke::new(2.5, Color32::from_black_alpha(120));
@@ -212,7 +212,7 @@ impl CanvasOutput {
     /// lines of whole pixels of the screen.
     ///
     /// One mesh of rectangles: an outline has thousands of sides, and is painted anew at every move of a stroke.
-    pub fn segments(&self, segments: &[[[f32; 2]; 2]], color: Color32, width: f32) {
+    pub(crate) fn segments(&self, segments: &[[[f32; 2]; 2]], color: Color32, width: f32) {
         let corner = |p: [f32; 2]| self.map.to_screen([p[0] - 0.5, p[1] - 0.5]);
         let per_point = self.painter.pixels_per_point();
         let wide = (width * per_point).round().max(1.0);
@@ -234,7 +234,7 @@ impl CanvasOutput {
     }
 
     /// Writes a caption into a corner of the pane, on a shade that keeps it readable over any picture.
-    pub fn caption(&self, corner: egui::Align2, text: &str, color: Color32) {
+    pub(crate) fn caption(&self, corner: egui::Align2, text: &str, color: Color32) {
         if text.is_empty() {
             return;
         }

@@ -12,7 +12,7 @@ use touch2touch_core::label::{Rect, difference};
 use touch2touch_core::picture::{self, Rgb8};
 
 /// Bars in a histogram.
-pub const BINS: usize = 64;
+pub(crate) const BINS: usize = 64;
 
 /// How many values fall into each of [`BINS`] equal parts of a span.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,7 +25,7 @@ pub struct Histogram {
 
 impl Histogram {
     /// The span without the outermost half percent on each side, in the unit of the data: single flying pixels say nothing.
-    pub fn bulk(&self) -> Range {
+    pub(crate) fn bulk(&self) -> Range {
         let total: u32 = self.counts.iter().sum();
         let (cut, width) = (total / 200, (self.span.hi - self.span.lo) / BINS as f32);
         let bins_cut = |counts: &mut dyn Iterator<Item = &u32>| {
@@ -86,7 +86,7 @@ struct MaskPicture {
 
 impl Textures {
     /// Starts a frame: pictures that were not shown for a while are dropped.
-    pub fn begin_frame(&mut self) {
+    pub(crate) fn begin_frame(&mut self) {
         self.frame += 1;
         let frame = self.frame;
         self.slots.retain(|_, picture| picture.used + 120 > frame);
@@ -171,7 +171,7 @@ impl Textures {
 
 /// Things derived from what is shown, made again only when that changed.
 #[derive(Debug)]
-pub struct Memo<V> {
+pub(crate) struct Memo<V> {
     slots: BTreeMap<u64, (u64, V)>,
 }
 
@@ -183,7 +183,7 @@ impl<V> Default for Memo<V> {
 
 impl<V> Memo<V> {
     /// The thing in `slot`; made with `make` if `key` changed.
-    pub fn get(&mut self, slot: impl Hash, key: impl Hash, make: impl FnOnce() -> V) -> &V {
+    pub(crate) fn get(&mut self, slot: impl Hash, key: impl Hash, make: impl FnOnce() -> V) -> &V {
         let (slot, key) = (hash(slot), hash(key));
         match self.slots.entry(slot) {
             std::collections::btree_map::Entry::Vacant(entry) => &entry.insert((key, make())).1,
@@ -205,17 +205,17 @@ fn hash(value: impl Hash) -> u64 {
 }
 
 /// A depth map through a color map.
-pub fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage {
+pub(crate) fn depth_image(depth: &DepthMap, map: ColorMap, range: Range) -> ColorImage {
     picture_image(&picture::colored(depth, map, range))
 }
 
 /// A picture as the graphics card takes it.
-pub fn picture_image(picture: &Rgb8) -> ColorImage {
+pub(crate) fn picture_image(picture: &Rgb8) -> ColorImage {
     ColorImage::new(picture.size(), picture.as_slice().iter().map(|[r, g, b]| Color32::from_rgb(*r, *g, *b)).collect())
 }
 
 /// A mask as a transparent layer.
-pub fn mask_image(mask: &Mask, color: Color32) -> ColorImage {
+pub(crate) fn mask_image(mask: &Mask, color: Color32) -> ColorImage {
     let pixel = |on: &bool| if *on { color } else { Color32::TRANSPARENT };
     ColorImage::new(mask.size(), mask.as_slice().iter().map(pixel).collect())
 }
@@ -269,7 +269,7 @@ pub fn outline(mask: &Mask) -> Vec<[[f32; 2]; 2]> {
 }
 
 /// Every other pixel side of an outline, so that it looks dashed.
-pub fn dashes(outline: &[[[f32; 2]; 2]]) -> Vec<[[f32; 2]; 2]> {
+pub(crate) fn dashes(outline: &[[[f32; 2]; 2]]) -> Vec<[[f32; 2]; 2]> {
     let sides = outline.iter().flat_map(|[a, b]| {
         let along = if a[1] == b[1] { [1.0, 0.0] } else { [0.0, 1.0] };
         let length = (b[0] - a[0] + b[1] - a[1]).max(0.0) as u32;

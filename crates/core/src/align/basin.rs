@@ -11,9 +11,9 @@ use crate::frames::PlanarPose;
 use crate::units::{angle_error, wrap_angle};
 
 /// Ends closer than this are one: radians and meters.
-pub const SAME_RAD: f64 = 1.0 / 180.0 * std::f64::consts::PI;
+pub(crate) const SAME_RAD: f64 = 1.0 / 180.0 * std::f64::consts::PI;
 /// See [`SAME_RAD`].
-pub const SAME_M: f64 = 1e-3;
+pub(crate) const SAME_M: f64 = 1e-3;
 
 /// The two coordinates of a start that are varied. The angle is in the lab's sense: that of `object_from_grasp`.
 #[derive(

@@ -21,8 +21,9 @@ use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
 
-pub use policy::{Dof, Kernel, Rejector, Residual, Solver, Target};
-pub use prepared::{in_space, instead_of_triangles, silhouette};
+pub(crate) use policy::{Dof, Rejector, Solver};
+pub use policy::{Kernel, Residual, Target};
+pub use prepared::{in_space, silhouette};
 use problem::{Problem, State, Sums};
 pub(super) use samples::Matcher;
 pub use samples::Samples;
@@ -37,7 +38,7 @@ const MIN_SHARE: f64 = 0.05;
 
 /// An ICP. Lengths in meters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct IcpConfig {
+pub(crate) struct IcpConfig {
     /// What the contacts are compared with.
     pub target: Target,
     /// How the distance of a pair is measured.
@@ -87,7 +88,7 @@ fn robust() -> Vec<Kernel> {
 }
 
 /// The angles from -22.5 to 22.5 degrees, 5 apart, at the middle of the gripper.
-pub fn ten_starts() -> Vec<PlanarPose> {
+pub(crate) fn ten_starts() -> Vec<PlanarPose> {
     (0..10)
         .map(|i| PlanarPose { theta_rad: (f64::from(i) * 5.0 - 22.5).to_radians(), ..PlanarPose::default() })
         .collect()
@@ -95,12 +96,12 @@ pub fn ten_starts() -> Vec<PlanarPose> {
 
 impl IcpConfig {
     /// Point to point on the silhouette; pairs more than 3 mm apart are left out.
-    pub fn planar_point_to_point() -> Self {
+    pub(crate) fn planar_point_to_point() -> Self {
         Self { rejector: Rejector::MaxDistance { distance_m: 3e-3 }, ..Self::default() }
     }
 
     /// Point to plane on the silhouette with a redescending kernel.
-    pub fn planar_point_to_plane() -> Self {
+    pub(crate) fn planar_point_to_plane() -> Self {
         Self {
             residual: Residual::PointToPlane,
             kernels: robust(),
@@ -110,23 +111,23 @@ impl IcpConfig {
     }
 
     /// Generalized-ICP, moved in the plane only.
-    pub fn planar_gicp() -> Self {
+    pub(crate) fn planar_gicp() -> Self {
         Self { dof: Dof::Planar, ..Self::gicp() }
     }
 
     /// Point to point in space; pairs more than 3 mm apart are left out.
-    pub fn point_to_point() -> Self {
+    pub(crate) fn point_to_point() -> Self {
         Self { target: Target::Surface, dof: Dof::Full, ..Self::planar_point_to_point() }
     }
 
     /// Point to plane in space; pairs more than 3 mm apart are left out. A redescending kernel would let go of the
     /// few contacts beside the tool, which alone tell the angle.
-    pub fn point_to_plane() -> Self {
+    pub(crate) fn point_to_plane() -> Self {
         Self { residual: Residual::PointToPlane, solver: Solver::LevenbergMarquardt, ..Self::point_to_point() }
     }
 
     /// Generalized-ICP in space with Huber's kernel; pairs more than 2 mm apart are left out.
-    pub fn gicp() -> Self {
+    pub(crate) fn gicp() -> Self {
         Self {
             residual: Residual::Generalized,
             kernels: vec![Kernel::Huber { width_m: 5e-4 }],

@@ -23,9 +23,9 @@ use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 
 /// Fewest contact points the lab's loop works with.
-pub const LAB_MIN_POINTS: usize = 4;
+pub(crate) const LAB_MIN_POINTS: usize = 4;
 /// Starts of the lab's multi-start variant.
-pub const LAB_STARTS: usize = 10;
+pub(crate) const LAB_STARTS: usize = 10;
 /// Distance below which a contact counts as an inlier in the report, meters; the loop itself does not use it.
 const INLIER_M: f64 = 1e-3;
 /// Beyond this, meters, the lab's choice among starts does not look.

@@ -13,7 +13,7 @@ use crate::units::fixed;
 /// Smallest eigenvalue below which a pose counts as not determined.
 ///
 /// Separates straight rods (at most 0.0084) from tools with an angle or a junction (at least 0.0229).
-pub const DEGENERATE_BELOW: f64 = 0.015;
+pub(crate) const DEGENERATE_BELOW: f64 = 0.015;
 /// Points this far outside the silhouette, meters, still tell about it.
 const REACH_M: f64 = 0.002;
 /// Fewer telling points than this tell nothing.

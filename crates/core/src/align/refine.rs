@@ -12,7 +12,7 @@ use crate::tool::ToolModel;
 /// The second part is held back to the planar pose: what the contacts do not tell (a rod along itself, a disc about
 /// its axis) stays where the first part left it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct RefineConfig {
+pub(crate) struct RefineConfig {
     /// The first part.
     pub planar: AlignConfig,
     /// The second part; its starts are replaced by the planar pose.

@@ -91,7 +91,7 @@ impl ToolSpec {
     }
 
     /// Smallest and largest (y, z) of the outline, meters.
-    pub fn outline_bounds(&self) -> [DVec2; 2] {
+    pub(crate) fn outline_bounds(&self) -> [DVec2; 2] {
         let mut lo = DVec2::splat(f64::INFINITY);
         let mut hi = DVec2::splat(f64::NEG_INFINITY);
         for bar in &self.bars {

@@ -10,7 +10,7 @@ use super::{
 };
 
 /// A clean latent, `[batch, channels, height, width]`.
-pub type Latent = Tensor;
+pub(crate) type Latent = Tensor;
 
 /// How the noise is taken away.
 #[derive(
@@ -128,7 +128,7 @@ pub fn sample(
 ///
 /// # Errors
 /// See [`DiffusionError`].
-pub fn sample_seeds(
+pub(crate) fn sample_seeds(
     denoiser: &mut dyn Denoiser,
     schedule: &Schedule,
     config: &GenerateConfig,

@@ -88,7 +88,7 @@ impl Schedule {
     ///
     /// # Errors
     /// Empty, outside [0, 1], NaN, or rising anywhere (even in the last bit: a rise makes a noise variance negative).
-    pub fn from_alpha_bar(alpha_bar: Vec<f64>) -> Result<Self, ScheduleError> {
+    pub(crate) fn from_alpha_bar(alpha_bar: Vec<f64>) -> Result<Self, ScheduleError> {
         if alpha_bar.is_empty() || alpha_bar.len() > 1_000_000 {
             return Err(ScheduleError::Length(alpha_bar.len()));
         }
@@ -148,7 +148,8 @@ impl Schedule {
     }
 
     /// ᾱ of every training step.
-    pub fn alpha_bar(&self) -> &[f64] {
+    #[cfg(test)]
+    pub(crate) fn alpha_bar(&self) -> &[f64] {
         &self.alpha_bar
     }
 

@@ -6,7 +6,7 @@ use super::agreement::agreement;
 use crate::grid::{Grid, Mask};
 
 /// Probabilities of contact that say neither yes nor no: a quarter to three quarters.
-pub const UNSURE: std::ops::RangeInclusive<f32> = 0.25..=0.75;
+pub(crate) const UNSURE: std::ops::RangeInclusive<f32> = 0.25..=0.75;
 
 /// Reasons to look at the mask of a pair, of its finger with the most of each.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -57,7 +57,7 @@ impl Marks {
     }
 
     /// The layer of each pixel, an index into [`Marks::layers`].
-    pub fn layer_of(&self) -> &Grid<u8> {
+    pub(crate) fn layer_of(&self) -> &Grid<u8> {
         &self.of
     }
 

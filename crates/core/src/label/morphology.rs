@@ -65,7 +65,7 @@ pub fn largest_island(mask: &Mask) -> Mask {
 }
 
 /// Removes the islands with fewer than `min_pixels` pixels.
-pub fn remove_islands(mask: &Mask, min_pixels: usize) -> Mask {
+pub(crate) fn remove_islands(mask: &Mask, min_pixels: usize) -> Mask {
     let (labels, sizes) = islands(mask);
     labels.map(|&label| label != 0 && sizes[label as usize - 1] >= min_pixels)
 }

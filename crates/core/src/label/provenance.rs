@@ -124,7 +124,7 @@ impl Provenance {
     }
 
     /// Whether a person looked at this very pixel.
-    pub fn is_hand(&self) -> bool {
+    pub(crate) fn is_hand(&self) -> bool {
         matches!(self, Self::Hand { .. })
     }
 

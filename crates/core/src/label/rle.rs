@@ -29,7 +29,7 @@ pub enum RleError {
 const MAX_PIXELS: usize = 1 << 26;
 
 /// The lengths of the runs; the first one is of `false` and may be 0.
-pub fn encode_runs(mask: &Mask) -> Vec<u32> {
+pub(crate) fn encode_runs(mask: &Mask) -> Vec<u32> {
     let mut runs = vec![0];
     let mut current = false;
     for &value in mask.as_slice() {
@@ -48,7 +48,7 @@ pub fn encode_runs(mask: &Mask) -> Vec<u32> {
 ///
 /// # Errors
 /// [`RleError`] if the runs do not fill exactly the given size.
-pub fn decode_runs(width: usize, height: usize, runs: &[u32]) -> Result<Mask, RleError> {
+pub(crate) fn decode_runs(width: usize, height: usize, runs: &[u32]) -> Result<Mask, RleError> {
     let Some(pixels) = width.checked_mul(height).filter(|&n| n <= MAX_PIXELS) else {
         return Err(RleError::Size { width, height });
     };

@@ -83,13 +83,13 @@ impl MeshDistance {
     }
 
     /// Distance to the nearest triangle, meters, without a sign. NaN for a point that is not finite.
-    pub fn unsigned(&self, p: DVec3) -> f64 {
+    pub(crate) fn unsigned(&self, p: DVec3) -> f64 {
         if p.is_finite() { self.nearest_below(p, f64::INFINITY).sqrt() } else { f64::NAN }
     }
 
     /// The nearest point of the surface within `limit_m` (meters, may be infinite) and the unit normal of its
     /// triangle, as the mesh is wound. `None` if there is none, or `p` is not finite.
-    pub fn closest(&self, p: DVec3, limit_m: f64) -> Option<(DVec3, DVec3)> {
+    pub(crate) fn closest(&self, p: DVec3, limit_m: f64) -> Option<(DVec3, DVec3)> {
         if !p.is_finite() {
             return None;
         }
@@ -134,7 +134,7 @@ impl MeshDistance {
     ///
     /// Much cheaper than [`Self::signed`] for points far away. How deep a point is that lies further inside than the limit is
     /// not said: minus the limit.
-    pub fn signed_within(&self, p: DVec3, limit_m: f64) -> f64 {
+    pub(crate) fn signed_within(&self, p: DVec3, limit_m: f64) -> f64 {
         if !p.is_finite() {
             return f64::NAN;
         }

@@ -16,7 +16,7 @@ impl TriMesh {
     }
 
     /// The same points as [`Self::sample_surface`], each with the unit normal of its triangle.
-    pub fn sample_surface_with_normals(&self, count: usize, seed: u64) -> Vec<(DVec3, DVec3)> {
+    pub(crate) fn sample_surface_with_normals(&self, count: usize, seed: u64) -> Vec<(DVec3, DVec3)> {
         let mut upto = Vec::with_capacity(self.triangles.len());
         let mut total = 0.0;
         for i in 0..self.triangles.len() {

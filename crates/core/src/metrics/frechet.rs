@@ -13,7 +13,7 @@ use crate::linear::eigen_symmetric;
 /// # Numerics
 /// In f64. The trace of the root is the sum of the singular values of `C1^½ C2^½`, which needs no root of a matrix that
 /// is not symmetric; eigenvalues below rounding count as 0, so fewer vectors than dimensions are no trouble.
-pub fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
+pub(crate) fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
     let d = first.first()?.len();
     let sound = |set: &[&[f32]]| set.len() >= 2 && set.iter().all(|v| v.len() == d && v.iter().all(|x| x.is_finite()));
     if d == 0 || !sound(first) || !sound(second) {

@@ -42,33 +42,6 @@ impl Psnr {
     }
 }
 
-/// The mean of several PSNRs in dB (not the PSNR of the mean MSE, which is lower).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct PsnrMean {
-    /// Mean of the finite ones; `None` if there is none.
-    pub db: Option<f64>,
-    /// How many were averaged.
-    pub count: usize,
-    /// How many pairs were equal and are not in the mean.
-    pub equal: usize,
-}
-
-impl FromIterator<Psnr> for PsnrMean {
-    fn from_iter<I: IntoIterator<Item = Psnr>>(values: I) -> Self {
-        let (mut sum, mut count, mut equal) = (0.0, 0, 0);
-        for value in values {
-            match value {
-                Psnr::Db(db) => {
-                    sum += db;
-                    count += 1;
-                }
-                Psnr::Equal => equal += 1,
-            }
-        }
-        Self { db: (count > 0).then(|| sum / count as f64), count, equal }
-    }
-}
-
 /// The mean squared difference over the pixels that are finite in both images, in squared units of the images.
 ///
 /// # Errors
@@ -97,7 +70,7 @@ pub fn psnr(prediction: &Grid<f32>, truth: &Grid<f32>, peak: f64) -> Result<Psnr
 ///
 /// # Errors
 /// [`MetricError::Range`] for a peak that is not positive.
-pub fn psnr_of_mse(mse: f64, peak: f64) -> Result<Psnr, MetricError> {
+pub(crate) fn psnr_of_mse(mse: f64, peak: f64) -> Result<Psnr, MetricError> {
     if !(peak > 0.0 && peak.is_finite()) {
         return Err(MetricError::Range(peak));
     }
@@ -147,9 +120,6 @@ mod tests {
         for peak in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             assert!(matches!(psnr(&a, &b, peak), Err(MetricError::Range(_))));
         }
-        let mean: PsnrMean = [Psnr::Db(20.0), Psnr::Equal, Psnr::Db(30.0)].into_iter().collect();
-        assert_eq!(mean, PsnrMean { db: Some(25.0), count: 2, equal: 1 });
-        assert_eq!([Psnr::Equal].into_iter().collect::<PsnrMean>().db, None);
     }
 
     #[test]

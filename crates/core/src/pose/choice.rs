@@ -185,7 +185,7 @@ impl Registration {
     }
 
     /// Whether it can be given a gate.
-    pub fn has_gate(self) -> bool {
+    pub(crate) fn has_gate(self) -> bool {
         self != Self::LabIcp
     }
 
@@ -195,7 +195,7 @@ impl Registration {
     }
 
     /// Whether it can leave out a share of the contacts.
-    pub fn can_trim(self) -> bool {
+    pub(crate) fn can_trim(self) -> bool {
         self == Self::Refined || self.icp().is_some()
     }
 }

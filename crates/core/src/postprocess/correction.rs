@@ -152,7 +152,7 @@ impl Correction {
     }
 
     /// A placed picture on the sensor's scale with the mean residual: [`CorrectionPart::Field`].
-    pub fn leveled(&self, placed: &DepthMap) -> DepthMap {
+    pub(crate) fn leveled(&self, placed: &DepthMap) -> DepthMap {
         if !self.has(CorrectionPart::Field) {
             return placed.clone();
         }
@@ -160,7 +160,7 @@ impl Correction {
     }
 
     /// How far a placed picture's deviation from the mean is changed, meters: [`CorrectionPart::Gain`].
-    pub fn weighed(&self, placed: &DepthMap, leveled: &DepthMap) -> DepthMap {
+    pub(crate) fn weighed(&self, placed: &DepthMap, leveled: &DepthMap) -> DepthMap {
         if !self.has(CorrectionPart::Gain) {
             return leveled.clone();
         }
@@ -193,7 +193,7 @@ impl Correction {
     }
 
     /// The straight line alone.
-    pub fn on_line(&self, meters: &DepthMap) -> DepthMap {
+    pub(crate) fn on_line(&self, meters: &DepthMap) -> DepthMap {
         let [gain, offset_m] = self.line;
         meters.map(|&v| (f64::from(v) * gain + offset_m) as f32)
     }

@@ -85,7 +85,7 @@ impl Stats {
     }
 
     /// Whether the spread is no more than rounding.
-    pub fn is_flat(&self) -> bool {
+    pub(crate) fn is_flat(&self) -> bool {
         self.count > 0 && self.std <= RELATIVE_NO_SPREAD * self.min.abs().max(self.max.abs())
     }
 }

@@ -32,9 +32,9 @@ pub static GELSLIM: Sensor = Sensor {
 
 /// Directions of the GelSlim's red, green and blue LED in its picture, radians from +x (right) towards +y (down): green
 /// lights the wrist side, red and blue 120 degrees away.
-pub const GELSLIM_LED_ANGLE_RAD: [f64; 3] = [-1.12, std::f64::consts::PI, 1.05];
+pub(crate) const GELSLIM_LED_ANGLE_RAD: [f64; 3] = [-1.12, std::f64::consts::PI, 1.05];
 /// Brightness change of the GelSlim's picture per unit of slope, per channel, 0..255 scale.
-pub const GELSLIM_LED_GAIN: [f64; 3] = [82.0, 39.0, 48.0];
+pub(crate) const GELSLIM_LED_GAIN: [f64; 3] = [82.0, 39.0, 48.0];
 
 /// The Soft Bubble: a depth camera behind an air-filled membrane.
 pub static BUBBLE: Sensor = Sensor {

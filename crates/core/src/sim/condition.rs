@@ -10,7 +10,7 @@ use crate::rig::lab;
 use crate::sample::Sample;
 
 /// Largest distance along y and z between the grasps of a misaligned pair, meters.
-pub const MISALIGNMENT_M: f64 = 0.008;
+pub(crate) const MISALIGNMENT_M: f64 = 0.008;
 /// Standard deviation of the noise on the condition, 0..255 scale, RGB: half that of the lab's difference images.
 const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0.0576 * 255.0];
 

@@ -10,7 +10,7 @@ use crate::rig::{PadId, lab};
 use crate::sensor::Intrinsics;
 
 /// Membrane points up to this far from the tool count as contact, meters: the lab labels its masks so.
-pub const CONTACT_DISTANCE_M: f64 = 0.001;
+pub(crate) const CONTACT_DISTANCE_M: f64 = 0.001;
 
 /// Slopes of a membrane are hardly ever steeper: tools' bevels are not, nor does it fall off beside a bar.
 const MAX_SLOPE: f64 = 2.5;

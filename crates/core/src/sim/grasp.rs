@@ -4,11 +4,11 @@ use crate::frames::PlanarPose;
 use crate::noise::{Noise, Stream};
 
 /// Half the range of the grasp angle, radians.
-pub const THETA_RANGE_RAD: f64 = 22.5 * std::f64::consts::PI / 180.0;
+pub(crate) const THETA_RANGE_RAD: f64 = 22.5 * std::f64::consts::PI / 180.0;
 /// Half the side of the square of grasp positions, meters.
-pub const POSITION_RANGE_M: f64 = 0.005;
+pub(crate) const POSITION_RANGE_M: f64 = 0.005;
 /// Grasps on the grid; higher numbers start over.
-pub const GRID_GRASPS: u64 = 1344;
+pub(crate) const GRID_GRASPS: u64 = 1344;
 
 /// A grasp in the lab's terms, see [`PlanarPose::object_from_grasp_of_lab`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

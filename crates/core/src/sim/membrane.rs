@@ -150,7 +150,7 @@ impl<'a> Membrane<'a> {
 
     /// Distance of the membrane's point `(n, y, z)` from the tool's surface, meters, negative inside; more than
     /// `limit` is only known to be more.
-    pub fn distance_to_tool(&self, n: f64, yz: DVec2, limit: f64) -> f64 {
+    pub(crate) fn distance_to_tool(&self, n: f64, yz: DVec2, limit: f64) -> f64 {
         let p = self.object_from_grasp.transform_yz(yz);
         let s = self.tool.outline_distance(p);
         if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }

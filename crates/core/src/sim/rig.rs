@@ -17,7 +17,7 @@ pub const RANGE_M: f64 = 0.083;
 const CAMERA_ANGLE_DEG: f64 = 55.04;
 
 /// Intrinsics of the full image. Focal length from the scale (2.36 px/mm at about 90 mm).
-pub const INTRINSICS: Intrinsics = Intrinsics { fx: 212.0, fy: 212.0, cx: 112.0, cy: 86.0 };
+pub(crate) const INTRINSICS: Intrinsics = Intrinsics { fx: 212.0, fy: 212.0, cx: 112.0, cy: 86.0 };
 
 /// The sign that turns grasp x into "away from this finger": the finger's side of the tool is at negative values.
 pub fn outward(finger: PadId) -> f64 {
@@ -48,17 +48,17 @@ pub fn gelslim_yz(finger: PadId, column: f64, row: f64) -> DVec2 {
     DVec2::new(-outward(finger) * down, right)
 }
 
-/// The inverse of [`gelslim_yz`].
-pub fn gelslim_pixel(finger: PadId, yz: DVec2) -> (f64, f64) {
-    (
-        yz.y * lab::GELSLIM.px_per_m + 0.5 * (lab::GELSLIM.width - 1) as f64,
-        -outward(finger) * yz.x * lab::GELSLIM.px_per_m + 0.5 * (lab::GELSLIM.height - 1) as f64,
-    )
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// The inverse of [`gelslim_yz`].
+    fn gelslim_pixel(finger: PadId, yz: DVec2) -> (f64, f64) {
+        (
+            yz.y * lab::GELSLIM.px_per_m + 0.5 * (lab::GELSLIM.width - 1) as f64,
+            -outward(finger) * yz.x * lab::GELSLIM.px_per_m + 0.5 * (lab::GELSLIM.height - 1) as f64,
+        )
+    }
 
     #[test]
     fn rotations_are_the_labs_and_the_cameras_face_each_other() {

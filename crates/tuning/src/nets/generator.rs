@@ -14,14 +14,14 @@ use crate::params::{Leaves, Params};
 use crate::tape::Tensor;
 
 /// In front of the names of the condition encoder's weights.
-pub const ENCODER: &str = "encoder/";
+pub(crate) const ENCODER: &str = "encoder/";
 /// In front of the names of the denoiser's weights.
 pub const DENOISER: &str = "denoiser/";
 /// In front of the names of the decoder's weights.
-pub const DECODER: &str = "decoder/";
+pub(crate) const DECODER: &str = "decoder/";
 
 /// Channels of the latent.
-pub const LATENT: usize = 4;
+pub(crate) const LATENT: usize = 4;
 /// Pixels of the picture per cell of the latent.
 const CELL: usize = 8;
 /// Pixels of the picture per token of the encoder.
@@ -270,7 +270,7 @@ impl Schedule {
     }
 
     /// Amplitudes of signal and noise at a step.
-    pub fn amplitudes(&self, t: usize) -> (f64, f64) {
+    pub(crate) fn amplitudes(&self, t: usize) -> (f64, f64) {
         (self.bars[t].sqrt(), (1.0 - self.bars[t]).sqrt())
     }
 
@@ -326,7 +326,7 @@ fn of_equal_power(pictures: &[f32], length: usize) -> Vec<f32> {
 }
 
 /// The denoiser: v of noisy latents `[n, 4, cells, cells]` at a step, the same for the whole batch.
-pub fn denoise(
+pub(crate) fn denoise(
     leaves: &Leaves<'_>,
     sizes: &Sizes,
     schedule: &Schedule,

@@ -31,19 +31,19 @@ impl<'a> Layers<'a> {
     }
 
     /// A convolution.
-    pub fn conv(&self, x: &Tensor, name: &str, stride: usize, padding: usize) -> Tensor {
+    pub(crate) fn conv(&self, x: &Tensor, name: &str, stride: usize, padding: usize) -> Tensor {
         let (weight, bias) = self.both(name);
         ops::conv2d(x, &weight, &bias, stride, padding)
     }
 
     /// A normalization of pictures.
-    pub fn group_norm(&self, x: &Tensor, name: &str, then: Activation) -> Tensor {
+    pub(crate) fn group_norm(&self, x: &Tensor, name: &str, then: Activation) -> Tensor {
         let (scale, shift) = self.both(name);
         ops::group_norm(x, &scale, &shift, then)
     }
 
     /// A normalization of tokens `[n, tokens, dim]`.
-    pub fn layer_norm(&self, x: &Tensor, name: &str) -> Tensor {
+    pub(crate) fn layer_norm(&self, x: &Tensor, name: &str) -> Tensor {
         let (scale, shift) = self.both(name);
         ops::layer_norm(x, &scale, &shift)
     }
@@ -55,7 +55,7 @@ impl<'a> Layers<'a> {
     }
 
     /// A product with rows; weights are `[out, in]`.
-    pub fn gemm(&self, x: &Tensor, name: &str) -> Tensor {
+    pub(crate) fn gemm(&self, x: &Tensor, name: &str) -> Tensor {
         let (weight, bias) = self.both(name);
         ops::linear(x, &weight, &bias, Weights::OutIn)
     }
@@ -89,7 +89,7 @@ impl<'a> Layers<'a> {
     }
 
     /// Attention of tokens on a source, or on themselves, then a perceptron of two layers.
-    pub fn transformer(&self, x: &Tensor, source: Option<&Tensor>, name: &str) -> Tensor {
+    pub(crate) fn transformer(&self, x: &Tensor, source: Option<&Tensor>, name: &str) -> Tensor {
         let h = self.layer_norm(x, &format!("{name}.norm1"));
         let queries = self.linear(&h, &format!("{name}.attention.q"));
         let both = self.linear(source.unwrap_or(&h), &format!("{name}.attention.kv"));

@@ -25,18 +25,18 @@ impl Layout {
     }
 
     /// A convolution with square kernels.
-    pub fn conv(&mut self, name: &str, inputs: usize, outputs: usize, kernel: usize) {
+    pub(crate) fn conv(&mut self, name: &str, inputs: usize, outputs: usize, kernel: usize) {
         self.layer(name, &[outputs, inputs, kernel, kernel], outputs);
     }
 
     /// A normalization of pictures.
-    pub fn group_norm(&mut self, name: &str, channels: usize) {
+    pub(crate) fn group_norm(&mut self, name: &str, channels: usize) {
         self.weight(format!("{name}.weight"), &[channels, 1, 1]);
         self.weight(format!("{name}.bias"), &[channels, 1, 1]);
     }
 
     /// A normalization of tokens.
-    pub fn layer_norm(&mut self, name: &str, dim: usize) {
+    pub(crate) fn layer_norm(&mut self, name: &str, dim: usize) {
         self.layer(name, &[dim], dim);
     }
 
@@ -46,7 +46,7 @@ impl Layout {
     }
 
     /// A `Gemm` node, `[out, in]`.
-    pub fn gemm(&mut self, name: &str, inputs: usize, outputs: usize) {
+    pub(crate) fn gemm(&mut self, name: &str, inputs: usize, outputs: usize) {
         self.layer(name, &[outputs, inputs], outputs);
     }
 
@@ -65,7 +65,7 @@ impl Layout {
     }
 
     /// Attention and a perceptron, each behind a normalization.
-    pub fn transformer(&mut self, name: &str, dim: usize) {
+    pub(crate) fn transformer(&mut self, name: &str, dim: usize) {
         for norm in ["norm1", "norm2"] {
             self.layer_norm(&format!("{name}.{norm}"), dim);
         }

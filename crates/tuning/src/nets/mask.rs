@@ -12,7 +12,7 @@ use crate::params::{Leaves, Params};
 use crate::tape::Tensor;
 
 /// In front of the names of the mask network's weights.
-pub const MASK: &str = "mask/";
+pub(crate) const MASK: &str = "mask/";
 
 pub(crate) const NETWORK: &str = "mask network";
 const LEVELS: usize = 4;

@@ -23,7 +23,7 @@ pub fn add(a: &Tensor, b: &Tensor) -> Tensor {
 }
 
 /// `x + row` for each item of a batch `[n, …]`; the row is `[1, …]`.
-pub fn add_each(x: &Tensor, row: &Tensor) -> Tensor {
+pub(crate) fn add_each(x: &Tensor, row: &Tensor) -> Tensor {
     let length = row.values().len();
     let values = x.values().chunks_exact(length).flat_map(|item| zipped(item, row.values(), |a, b| a + b)).collect();
     Tensor::made([x, row], x.shape(), values, move |slope, [to_x, to_row], slopes| {
@@ -42,7 +42,7 @@ pub(super) fn summed(batch: &[f32], length: usize) -> Vec<f32> {
 }
 
 /// `a · b`, value by value.
-pub fn mul(a: &Tensor, b: &Tensor) -> Tensor {
+pub(crate) fn mul(a: &Tensor, b: &Tensor) -> Tensor {
     assert_eq!(a.values().len(), b.values().len(), "{:?} * {:?}", a.shape(), b.shape());
     let (of_a, of_b) = (a.shared(), b.shared());
     Tensor::made([a, b], a.shape(), zipped(a.values(), b.values(), |a, b| a * b), move |slope, [to_a, to_b], slopes| {
@@ -69,7 +69,7 @@ pub fn line(x: &Tensor, factor: f32, offset: f32) -> Tensor {
 }
 
 /// `x · scale + shift` for each item of a batch, with fixed arrays of an item's size.
-pub fn rescaled(x: &Tensor, scale: Arc<Vec<f32>>, shift: &[f32]) -> Tensor {
+pub(crate) fn rescaled(x: &Tensor, scale: Arc<Vec<f32>>, shift: &[f32]) -> Tensor {
     let item = |item: &[f32]| zipped(&zipped(item, &scale, |x, s| x * s), shift, |x, s| x + s);
     let values = x.values().chunks_exact(shift.len()).flat_map(item).collect();
     Tensor::made([x], x.shape(), values, move |slope, [to_x], slopes| {
@@ -79,7 +79,7 @@ pub fn rescaled(x: &Tensor, scale: Arc<Vec<f32>>, shift: &[f32]) -> Tensor {
 }
 
 /// `x · sigmoid(x)`.
-pub fn silu(x: &Tensor) -> Tensor {
+pub(crate) fn silu(x: &Tensor) -> Tensor {
     let input = x.shared();
     Tensor::made([x], x.shape(), mapped(x.values(), |x| x * sigmoid(x)), move |slope, [to_x], slopes| {
         slopes.add(to_x, || {

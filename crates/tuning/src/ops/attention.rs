@@ -46,7 +46,7 @@ impl Sizes {
 
 /// Reads values by the likeness of queries `[n, tokens, dim]` and keys; keys and values are `[n, sources, 2 · dim]`, keys
 /// first. The result is `[n, tokens, dim]`.
-pub fn attention(queries: &Tensor, both: &Tensor, heads: usize) -> Tensor {
+pub(crate) fn attention(queries: &Tensor, both: &Tensor, heads: usize) -> Tensor {
     let [batch, tokens, dim] = queries.dims();
     let [_, sources, _] = both.dims();
     let sizes = Sizes { batch, heads, tokens, sources, dim };

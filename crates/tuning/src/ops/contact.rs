@@ -8,7 +8,7 @@ use crate::tape::Tensor;
 /// `counted` has 1 for each pixel that counts and 0 for one that is left out of everything. The cross-entropy is the mean
 /// over the pixels that count; the Dice of a picture without contact is told by adding 1 to both of its sides. A picture
 /// of which no pixel counts adds nothing.
-pub fn contact_loss(logits: &Tensor, masks: &[f32], counted: &[f32], weights: &[f32]) -> Tensor {
+pub(crate) fn contact_loss(logits: &Tensor, masks: &[f32], counted: &[f32], weights: &[f32]) -> Tensor {
     let [n, classes, h, w] = logits.dims();
     let pixels = h * w;
     assert_eq!((classes, masks.len(), counted.len(), weights.len()), (2, n * pixels, n * pixels, n));

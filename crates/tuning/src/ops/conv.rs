@@ -10,7 +10,7 @@ use crate::tape::Tensor;
 
 /// Convolution (cross-correlation) of pictures `[n, c, h, w]` with square kernels `[filters, c, k, k]` and a bias per
 /// filter, padded with zeros.
-pub fn conv2d(input: &Tensor, weight: &Tensor, bias: &Tensor, stride: usize, padding: usize) -> Tensor {
+pub(crate) fn conv2d(input: &Tensor, weight: &Tensor, bias: &Tensor, stride: usize, padding: usize) -> Tensor {
     let g = Geometry::new(input.dims(), weight.dims(), stride, padding);
     let output = forward(input.values(), weight.values(), bias.values(), g);
     let shape = [g.batch, g.filters, g.out_height, g.out_width];

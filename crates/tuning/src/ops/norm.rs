@@ -8,12 +8,12 @@ use super::math::{sigmoid, sum};
 use crate::tape::Tensor;
 
 /// Groups of channels that are normalized together, in every network here.
-pub const GROUPS: usize = 8;
+pub(crate) const GROUPS: usize = 8;
 const EPSILON: f32 = 1e-5;
 
 /// What follows the normalization.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Activation {
+pub(crate) enum Activation {
     /// Nothing.
     None,
     /// `x · sigmoid(x)`.
@@ -21,13 +21,13 @@ pub enum Activation {
 }
 
 /// Normalizes pictures `[n, c, h, w]` in [`GROUPS`] groups of channels, scales and shifts each channel, and activates.
-pub fn group_norm(input: &Tensor, scale: &Tensor, shift: &Tensor, then: Activation) -> Tensor {
+pub(crate) fn group_norm(input: &Tensor, scale: &Tensor, shift: &Tensor, then: Activation) -> Tensor {
     let [_, channels, height, width] = input.dims();
     normalized(input, scale, shift, Layout { channels, groups: GROUPS, pixels: height * width }, then)
 }
 
 /// Normalizes each token of `[n, tokens, dim]`, scales and shifts each of its values.
-pub fn layer_norm(input: &Tensor, scale: &Tensor, shift: &Tensor) -> Tensor {
+pub(crate) fn layer_norm(input: &Tensor, scale: &Tensor, shift: &Tensor) -> Tensor {
     let [.., dim] = input.dims::<3>();
     normalized(input, scale, shift, Layout { channels: dim, groups: 1, pixels: 1 }, Activation::None)
 }

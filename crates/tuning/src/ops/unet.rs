@@ -3,7 +3,7 @@
 use crate::tape::Tensor;
 
 /// Negative values become 0.
-pub fn relu(x: &Tensor) -> Tensor {
+pub(crate) fn relu(x: &Tensor) -> Tensor {
     let input = x.shared();
     let values = x.values().iter().map(|v| v.max(0.0)).collect();
     Tensor::made([x], x.shape(), values, move |slope, [to_x], slopes| {
@@ -44,7 +44,7 @@ pub struct Margins {
 
 impl Margins {
     /// What makes both sides multiples of a number, half on either side, the odd one behind.
-    pub fn to_multiples(rows: usize, columns: usize, of: usize) -> Self {
+    pub(crate) fn to_multiples(rows: usize, columns: usize, of: usize) -> Self {
         let split = |size: usize| {
             let more = size.next_multiple_of(of) - size;
             [more / 2, more - more / 2]
@@ -68,7 +68,7 @@ pub fn padded(x: &Tensor, margins: Margins) -> Tensor {
 }
 
 /// Pictures `[n, c, h, w]` without their margins.
-pub fn cropped(x: &Tensor, margins: Margins) -> Tensor {
+pub(crate) fn cropped(x: &Tensor, margins: Margins) -> Tensor {
     let [n, c, rows, columns] = x.dims();
     let [around_rows, around_columns] = margins.around([0, 0]);
     let inner = [rows - around_rows, columns - around_columns];

@@ -87,7 +87,7 @@ pub struct HeldBack {
 }
 
 /// More touches than these are not kept to be looked at.
-pub const MOST_SHOWN: usize = 200;
+pub(crate) const MOST_SHOWN: usize = 200;
 
 /// What was found for a pad.
 #[derive(Clone, Debug, Serialize)]

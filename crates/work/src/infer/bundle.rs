@@ -74,7 +74,7 @@
 //! there, pixels of the raw imprint, for every pad: each picture is then moved to where the rig has the pad's window. Without
 //! it, or in a rig without windows, pictures stay where they are.
 //!
-//! `sensor` declares a sensor as the rig of the data does ([`SensorSpec`]); a bundle is used only where they agree. A
+//! `sensor` declares a sensor as the rig of the data does ([`sensor::SensorSpec`]); a bundle is used only where they agree. A
 //! generator that starts from a depth sensor has `"scale": "m"` and one number in `mean` and `std`; one that predicts a
 //! color sensor has, in place of `range_m`, the `range` of the difference on the 0..255 scale, three channels and no
 //! `shift`. Version 1 has `"sensor": "gelslim"` or `"bubble"` in `input` and none in `output`: the lab's sensors.
@@ -107,7 +107,7 @@
 pub(super) mod contract;
 mod find;
 mod fit;
-mod manifest;
+pub(crate) mod manifest;
 mod origin;
 mod sensor;
 
@@ -125,14 +125,19 @@ use touch2touch_core::fit::Fitted;
 use touch2touch_core::units::counted;
 
 pub use find::{Found, find, find_all};
-pub use fit::{FitSpec, write as write_fit};
-pub use manifest::{
-    BundleSpec, Cast, ClassifierInput, ClassifierOutput, ClassifierSpec, GeneratorInput, GeneratorSpec, GuidanceSpec,
-    InputScale, LatentSpec, MaskInput, MaskOutput, MaskSpec, OutputSpec, ScheduleKind, ScheduleSpec, TensorSpec,
-    TimestepType, Unconditional,
+pub(crate) use fit::FitSpec;
+pub use fit::write as write_fit;
+pub use manifest::TimestepType;
+pub(crate) use manifest::{
+    BundleSpec, Cast, ClassifierInput, ClassifierSpec, GeneratorInput, GeneratorSpec, InputScale, MaskInput, MaskSpec,
+    Unconditional,
 };
-pub use origin::{BundleFile, Origin};
-pub use sensor::{Ends, Misfit, SensorPair, SensorSpec};
+pub(crate) use origin::BundleFile;
+pub use origin::Origin;
+pub(crate) use sensor::Misfit;
+#[cfg(test)]
+pub(crate) use sensor::SensorSpec;
+pub use sensor::{Ends, SensorPair};
 
 /// The manifest's file name.
 pub const MANIFEST: &str = "manifest.json";

@@ -61,7 +61,7 @@ impl KeptKey {
 }
 
 /// The identity of a GelSlim difference image: SHA-256 of its size and of every value, in hex.
-pub fn input_digest(difference: &RgbGrid) -> String {
+pub(crate) fn input_digest(difference: &RgbGrid) -> String {
     let mut hash = Sha256::new();
     for side in difference.size() {
         hash.update((side as u64).to_le_bytes());

@@ -90,7 +90,7 @@ impl MaskModel {
     }
 
     /// The probability from which a pixel counts as contact, as the bundle says.
-    pub fn least_probability(&self) -> f32 {
+    pub(crate) fn least_probability(&self) -> f32 {
         self.spec.output.threshold as f32
     }
 
@@ -124,7 +124,7 @@ fn at_least(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> Mask {
 }
 
 /// The contact mask of an imprint from its map of [`MaskModel::probability`].
-pub fn contact_of(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> ContactMask {
+pub(crate) fn contact_of(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> ContactMask {
     let found = settled_model(imprint, at_least(probability, imprint, least));
     ContactMask { unsure: unsure_share(probability), ..found }
 }

@@ -9,8 +9,9 @@ use serde::Serialize;
 
 use super::engine::{self, EngineChoice, EngineKind};
 
-pub use super::library::Searched;
-pub use fetch::{FetchError, VERSION, fetch_runtime};
+pub(crate) use super::library::Searched;
+pub(crate) use fetch::VERSION;
+pub use fetch::fetch_runtime;
 
 /// Which engine runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]

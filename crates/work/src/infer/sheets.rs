@@ -15,7 +15,7 @@ use crate::io::digest::sha256;
 use crate::io::{atomic, files};
 
 /// How the files are recognized, beside those of [`super::store`].
-pub const SUFFIX: &str = ".scores";
+pub(crate) const SUFFIX: &str = ".scores";
 /// No larger file is one of ours.
 const MAX_BYTES: u64 = 512 << 20;
 /// Hex digits of a line's checksum.
@@ -23,7 +23,7 @@ const DIGITS: usize = 16;
 
 /// Sheets of a folder. Shared by threads.
 #[derive(Debug, Default)]
-pub struct Sheets {
+pub(crate) struct Sheets {
     open: Mutex<Open>,
 }
 
@@ -44,30 +44,30 @@ struct Sheet {
 
 impl Sheets {
     /// Those of a folder (made when something is first written); `None` keeps nothing on the disk.
-    pub fn new(folder: Option<PathBuf>) -> Self {
+    pub(crate) fn new(folder: Option<PathBuf>) -> Self {
         Self { open: Mutex::new(Open { folder, sheets: BTreeMap::new() }) }
     }
 
     /// Where they are from now on; `None` for nowhere.
-    pub fn set_folder(&self, folder: Option<PathBuf>) {
+    pub(crate) fn set_folder(&self, folder: Option<PathBuf>) {
         self.lock().folder = folder;
     }
 
     /// The value of each key of a sheet, in order; `None` for one that is not there.
-    pub fn get<'a>(&self, sheet: &str, keys: impl IntoIterator<Item = &'a str>) -> Vec<Option<String>> {
+    pub(crate) fn get<'a>(&self, sheet: &str, keys: impl IntoIterator<Item = &'a str>) -> Vec<Option<String>> {
         let mut open = self.lock();
         let lines = &open.read(sheet).lines;
         keys.into_iter().map(|key| lines.get(key).cloned()).collect()
     }
 
     /// Whether nothing is in a sheet.
-    pub fn is_empty(&self, sheet: &str) -> bool {
+    pub(crate) fn is_empty(&self, sheet: &str) -> bool {
         self.lock().read(sheet).lines.is_empty()
     }
 
     /// Puts values (without line breaks) under keys (without spaces). What the disk refuses is said in the log and kept
     /// until the program ends.
-    pub fn put(&self, sheet: &str, values: impl IntoIterator<Item = (String, String)>) {
+    pub(crate) fn put(&self, sheet: &str, values: impl IntoIterator<Item = (String, String)>) {
         let mut open = self.lock();
         let file = open.file(sheet);
         let kept = open.read(sheet);

@@ -114,7 +114,7 @@ impl Store {
     }
 
     /// Changes the budget; what is too much goes at the next write.
-    pub fn set_budget(&mut self, budget: u64) {
+    pub(crate) fn set_budget(&mut self, budget: u64) {
         self.budget = budget;
     }
 

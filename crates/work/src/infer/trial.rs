@@ -54,7 +54,7 @@ pub fn by_this_program() {
 }
 
 /// The most memory a trial of the bundle may use, bytes.
-pub fn memory_limit(bundle: &Bundle) -> u64 {
+pub(crate) fn memory_limit(bundle: &Bundle) -> u64 {
     MEMORY + MEMORY_PER_BYTE * bundle.bytes()
 }
 

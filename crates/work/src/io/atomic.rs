@@ -54,7 +54,7 @@ pub fn write_bytes(path: &Path, bytes: &[u8]) -> io::Result<()> {
 ///
 /// # Errors
 /// Whatever the disk says.
-pub fn probe(folder: &Path) -> io::Result<NamedTempFile> {
+pub(crate) fn probe(folder: &Path) -> io::Result<NamedTempFile> {
     temporary(folder)
 }
 

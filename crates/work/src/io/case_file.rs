@@ -51,7 +51,7 @@ pub struct CaseContent {
 }
 
 /// Results of a case: below this folder of it.
-pub const RESULTS: &str = "results/";
+pub(crate) const RESULTS: &str = "results/";
 /// Models of a case: below this folder of it.
 pub const MODELS: &str = "models/";
 /// The folders of a case besides that of the data.
@@ -177,7 +177,7 @@ pub fn unpack(content: &CaseContent, folder: &Path) -> Result<(), CaseFileError>
 ///
 /// # Errors
 /// Whatever the disk says.
-pub fn unpack_models(content: &CaseContent, folder: &Path) -> Result<(), CaseFileError> {
+pub(crate) fn unpack_models(content: &CaseContent, folder: &Path) -> Result<(), CaseFileError> {
     let models = content.beside.iter().filter_map(|(name, bytes)| Some((name.strip_prefix(MODELS)?, bytes)));
     write_all(models, folder)
 }

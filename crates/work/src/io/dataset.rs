@@ -33,12 +33,13 @@ use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
-pub use grow::{Growth, RIG_FILE, cameras_of};
-pub use pictures::{ASSUMED_IMPRINT_RANGE_M, ASSUMED_SCALE_NOTE, RIG_JSON, assumed_meters, rig_of};
+pub use grow::cameras_of;
+pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters};
+pub use pictures::{RIG_JSON, rig_of};
 pub use read_as::{READ_AS_FILE, write_read_as};
-pub use tool_scale::{
-    ToolFile, ToolScale, ToolUnit, UNIT_FILE, read_in_meters, read_tool, said_beside, tool_size, write_beside,
-};
+pub(crate) use tool_scale::ToolFile;
+pub use tool_scale::{ToolScale, ToolUnit, UNIT_FILE, read_in_meters};
+pub(crate) use tool_scale::{read_tool, said_beside, tool_size, write_beside};
 
 /// Which kind of source a data set is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,7 +86,7 @@ impl InvalidPixels {
     }
 
     /// Whether they are worth a note of their own: more than a depth camera drops anyway.
-    pub fn are_many(self, pixels: usize) -> bool {
+    pub(crate) fn are_many(self, pixels: usize) -> bool {
         self.infinite > 0 || self.total() as f64 > MANY_INVALID * pixels as f64
     }
 }
@@ -210,7 +211,7 @@ impl Dataset {
     }
 
     /// Which built-in data set it is, if it is one.
-    pub fn built_in_set(&self) -> Option<BuiltIn> {
+    pub(crate) fn built_in_set(&self) -> Option<BuiltIn> {
         match self.source {
             Source::BuiltIn(set) => Some(set),
             Source::Lab(_) | Source::Pictures(_) => None,
@@ -273,7 +274,7 @@ impl Dataset {
     ///
     /// # Errors
     /// As [`Dataset::tool_mesh`].
-    pub fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
+    pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
         if let Source::BuiltIn(set) = self.source {
             return Ok(set.mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }));
         }
@@ -281,7 +282,7 @@ impl Dataset {
     }
 
     /// What was said of the unit of a tool's CAD file other than beside it: for this run, else on the command line.
-    pub fn scale_of(&self, tool: &str) -> Option<ToolScale> {
+    pub(crate) fn scale_of(&self, tool: &str) -> Option<ToolScale> {
         let held = self.held_units.lock().unwrap_or_else(PoisonError::into_inner);
         held.get(tool).map(|unit| unit.scale()).or(self.tool_scale)
     }
@@ -310,7 +311,7 @@ impl Dataset {
 
     /// All files that the figures of a pair depend on, besides its tool's: those of [`Dataset::pair_files`], and a stored
     /// prediction that lies by them. None of a built-in pair.
-    pub fn scored_files(&self, id: PairId) -> Vec<PathBuf> {
+    pub(crate) fn scored_files(&self, id: PairId) -> Vec<PathBuf> {
         let mut files = self.pair_files(id);
         if let Source::Pictures(pictures) = &self.source {
             files.extend(pictures.stored(id));

@@ -40,15 +40,16 @@ use touch2touch_core::rig::{PadId, Rig};
 
 pub use format::Format;
 use format::{Place, Writer};
-pub use found::{Listed, Listing, ReadError};
+pub use found::Listed;
+pub(crate) use found::ReadError;
 pub use read::list;
-pub use split::Stems;
-pub use unet::{CheckReport, check_folder};
+pub(crate) use split::Stems;
+pub use unet::check_folder;
 
 /// The imprint that becomes 0, meters.
-pub const IMAGE_LO_M: f64 = -0.0116;
+pub(crate) const IMAGE_LO_M: f64 = -0.0116;
 /// The imprint that becomes 255, meters.
-pub const IMAGE_HI_M: f64 = 0.0225;
+pub(crate) const IMAGE_HI_M: f64 = 0.0225;
 /// Names of the parts, in the order of [`ExportReport::counts`].
 pub const PARTS: [&str; 3] = ["train", "val", "test"];
 /// The folder of the pixels of which masks say nothing.
@@ -232,7 +233,7 @@ impl Manifest {
 ///
 /// # Errors
 /// [`ExportError::Sources`] with all that cannot be read.
-pub fn check_stored<'a>(
+pub(crate) fn check_stored<'a>(
     store: &MaskStore,
     entries: impl IntoIterator<Item = &'a ExportEntry>,
 ) -> Result<(), ExportError> {

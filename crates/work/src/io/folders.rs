@@ -16,7 +16,7 @@ pub fn data() -> Option<PathBuf> {
 
 /// What belongs to this machine, such as libraries and bundles; `TOUCH2TOUCH_DATA` overrides it. `None` without a home
 /// folder.
-pub fn program_data() -> Option<PathBuf> {
+pub(crate) fn program_data() -> Option<PathBuf> {
     let named = std::env::var_os("TOUCH2TOUCH_DATA").filter(|v| !v.is_empty()).map(PathBuf::from);
     named.or_else(local_data)
 }

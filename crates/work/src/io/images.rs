@@ -70,7 +70,7 @@ impl PictureError {
 }
 
 /// Most pixels a side. A file of a few kilobytes can announce a thousand times more.
-pub const MAX_SIDE: u32 = 4096;
+pub(crate) const MAX_SIDE: u32 = 4096;
 /// Most bytes of a file: what a picture of that size takes without compression.
 const MAX_BYTES: u64 = 256 << 20;
 
@@ -181,7 +181,7 @@ pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
 ///
 /// # Errors
 /// As the encoder says; an empty picture has no file.
-pub fn png_bytes(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, image::ImageError> {
+pub(crate) fn png_bytes(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, image::ImageError> {
     png(picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgb8)
 }
 

@@ -166,7 +166,7 @@ impl StoredReview {
 }
 
 /// Seconds since 1970, for [`StoredMask::saved_unix_s`]; 0 if the clock is set before that.
-pub fn now_unix_s() -> u64 {
+pub(crate) fn now_unix_s() -> u64 {
     std::time::SystemTime::now().duration_since(std::time::UNIX_EPOCH).map_or(0, |d| d.as_secs())
 }
 
@@ -286,7 +286,7 @@ impl MaskStore {
 
     /// The same folder, for other sensors.
     #[must_use]
-    pub fn of_rig(self, rig: Arc<Rig>) -> Self {
+    pub(crate) fn of_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig, ..self }
     }
 

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 pub const OUTPUT_MARK: &str = ".t2t.";
 
 /// Whether a file name is one that this program writes beside touches.
-pub fn is_output(name: &str) -> bool {
+pub(crate) fn is_output(name: &str) -> bool {
     name.contains(OUTPUT_MARK)
 }
 
@@ -34,7 +34,7 @@ pub fn label(pair: &str) -> String {
 }
 
 /// The pair behind [`label`]; `None` for shortened names and for what it never returns.
-pub fn pair_of_label(name: &str) -> Option<String> {
+pub(crate) fn pair_of_label(name: &str) -> Option<String> {
     let pair = unescaped(name)?;
     (label(&pair) == name).then_some(pair)
 }

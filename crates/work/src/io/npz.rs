@@ -50,7 +50,7 @@ pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
 }
 
 /// An image as the bytes of a `.npy` file: f32, shape `(height, width)`, row-major.
-pub fn npy_bytes(image: &Grid<f32>) -> Vec<u8> {
+pub(crate) fn npy_bytes(image: &Grid<f32>) -> Vec<u8> {
     npy::bytes(&[image.height(), image.width()], &Values::F32(image.as_slice().to_vec()))
 }
 
@@ -58,7 +58,7 @@ pub fn npy_bytes(image: &Grid<f32>) -> Vec<u8> {
 ///
 /// # Errors
 /// In words, if they are not those of an image of 32-bit floats.
-pub fn image_of_npy(bytes: &[u8]) -> Result<Grid<f32>, String> {
+pub(crate) fn image_of_npy(bytes: &[u8]) -> Result<Grid<f32>, String> {
     let mut from = bytes;
     let header = npy::header(&mut from, bytes.len())?;
     let tensor = header.values(&mut from, bytes.len() as u64)?;
@@ -153,7 +153,7 @@ pub fn read(path: &Path) -> Result<BTreeMap<String, Tensor>, NpzError> {
 ///
 /// # Errors
 /// As [`read`].
-pub fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, NpzError> {
+pub(crate) fn read_bytes(path: &Path, bytes: &[u8]) -> Result<BTreeMap<String, Tensor>, NpzError> {
     read_from(path, std::io::Cursor::new(bytes))
 }
 

@@ -69,7 +69,7 @@ impl Tensor {
     }
 
     /// The values as 64-bit floats.
-    pub fn into_f64(self) -> Vec<f64> {
+    pub(crate) fn into_f64(self) -> Vec<f64> {
         match self.values {
             Values::F32(v) => v.into_iter().map(f64::from).collect(),
             Values::F64(v) => v,
@@ -169,7 +169,7 @@ impl PtDict {
     ///
     /// # Errors
     /// As [`PtDict::f32s`].
-    pub fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, PtError> {
+    pub(crate) fn f64s(&self, key: &str, shapes: &[&[usize]]) -> Result<Vec<f64>, PtError> {
         Ok(self.shaped(key, shapes)?.into_f64())
     }
 

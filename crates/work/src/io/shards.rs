@@ -10,7 +10,7 @@ use super::{atomic, files};
 use touch2touch_core::grid::{DepthMap, Mask, RgbGrid};
 
 /// Side of the GelSlim image, pixels.
-pub const GELSLIM_SIDE: usize = 128;
+pub(crate) const GELSLIM_SIDE: usize = 128;
 /// Steps per gray level in which its difference is stored.
 const STEPS_PER_LEVEL: f32 = 64.0;
 /// Numbers per touch beside the images.
@@ -63,7 +63,7 @@ pub enum Origin {
 
 /// A shard that is being written.
 #[derive(Debug)]
-pub struct ShardWriter {
+pub(crate) struct ShardWriter {
     folder: PathBuf,
     /// `[width, height]` of imprints.
     size: [usize; 2],
@@ -93,7 +93,7 @@ impl ShardWriter {
     ///
     /// # Errors
     /// Whatever the disk says.
-    pub fn create(folder: &Path, size: [usize; 2]) -> io::Result<Self> {
+    pub(crate) fn create(folder: &Path, size: [usize; 2]) -> io::Result<Self> {
         std::fs::create_dir_all(folder)?;
         let mut shard = Self { folder: folder.to_owned(), size, files: Vec::new(), touches: 0, finished: false };
         for name in FILES {
@@ -108,7 +108,7 @@ impl ShardWriter {
     ///
     /// # Errors
     /// Whatever the disk says, or if an image has another size.
-    pub fn push(&mut self, record: &Record) -> io::Result<()> {
+    pub(crate) fn push(&mut self, record: &Record) -> io::Result<()> {
         let sizes = [record.imprint.size(), record.clean.size(), record.contact.as_ref().map_or(self.size, Mask::size)];
         if record.gelslim.size() != [GELSLIM_SIDE; 2] || sizes != [self.size; 3] {
             return Err(io::Error::new(io::ErrorKind::InvalidInput, "an image has another size"));
@@ -139,7 +139,7 @@ impl ShardWriter {
     }
 
     /// Touches so far.
-    pub fn touches(&self) -> usize {
+    pub(crate) fn touches(&self) -> usize {
         self.touches
     }
 
@@ -147,7 +147,7 @@ impl ShardWriter {
     ///
     /// # Errors
     /// Whatever the disk says.
-    pub fn finish(mut self, about: &Value) -> io::Result<()> {
+    pub(crate) fn finish(mut self, about: &Value) -> io::Result<()> {
         let (n, [width, height]) = (self.touches, self.size);
         let shapes = [
             ("<i2", vec![n, 3, GELSLIM_SIDE, GELSLIM_SIDE]),

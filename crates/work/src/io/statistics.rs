@@ -169,7 +169,7 @@ impl ShiftStatistics {
 /// Seconds since 1970 as a date and time in UTC.
 ///
 /// Source: the civil-from-days algorithm of Howard Hinnant, "chrono-compatible low-level date algorithms".
-pub fn utc_text(unix_s: u64) -> String {
+pub(crate) fn utc_text(unix_s: u64) -> String {
     let (days, rest) = ((unix_s / 86_400) as i64 + 719_468, unix_s % 86_400);
     let era = days.div_euclid(146_097);
     let day_of_era = days.rem_euclid(146_097);

@@ -66,10 +66,10 @@ impl From<Provenance> for Base {
 }
 
 /// A longer time between two deeds is a pause, seconds: nobody worked on the pair then.
-pub const PAUSE_S: u64 = 60;
+pub(crate) const PAUSE_S: u64 = 60;
 
 /// The time that some deeds took, seconds: from each to the next, unless that was a pause.
-pub fn working_seconds(records: &[Record]) -> u64 {
+pub(crate) fn working_seconds(records: &[Record]) -> u64 {
     // A clock that was set back is no time.
     let between = |pair: &[Record]| pair[1].unix_s.saturating_sub(pair[0].unix_s);
     records.windows(2).map(between).filter(|&s| s <= PAUSE_S).sum()

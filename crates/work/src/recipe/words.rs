@@ -119,7 +119,7 @@ impl Recipe {
 }
 
 /// The options of a way to meters.
-pub fn shift_words(shift: ShiftMode) -> Words {
+pub(crate) fn shift_words(shift: ShiftMode) -> Words {
     let words = Words::default();
     match shift {
         ShiftMode::Raw => words.option("--shift", "raw"),

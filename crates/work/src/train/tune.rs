@@ -8,8 +8,9 @@ use sha2::{Digest as _, Sha256};
 use touch2touch_tuning::{Cast, Descent as _, Error, MaskConfig, MaskStart, MaskTouch, MaskTuner};
 
 use super::gather::{Drawn, Gathered};
+use super::trained::HeldOut;
 use super::write::{Provenance, bundle};
-use super::{HeldOut, NO_TOOL, Told, TrainPlan, TrainSetup, Trained, WHAT};
+use super::{NO_TOOL, Told, TrainPlan, TrainSetup, Trained, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::{self, MaskSpec, Role};
 use crate::infer::mask::contact_of;

@@ -51,7 +51,7 @@ pub enum LayerSize {
 
 impl LayerSize {
     /// Sizes that can be drawn, in either unit.
-    pub const RANGE: std::ops::RangeInclusive<f32> = 0.1..=20.0;
+    pub(crate) const RANGE: std::ops::RangeInclusive<f32> = 0.1..=20.0;
 
     /// The number.
     pub fn value(self) -> f32 {
@@ -104,12 +104,12 @@ impl SceneLayer {
     }
 
     /// Whether it has points or lines that have a size.
-    pub fn has_size(self) -> bool {
+    pub(crate) fn has_size(self) -> bool {
         !matches!(self, Self::Surface | Self::Cad | Self::Guides)
     }
 
     /// Whether its size can be in millimeters.
-    pub fn has_points(self) -> bool {
+    pub(crate) fn has_points(self) -> bool {
         matches!(self, Self::Membrane | Self::Contact | Self::OtherContact | Self::Dropped | Self::Added)
     }
 }

@@ -11,7 +11,7 @@ pub enum Target {
     /// Model points in space, with the normals of the surface.
     Surface,
     /// The triangles themselves; where searching them takes too long, points that stand for them
-    /// ([`super::instead_of_triangles`]).
+    /// ([`super::prepared::instead_of_triangles`]).
     Mesh,
 }
 
@@ -48,7 +48,7 @@ pub enum Kernel {
 
 impl Kernel {
     /// Width, meters; infinite without one.
-    pub fn width_m(self) -> f64 {
+    pub(crate) fn width_m(self) -> f64 {
         match self {
             Self::None => f64::INFINITY,
             Self::Huber { width_m } | Self::GemanMcClure { width_m } => width_m,
@@ -84,7 +84,7 @@ impl Kernel {
 /// Which pairs are left out of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Rejector {
+pub(crate) enum Rejector {
     /// None.
     None,
     /// Those farther apart than this. They pay as if they were that far, so that running away does not pay.
@@ -102,7 +102,7 @@ pub enum Rejector {
 /// How a step is found from the pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Solver {
+pub(crate) enum Solver {
     /// The motion that brings the pairs closest: `atan2` in the plane, Horn's quaternion in space. Only for
     /// point to point.
     ClosedForm,
@@ -113,7 +113,7 @@ pub enum Solver {
 /// Which motions are open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Dof {
+pub(crate) enum Dof {
     /// Angle about the closing axis, y and z.
     Planar,
     /// All six.

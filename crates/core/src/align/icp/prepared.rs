@@ -50,7 +50,7 @@ pub fn silhouette(tool: &ToolModel) -> Samples {
 
 /// What to compare with in place of the triangles, where looking for the nearest triangle takes too long: points of
 /// the surface, close together, each with the plane of its triangle. `None` for nearly all tools.
-pub fn instead_of_triangles(tool: &ToolModel) -> Option<Samples> {
+pub(crate) fn instead_of_triangles(tool: &ToolModel) -> Option<Samples> {
     let dense = |tool: &ToolModel| {
         let (mut effort, mut searches) = (0, 0);
         for (i, (point, normal)) in tool.surface().iter().take(EFFORT_SEARCHES).enumerate() {

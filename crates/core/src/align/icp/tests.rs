@@ -1,3 +1,4 @@
+use super::prepared::instead_of_triangles;
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;

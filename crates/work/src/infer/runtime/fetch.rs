@@ -13,7 +13,7 @@ use crate::io::digest::sha256;
 use crate::io::files;
 
 /// The version fetched.
-pub const VERSION: &str = "1.31.1";
+pub(crate) const VERSION: &str = "1.31.1";
 
 /// A platform's wheel.
 struct Wheel {

@@ -13,7 +13,7 @@ use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::{DepthCamera, Sample};
 
 /// A bubble file of the rig, in the root of a data set: its cameras serve touches that have no bubble file.
-pub const RIG_FILE: &str = "rig.pt";
+pub(crate) const RIG_FILE: &str = "rig.pt";
 
 /// A data set after its folder was read again.
 #[derive(Debug)]
@@ -151,7 +151,7 @@ impl Dataset {
     }
 
     /// Lets touches that come without a depth picture use these cameras.
-    pub fn set_rig_cameras(&mut self, cameras: PerPad<DepthCamera>) {
+    pub(crate) fn set_rig_cameras(&mut self, cameras: PerPad<DepthCamera>) {
         self.cameras = OnceLock::from(cameras.map(|camera| camera.map(Arc::new)));
     }
 

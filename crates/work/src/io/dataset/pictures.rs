@@ -32,10 +32,7 @@ use touch2touch_core::upright::{self, TurnReading};
 use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 /// What the darkest and brightest value of a bubble picture are taken for, meters.
-pub const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
-
-/// What to say beside every length of a picture folder.
-pub const ASSUMED_SCALE_NOTE: &str = "assumed scale: the pictures were stretched to 0..255, taken as -6.3 to 18.0 mm";
+pub(crate) const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
 
 /// Difference (0..255 scale) per gray level of an unclipped picture: red, green, blue.
 ///
@@ -279,7 +276,7 @@ fn unsure(path: &Path, read: TurnReading) -> Problem {
 }
 
 /// A bubble picture (0..255) on its own pixels, in the assumed meters.
-pub fn assumed_meters(tile: &Grid<f32>) -> DepthMap {
+pub(crate) fn assumed_meters(tile: &Grid<f32>) -> DepthMap {
     let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
     tile.map(|&v| (lo + (hi - lo) * f64::from(v) / 255.0) as f32)
 }

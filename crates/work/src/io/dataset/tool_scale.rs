@@ -135,7 +135,7 @@ impl ToolScale {
 ///
 /// # Errors
 /// If it is there and cannot be read.
-pub fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
+pub(crate) fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
     let file: PathBuf = model.with_file_name(UNIT_FILE);
     match files::read_to_string(&file, MAX_UNIT_BYTES) {
         Ok(text) => Ok(Some(text.trim().to_owned())),
@@ -148,7 +148,7 @@ pub fn said_beside(model: &Path) -> Result<Option<String>, MeshError> {
 ///
 /// # Errors
 /// If it cannot be read.
-pub fn tool_size(path: &Path) -> Result<f64, MeshError> {
+pub(crate) fn tool_size(path: &Path) -> Result<f64, MeshError> {
     let bounds = stl::read(path)?.mesh.bounds();
     Ok(bounds.map_or(0.0, |[lo, hi]| (hi - lo).max_element()))
 }
@@ -157,7 +157,7 @@ pub fn tool_size(path: &Path) -> Result<f64, MeshError> {
 ///
 /// # Errors
 /// Whatever the disk says.
-pub fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
+pub(crate) fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
     atomic::write_bytes(&model.with_file_name(UNIT_FILE), format!("{word}\n").as_bytes())
 }
 
@@ -176,7 +176,7 @@ pub struct ToolFile {
 /// # Errors
 /// [`MeshError`]; [`MeshError::Unit`], with the factor that would fit, if the model cannot be in meters, and
 /// [`MeshError::NotATool`] if no unit makes it a tool, or not the one that was named.
-pub fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
+pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFile, MeshError> {
     let (scale, said_by) = match scale {
         Some(scale) => (scale, "the caller".to_owned()),
         None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),

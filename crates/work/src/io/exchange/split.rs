@@ -102,11 +102,11 @@ pub(super) fn stems(entries: &[ExportEntry], rig: &Rig) -> Vec<String> {
 
 /// What the stems of an export mean, for files that come without its list.
 #[derive(Clone, Debug)]
-pub struct Stems(HashMap<String, Vec<usize>>);
+pub(crate) struct Stems(HashMap<String, Vec<usize>>);
 
 impl Stems {
     /// All that an export of any of `entries` gives.
-    pub fn of(entries: &[ExportEntry], rig: &Rig) -> Self {
+    pub(crate) fn of(entries: &[ExportEntry], rig: &Rig) -> Self {
         let mut all: HashMap<String, Vec<usize>> = HashMap::new();
         for (at, entry) in entries.iter().enumerate() {
             let stem = stem(entry, rig);
@@ -117,7 +117,7 @@ impl Stems {
     }
 
     /// The entries that a stem may be of: more than one where their names became equal.
-    pub fn find(&self, stem: &str) -> &[usize] {
+    pub(crate) fn find(&self, stem: &str) -> &[usize] {
         self.0.get(stem).map_or(&[], Vec::as_slice)
     }
 }
