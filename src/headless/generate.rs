@@ -17,10 +17,10 @@ use super::seeds::{self, SeedArgs};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::grid::DepthMap;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::{Sample, Scale};
+use touch2touch_core::sample::{PadTouch, Sample, Scale};
 use touch2touch_core::{metrics, resample};
 use touch2touch_work::compare;
 use touch2touch_work::doubts;
@@ -111,12 +111,7 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 if let Some(difference) = imprint::color(&predicted, [0, 0])? {
                     unit = Unit::Levels;
                     write_color(&stem, &difference)?;
-                    if let Some(measured) = touch.color() {
-                        let [w, h] = measured.difference.size();
-                        let sized = resample::bilinear_rgb(&difference, w, h);
-                        let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
-                        (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
-                    }
+                    score_color(&difference, touch, &mut pair)?;
                     made.push(pair);
                     continue;
                 }
@@ -162,6 +157,17 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     begun.finish(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(complete)
+}
+
+/// Fills in the figures of a predicted color picture against the measured one.
+fn score_color(difference: &RgbGrid, touch: &PadTouch, pair: &mut Pair) -> anyhow::Result<()> {
+    if let Some(measured) = touch.color() {
+        let [w, h] = measured.difference.size();
+        let sized = resample::bilinear_rgb(difference, w, h);
+        let (psnr, ssim) = metrics::color(&sized, &measured.difference)?;
+        (pair.psnr_db, pair.ssim) = (psnr.db(), Some(ssim));
+    }
+    Ok(())
 }
 
 /// Fills in the figures of a prediction against the measured imprint, and of the lab's own prediction where it lies by.

@@ -434,6 +434,17 @@ impl StudioApp {
     }
 }
 
+/// The factor that held keys put on a step of the tool in hand.
+fn step_scale(held: egui::Modifiers) -> f64 {
+    if held.command || held.ctrl {
+        0.1
+    } else if held.shift {
+        10.0
+    } else {
+        1.0
+    }
+}
+
 impl eframe::App for StudioApp {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
         let doc = &self.state.document;
@@ -485,14 +496,7 @@ impl eframe::App for StudioApp {
                 }
                 match action.command(state) {
                     Some(Command::Workbench(WorkbenchCommand::Nudge(axis, by))) if action.is_nudge() => {
-                        let held = ctx.input(|i| i.modifiers);
-                        let scale = if held.command || held.ctrl {
-                            0.1
-                        } else if held.shift {
-                            10.0
-                        } else {
-                            1.0
-                        };
+                        let scale = step_scale(ctx.input(|i| i.modifiers));
                         cx.push(Command::Workbench(WorkbenchCommand::Nudge(axis, by * scale)));
                     }
                     _ => cx.act(action),

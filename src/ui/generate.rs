@@ -48,11 +48,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let bundle = cx.state.bundle(BundleKind::Generator).ok();
-    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
-    let spelt_out = cx.state.settings.generate.spelt_out(bundle);
-    let mut new = spelt_out.clone();
+/// The model bundle, and the folders that are none.
+fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     row(ui, cx.p.weak, "Model", |ui| {
         let bundles: Vec<_> = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
         let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
@@ -79,6 +76,14 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
     }
+}
+
+fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let bundle = cx.state.bundle(BundleKind::Generator).ok();
+    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
+    let spelt_out = cx.state.settings.generate.spelt_out(bundle);
+    let mut new = spelt_out.clone();
+    model(cx, ui, &mut new);
     row(ui, cx.p.weak, "Preset", |ui| {
         for preset in Preset::iter() {
             let chosen = spelt_out.preset == Some(preset);

@@ -165,19 +165,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         }
         _ => {}
     }
-    if let (Lookup::Ready(clouds), Ok(Some(key))) = (lookup, state.cloud_key(source)) {
-        build::update_cloud(cx, memory, source, key, clouds);
-    }
-    if state.workbench.both_clouds {
-        let other = other_side(source);
-        if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
-            build::update_cloud(cx, memory, other, key, clouds);
-        }
-    }
-    build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
-    layers::update(cx, memory, source);
-    ghost::update(cx, memory, source);
-    steps::update(cx, memory, source);
+    update(cx, memory, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
@@ -215,31 +203,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
-    let pasted = pasted(ui, &output);
-    if let Some(camera) = pasted {
-        let orthographic = memory.views[source as usize].camera.orthographic;
-        memory.views[source as usize].camera = Camera { orthographic, ..camera };
-        memory.views[source as usize].placed = true;
-        if camera.orthographic != orthographic {
-            cx.act(Action::Parallel);
-        }
-    }
-    let aimed = match (output.fit, output.pointer, lookup) {
-        (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, &output, pointer, clouds),
-        _ => false,
-    };
-    let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
-    if place && let Some(bounds) = scene.bounds() {
-        let view = &mut memory.views[source as usize];
-        view.camera.fit(bounds, output.size);
-        view.placed = true;
-    }
-    if (output.moved || place || aimed || pasted.is_some()) && state.settings.cameras_linked {
-        let camera = memory.views[source as usize].camera;
-        let other = &mut memory.views[1 - source as usize];
-        other.camera = camera;
-        other.placed |= memory.clouds[1 - source as usize].is_some();
-    }
+    place_camera(cx, ui, memory, source, &output, scene.bounds());
     // A linked camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
@@ -273,6 +237,60 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     if let Lookup::Ready(clouds) = lookup {
         measure::card(cx, ui, source, rect, clouds);
     }
+}
+
+/// Moves the camera of a side to where it was pasted, aimed or fitted to; a linked one follows.
+fn place_camera(
+    cx: &mut Cx<'_>,
+    ui: &Ui,
+    memory: &mut Memory,
+    source: ImprintSource,
+    output: &SceneOutput,
+    bounds: Option<[DVec3; 2]>,
+) {
+    let pasted = pasted(ui, output);
+    if let Some(camera) = pasted {
+        let orthographic = memory.views[source as usize].camera.orthographic;
+        memory.views[source as usize].camera = Camera { orthographic, ..camera };
+        memory.views[source as usize].placed = true;
+        if camera.orthographic != orthographic {
+            cx.act(Action::Parallel);
+        }
+    }
+    let aimed = match (output.fit, output.pointer, cx.state.cloud(source)) {
+        (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, output, pointer, clouds),
+        _ => false,
+    };
+    let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
+    if place && let Some(bounds) = bounds {
+        let view = &mut memory.views[source as usize];
+        view.camera.fit(bounds, output.size);
+        view.placed = true;
+    }
+    if (output.moved || place || aimed || pasted.is_some()) && cx.state.settings.cameras_linked {
+        let camera = memory.views[source as usize].camera;
+        let other = &mut memory.views[1 - source as usize];
+        other.camera = camera;
+        other.placed |= memory.clouds[1 - source as usize].is_some();
+    }
+}
+
+/// Brings what the view draws up to date.
+fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    let state = cx.state;
+    if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(source), state.cloud_key(source)) {
+        build::update_cloud(cx, memory, source, key, clouds);
+    }
+    if state.workbench.both_clouds {
+        let other = other_side(source);
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
+            build::update_cloud(cx, memory, other, key, clouds);
+        }
+    }
+    build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
+    layers::update(cx, memory, source);
+    ghost::update(cx, memory, source);
+    steps::update(cx, memory, source);
 }
 
 /// A camera that was pasted over a view.

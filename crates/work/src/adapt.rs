@@ -29,9 +29,7 @@ use touch2touch_core::fit::{FitError, FitSource, Fitted, PadFit, closed_form, do
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::lattice::template;
 use touch2touch_core::postprocess::Correction;
-use touch2touch_core::rig::PerPad;
-#[cfg(not(feature = "tune"))]
-use touch2touch_core::rig::Rig;
+use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units::counted;
 
@@ -145,14 +143,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     let held_back = touches.iter().zip(&unseen).filter_map(|(touch, after)| Some(shown(touch, after.as_ref()?)));
     let held_back = held_back.take(MOST_SHOWN).collect();
     let fitted = Fitted { source, pads: with_lattices(&touches, corrections) };
-    let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
-        pad: dataset.rig.pad_key(pad).into_owned(),
-        touches: touches.iter().filter(|t| t.pad == pad).count(),
-        offset_px: fit.correction.offset_px,
-        gain: fit.correction.line[0],
-        offset_m: fit.correction.line[1],
-    });
-    let pads = summary.collect();
+    let pads = summaries(&fitted, &touches, &dataset.rig);
     notes.extend(tools.into_notes());
     left_out.sort_by(|a, b| a.name.cmp(&b.name));
     let mut adapted = Adapted {
@@ -303,6 +294,17 @@ fn source(dataset: &Dataset, bundle: &BundleInfo, touches: &[Touch]) -> FitSourc
 }
 
 /// The corrections with what the lattice of each pad looks like, where pictures were fitted.
+fn summaries(fitted: &Fitted, touches: &[Touch], rig: &Rig) -> Vec<PadSummary> {
+    let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
+        pad: rig.pad_key(pad).into_owned(),
+        touches: touches.iter().filter(|t| t.pad == pad).count(),
+        offset_px: fit.correction.offset_px,
+        gain: fit.correction.line[0],
+        offset_m: fit.correction.line[1],
+    });
+    summary.collect()
+}
+
 fn with_lattices(touches: &[Touch], corrections: Vec<Option<Correction>>) -> PerPad<PadFit> {
     let with = |(pad, correction): (usize, Option<Correction>)| {
         let own = touches.iter().filter(|t| t.pad.index() == pad && t.scale == Scale::Assumed);

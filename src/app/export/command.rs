@@ -88,18 +88,7 @@ impl State {
                     .word_if(self.table.published, "--paper")
                     .then(recipe.words(Stage::Pose))
             }
-            (Pane::Dial, _) => {
-                let dial = &self.dial;
-                let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
-                let values: Vec<String> = values.into_iter().map(Setting::key).collect();
-                let words = verb("sweep").option("--dial", dial.dial.key()).option("--values", values.join(","));
-                let words = match dial.pairs {
-                    DialPairs::All => words,
-                    DialPairs::Spread(count) => words.option("--pairs", count),
-                    DialPairs::Listed => words.option("--only", self.names(self.dial_pairs())?),
-                };
-                words.word_if(!dial.predictions, "--measured-only").then(self.dial_recipe().words(Stage::Pose))
-            }
+            (Pane::Dial, _) => self.dial_words(verb("sweep"))?,
             (Pane::Adapt, _) => {
                 let setup = self.adapt_setup()?;
                 let words = verb("adapt").option("--out", "fitted");
@@ -111,24 +100,37 @@ impl State {
                 // The fit is of what the exact inverse gives, and of no hand.
                 words.then(Recipe { shift: ShiftMode::default(), ..setup.recipe.clone() }.words(Stage::Pose))
             }
-            (Pane::Train, _) => {
-                let form = self.train.form;
-                let words = command("masks")
-                    .word("train")
-                    .word(&path)
-                    .option_if("--steps", form.by_steps.then_some(form.steps))
-                    .option_if("--minutes", (!form.by_steps).then_some(form.minutes))
-                    .option("--held-out", form.choice.held_out_percent)
-                    .option("--seed", form.choice.seed)
-                    .word_if(form.choice.test_in_train, "--test-in-train");
-                match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
-                    (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
-                    _ => words,
-                }
-            }
+            (Pane::Train, _) => self.train_words(command("masks").word("train").word(&path)),
             _ => return None,
         };
         Some(words.list())
+    }
+
+    fn dial_words(&self, words: Words) -> Option<Words> {
+        let dial = &self.dial;
+        let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
+        let values: Vec<String> = values.into_iter().map(Setting::key).collect();
+        let words = words.option("--dial", dial.dial.key()).option("--values", values.join(","));
+        let words = match dial.pairs {
+            DialPairs::All => words,
+            DialPairs::Spread(count) => words.option("--pairs", count),
+            DialPairs::Listed => words.option("--only", self.names(self.dial_pairs())?),
+        };
+        Some(words.word_if(!dial.predictions, "--measured-only").then(self.dial_recipe().words(Stage::Pose)))
+    }
+
+    fn train_words(&self, words: Words) -> Words {
+        let form = self.train.form;
+        let words = words
+            .option_if("--steps", form.by_steps.then_some(form.steps))
+            .option_if("--minutes", (!form.by_steps).then_some(form.minutes))
+            .option("--held-out", form.choice.held_out_percent)
+            .option("--seed", form.choice.seed)
+            .word_if(form.choice.test_in_train, "--test-in-train");
+        match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
+            (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
+            _ => words,
+        }
     }
 
     /// [`Self::equivalent_words`] as one line for a shell.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::{GraspScore, mean, psnr};
 use crate::sample::Scale;
 
-/// A metric of a grasp: a row of [`Metric::row`]. Lists, filters and pictures follow; the most telling first.
+/// A metric of a grasp: a row of [`ROWS`]. Lists, filters and pictures follow; the most telling first.
 #[derive(
     Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, Serialize, Deserialize,
 )]
@@ -42,6 +42,7 @@ pub enum Metric {
 
 /// A row of the table of metrics.
 struct Row {
+    metric: Metric,
     name: &'static str,
     short: &'static str,
     key: &'static str,
@@ -54,141 +55,156 @@ struct Row {
     of: fn(&GraspScore) -> Option<f64>,
 }
 
+const PLAIN: Row = Row {
+    metric: Metric::Angle,
+    name: "",
+    short: "",
+    key: "",
+    tip: "",
+    unit: "",
+    factor: 1.0,
+    decimals: 3,
+    larger_is_better: true,
+    of: |_| None,
+};
+const PERCENT: Row = Row { unit: "%", factor: 100.0, decimals: 1, ..PLAIN };
+const DB: Row = Row { unit: "dB", decimals: 1, ..PLAIN };
+const MM: Row = Row { unit: "mm", factor: 1e3, decimals: 2, larger_is_better: false, ..PLAIN };
+
+/// The table.
+static ROWS: [Row; 12] = [
+    Row {
+        metric: Metric::Angle,
+        name: "Angle error",
+        short: "angle",
+        key: "angle",
+        tip: "Error of the in-hand angle from the contact of both fingers, degrees",
+        unit: "°",
+        factor: 1f64.to_degrees(),
+        decimals: 1,
+        larger_is_better: false,
+        of: |grasp| grasp.angle_error_rad,
+    },
+    Row {
+        metric: Metric::Psnr,
+        name: "PSNR",
+        short: "PSNR",
+        key: "psnr",
+        tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
+        of: |grasp| psnr(&[grasp], |image| Some(image.error)),
+        ..DB
+    },
+    Row {
+        metric: Metric::Ssim,
+        name: "SSIM",
+        short: "SSIM",
+        key: "ssim",
+        tip: "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed",
+        // Stretched pictures have one range only.
+        of: |grasp| match grasp.scale {
+            Scale::Assumed => mean(grasp.images.iter().filter_map(|image| image.ssim)),
+            Scale::Measured => mean(grasp.images.iter().filter_map(|image| image.ssim_peak)),
+        },
+        ..PLAIN
+    },
+    Row {
+        metric: Metric::Rms,
+        name: "RMS error",
+        short: "RMS",
+        key: "rms",
+        tip: "Root mean square error of all fingers against the measured imprints, mm",
+        of: |grasp| {
+            let errors = grasp.images.iter().map(|image| image.error);
+            let (sum, pixels) = errors.fold((0.0, 0), |(sum, n), e| (sum + e.sum, n + e.pixels));
+            (grasp.scale == Scale::Measured && pixels > 0).then(|| (sum / pixels as f64).sqrt())
+        },
+        ..MM
+    },
+    Row {
+        metric: Metric::Tool,
+        name: "Tool named",
+        short: "tool",
+        key: "named",
+        tip: "Share of the imprints whose tool the classifier names, percent",
+        decimals: 0,
+        of: |grasp| mean(grasp.images.iter().filter_map(|i| i.tool_right).map(|right| f64::from(u8::from(right)))),
+        ..PERCENT
+    },
+    Row {
+        metric: Metric::PsnrNoiseFree,
+        name: "PSNR noise-free",
+        short: "clean",
+        key: "psnr-clean",
+        tip: "Against the simulator's imprint without camera noise, dB",
+        of: |grasp| psnr(&[grasp], |image| image.noise_free),
+        ..DB
+    },
+    Row {
+        metric: Metric::SsimTool,
+        name: "SSIM tool's range",
+        short: "SSIM t.",
+        key: "ssim-tool",
+        tip: "Structural similarity with the lab's range: that of the tool's predictions",
+        of: |grasp| {
+            let measured = grasp.scale == Scale::Measured;
+            mean(grasp.images.iter().filter_map(|image| image.ssim)).filter(|_| measured)
+        },
+        ..PLAIN
+    },
+    Row {
+        metric: Metric::SsimNoiseFree,
+        name: "SSIM noise-free",
+        short: "SSIM cl.",
+        key: "ssim-clean",
+        tip: "Against the simulator's imprint without camera noise; range of the tool's predictions",
+        of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim_noise_free)),
+        ..PLAIN
+    },
+    Row {
+        metric: Metric::Disagreement,
+        name: "Hand against model",
+        short: "hand/model",
+        key: "disagreement",
+        tip: "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent",
+        larger_is_better: false,
+        of: |grasp| grasp.doubt.disagreement,
+        ..PERCENT
+    },
+    Row {
+        metric: Metric::Unsure,
+        name: "Model unsure",
+        short: "unsure",
+        key: "unsure",
+        tip: "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent",
+        larger_is_better: false,
+        of: |grasp| grasp.doubt.unsure,
+        ..PERCENT
+    },
+    Row {
+        metric: Metric::SeedSpread,
+        name: "Seed spread",
+        short: "seeds",
+        key: "spread",
+        tip: "Standard deviation between kept predictions with different seeds, mean over the pixels, mm",
+        of: |grasp| grasp.seed_spread_m,
+        ..MM
+    },
+    Row {
+        metric: Metric::Seconds,
+        name: "Time",
+        short: "Time",
+        key: "time",
+        tip: "Time to generate one image, seconds",
+        unit: "s",
+        larger_is_better: false,
+        of: |grasp| grasp.seconds,
+        ..PLAIN
+    },
+];
+
 impl Metric {
-    fn row(self) -> Row {
-        let row = Row {
-            name: "",
-            short: "",
-            key: "",
-            tip: "",
-            unit: "",
-            factor: 1.0,
-            decimals: 3,
-            larger_is_better: true,
-            of: |_| None,
-        };
-        let percent = Row { unit: "%", factor: 100.0, decimals: 1, ..row };
-        let db = Row { unit: "dB", decimals: 1, ..row };
-        let mm = Row { unit: "mm", factor: 1e3, decimals: 2, larger_is_better: false, ..row };
-        match self {
-            Self::Angle => Row {
-                name: "Angle error",
-                short: "angle",
-                key: "angle",
-                tip: "Error of the in-hand angle from the contact of both fingers, degrees",
-                unit: "°",
-                factor: 1f64.to_degrees(),
-                decimals: 1,
-                larger_is_better: false,
-                of: |grasp| grasp.angle_error_rad,
-            },
-            Self::Psnr => Row {
-                name: "PSNR",
-                short: "PSNR",
-                key: "psnr",
-                tip: "Against the measured imprint, dB; peak 22.5 mm, or both scaled to 0..1 where the scale is assumed",
-                of: |grasp| psnr(&[grasp], |image| Some(image.error)),
-                ..db
-            },
-            Self::Ssim => Row {
-                name: "SSIM",
-                short: "SSIM",
-                key: "ssim",
-                tip: "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed",
-                // Stretched pictures have one range only.
-                of: |grasp| match grasp.scale {
-                    Scale::Assumed => mean(grasp.images.iter().filter_map(|image| image.ssim)),
-                    Scale::Measured => mean(grasp.images.iter().filter_map(|image| image.ssim_peak)),
-                },
-                ..row
-            },
-            Self::Rms => Row {
-                name: "RMS error",
-                short: "RMS",
-                key: "rms",
-                tip: "Root mean square error of all fingers against the measured imprints, mm",
-                of: |grasp| {
-                    let errors = grasp.images.iter().map(|image| image.error);
-                    let (sum, pixels) = errors.fold((0.0, 0), |(sum, n), e| (sum + e.sum, n + e.pixels));
-                    (grasp.scale == Scale::Measured && pixels > 0).then(|| (sum / pixels as f64).sqrt())
-                },
-                ..mm
-            },
-            Self::Tool => Row {
-                name: "Tool named",
-                short: "tool",
-                key: "named",
-                tip: "Share of the imprints whose tool the classifier names, percent",
-                decimals: 0,
-                of: |grasp| {
-                    mean(grasp.images.iter().filter_map(|i| i.tool_right).map(|right| f64::from(u8::from(right))))
-                },
-                ..percent
-            },
-            Self::PsnrNoiseFree => Row {
-                name: "PSNR noise-free",
-                short: "clean",
-                key: "psnr-clean",
-                tip: "Against the simulator's imprint without camera noise, dB",
-                of: |grasp| psnr(&[grasp], |image| image.noise_free),
-                ..db
-            },
-            Self::SsimTool => Row {
-                name: "SSIM tool's range",
-                short: "SSIM t.",
-                key: "ssim-tool",
-                tip: "Structural similarity with the lab's range: that of the tool's predictions",
-                of: |grasp| {
-                    let measured = grasp.scale == Scale::Measured;
-                    mean(grasp.images.iter().filter_map(|image| image.ssim)).filter(|_| measured)
-                },
-                ..row
-            },
-            Self::SsimNoiseFree => Row {
-                name: "SSIM noise-free",
-                short: "SSIM cl.",
-                key: "ssim-clean",
-                tip: "Against the simulator's imprint without camera noise; range of the tool's predictions",
-                of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim_noise_free)),
-                ..row
-            },
-            Self::Disagreement => Row {
-                name: "Hand against model",
-                short: "hand/model",
-                key: "disagreement",
-                tip: "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent",
-                larger_is_better: false,
-                of: |grasp| grasp.doubt.disagreement,
-                ..percent
-            },
-            Self::Unsure => Row {
-                name: "Model unsure",
-                short: "unsure",
-                key: "unsure",
-                tip: "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent",
-                larger_is_better: false,
-                of: |grasp| grasp.doubt.unsure,
-                ..percent
-            },
-            Self::SeedSpread => Row {
-                name: "Seed spread",
-                short: "seeds",
-                key: "spread",
-                tip: "Standard deviation between kept predictions with different seeds, mean over the pixels, mm",
-                of: |grasp| grasp.seed_spread_m,
-                ..mm
-            },
-            Self::Seconds => Row {
-                name: "Time",
-                short: "Time",
-                key: "time",
-                tip: "Time to generate one image, seconds",
-                unit: "s",
-                larger_is_better: false,
-                of: |grasp| grasp.seconds,
-                ..row
-            },
-        }
+    fn row(self) -> &'static Row {
+        ROWS.iter().find(|row| row.metric == self).unwrap_or(&PLAIN)
     }
 
     /// The name on screen.
@@ -319,6 +335,7 @@ mod tests {
             assert_eq!(Condition::parse(word), None, "{word}");
         }
         for metric in Metric::iter() {
+            assert!(!metric.name().is_empty());
             assert_eq!(Condition::parse(&format!("{}>0", metric.key())).map(|c| c.metric), Some(metric));
         }
     }

@@ -13,7 +13,7 @@ use super::{Setup, Skipped, ToolWork, apart};
 use crate::compare::as_tile;
 use crate::error::TaskError;
 use crate::feel::{Felt, Touch};
-use crate::infer::classifier::Verdict;
+use crate::infer::classifier::{ToolClassifier, Verdict};
 use crate::io::caught::caught;
 use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::job::JobCx;
@@ -50,6 +50,35 @@ struct Pending {
     images: Vec<Image>,
     /// Whether something about it failed, so that it is tried again the next time.
     failed: bool,
+}
+
+/// Why masks of a touch are not of the source that was asked, and how many.
+fn otherwise(felt: &Felt) -> Vec<(String, usize)> {
+    let mut otherwise: Vec<(String, usize)> = Vec::new();
+    let masked = felt.has(Stage::Mask).then(|| felt.contact());
+    for ContactMask { basis, .. } in masked.iter().flat_map(|contact| contact.masks.iter().flatten()) {
+        let why = match basis {
+            MaskBasis::Source => continue,
+            MaskBasis::Hand => "were drawn by hand",
+            MaskBasis::Flat => "are empty: the imprints are flat",
+            MaskBasis::Depth(_) => "are by depth: the mask model found no contact in imprints that have some",
+        };
+        match otherwise.iter_mut().find(|(known, _)| known == why) {
+            Some((_, count)) => *count += 1,
+            None => otherwise.push((why.to_owned(), 1)),
+        }
+    }
+    otherwise
+}
+
+/// Has the classifier name the tool of each image.
+fn name_tools(classifier: Option<&mut ToolClassifier>, images: &mut [Image]) -> Result<(), String> {
+    let Some(classifier) = classifier else { return Ok(()) };
+    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
+    let verdicts = guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string()));
+    let verdicts = verdicts.map_err(|why| format!("tool classifier: {why}"))?;
+    images.iter_mut().zip(verdicts).for_each(|(image, verdict)| image.verdict = Some(verdict));
+    Ok(())
 }
 
 /// A grasp with what a method made of it.
@@ -128,7 +157,7 @@ impl<'a> Tool<'a> {
                         continue;
                     }
                 };
-                let (mut otherwise, touch) = (Vec::<(String, usize)>::new(), self.touch(case, &labels));
+                let touch = self.touch(case, &labels);
                 let mut felt = Felt::with_imprints(&recipe, made.imprints.clone());
                 let posed = with_masks && self.model.is_some() && case.sample.grasp_from_object.is_some();
                 if posed {
@@ -139,21 +168,7 @@ impl<'a> Tool<'a> {
                         Err(why) => skip(case, format!("contact mask: {why}")),
                     }
                 }
-                let masked = felt.has(Stage::Mask).then(|| felt.contact());
-                for ContactMask { basis, .. } in masked.iter().flat_map(|contact| contact.masks.iter().flatten()) {
-                    let why = match basis {
-                        MaskBasis::Source => continue,
-                        MaskBasis::Hand => "were drawn by hand",
-                        MaskBasis::Flat => "are empty: the imprints are flat",
-                        MaskBasis::Depth(_) => {
-                            "are by depth: the mask model found no contact in imprints that have some"
-                        }
-                    };
-                    match otherwise.iter_mut().find(|(known, _)| known == why) {
-                        Some((_, count)) => *count += 1,
-                        None => otherwise.push((why.to_owned(), 1)),
-                    }
-                }
+                let otherwise = otherwise(&felt);
                 let doubt = match upper && case.sample.scale == Scale::Measured {
                     true => guarded(|| doubt(&mut felt, touch.labels, by_models).map_err(|err| err.why)),
                     false => Ok(Doubt::default()),
@@ -180,14 +195,9 @@ impl<'a> Tool<'a> {
                         continue;
                     }
                 };
-                if let Some(classifier) =
-                    classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured && made.colors.is_empty())
-                {
-                    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-                    match guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string())) {
-                        Ok(verdicts) => images.iter_mut().zip(verdicts).for_each(|(i, v)| i.verdict = Some(v)),
-                        Err(why) => skip(case, format!("tool classifier: {why}")),
-                    }
+                let classifier = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured);
+                if let Err(why) = name_tools(classifier.filter(|_| made.colors.is_empty()), &mut images) {
+                    skip(case, why);
                 }
                 let score = GraspScore {
                     pair: case.name.clone(),

@@ -128,6 +128,13 @@ pub(super) fn tune(
         name,
         bundle: setup.out.clone(),
     };
+    warn(&mut trained);
+    Ok(trained)
+}
+
+/// Warns of a training that was too short, or made the model worse.
+fn warn(trained: &mut Trained) {
+    let steps = trained.steps;
     if steps < ENOUGH_STEPS {
         let text = format!("{steps} steps are few: fewer than {ENOUGH_STEPS} change next to nothing");
         trained.warnings.push(text);
@@ -137,7 +144,6 @@ pub(super) fn tune(
                     or on more masks";
         trained.warnings.push(text.into());
     }
-    Ok(trained)
 }
 
 fn fail(err: Error) -> TaskError {

@@ -478,6 +478,47 @@ fn section<T: DeserializeOwned>(keys: &mut Map<String, Value>, key: &str, proble
         .ok()
 }
 
+/// Reports what is not fine, with what to do about it.
+type Check<'a> = &'a mut dyn FnMut(bool, &str, &str);
+
+fn check_input(input: &GeneratorInput, check: Check<'_>) {
+    check(sides(&input.size), "input.size: out of range", SIDES);
+    check(turn(input.rotation_deg), "input.rotation_deg: not supported", TURNS);
+    check(sides(&input.sensor.size), "input.sensor.size: out of range", SIDES);
+    let n = input.channels();
+    let each = "give one number per channel: three of a color sensor, one of a depth sensor";
+    check(input.mean.len() == n && input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", each);
+    let positive = input.std.len() == n && input.std.iter().all(|&s| s > 0.0 && s.is_finite());
+    check(positive, "input.std: not positive", each);
+    let meters = (input.sensor.kind == SensorKind::Depth) == (input.scale == InputScale::Meters);
+    check(meters, "input.scale: not the sensor's", "\"m\" of a depth sensor, \"0..1\" or \"0..255\" of a color sensor");
+}
+
+fn check_output(output: &OutputSpec, check: Check<'_>) {
+    check(sides(&output.size), "output.size: out of range", SIDES);
+    check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
+    let inside = |center: [f64; 2]| (0..2).all(|i| (0.0..output.imprint_size[i] as f64).contains(&center[i]));
+    let place = "give the window's center, pixels of the imprint in its raw orientation";
+    check(output.window_px.is_none_or(inside), "output.window_px: outside the imprint", place);
+    check(sides(&output.sensor.size), "output.sensor.size: out of range", SIDES);
+    match output.sensor.kind {
+        SensorKind::Depth => {
+            let valid = output.range_m.is_some_and(|range| range.is_valid()) && output.range.is_none();
+            check(valid, "output.range_m: empty", "give [smallest, largest] depth in meters");
+        }
+        SensorKind::Color => {
+            let valid = output.range.is_some_and(|[lo, hi]| lo < hi && lo.is_finite() && hi.is_finite());
+            let valid = valid && output.range_m.is_none();
+            check(valid, "output.range: empty", "give [smallest, largest] difference on the 0..255 scale");
+            check(output.channels == 3, "output.channels: not a color picture's", "a color sensor has 3 channels");
+        }
+    }
+    check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
+    check((1..=4).contains(&output.channels), "output.channels: out of range", "1 to 4 channels can be used");
+    let luma = output.reduction != Reduction::Luma || output.channels == 3;
+    check(luma, "output.reduction: luma needs 3 channels", "use \"mean\"");
+}
+
 fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
     // Every section is read before any is given up, so that the list of problems is whole.
     let input: Option<GeneratorInput> = section(keys, "input", problems);
@@ -498,20 +539,7 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         }
     };
     if let Some(input) = &input {
-        check(sides(&input.size), "input.size: out of range", SIDES);
-        check(turn(input.rotation_deg), "input.rotation_deg: not supported", TURNS);
-        check(sides(&input.sensor.size), "input.sensor.size: out of range", SIDES);
-        let n = input.channels();
-        let each = "give one number per channel: three of a color sensor, one of a depth sensor";
-        check(input.mean.len() == n && input.mean.iter().all(|m| m.is_finite()), "input.mean: not numbers", each);
-        let positive = input.std.len() == n && input.std.iter().all(|&s| s > 0.0 && s.is_finite());
-        check(positive, "input.std: not positive", each);
-        let meters = (input.sensor.kind == SensorKind::Depth) == (input.scale == InputScale::Meters);
-        check(
-            meters,
-            "input.scale: not the sensor's",
-            "\"m\" of a depth sensor, \"0..1\" or \"0..255\" of a color sensor",
-        );
+        check_input(input, &mut check);
     }
     if let Some(condition) = &condition {
         check(sides(&condition.shape), "condition.shape: out of range", SIDES);
@@ -522,30 +550,11 @@ fn generator(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<B
         check(usable, "latent.scale_factor: not positive", "give the factor used in training");
     }
     if let Some(output) = &output {
-        check(sides(&output.size), "output.size: out of range", SIDES);
-        check(sides(&output.imprint_size), "output.imprint_size: out of range", SIDES);
-        let inside = |center: [f64; 2]| (0..2).all(|i| (0.0..output.imprint_size[i] as f64).contains(&center[i]));
-        let place = "give the window's center, pixels of the imprint in its raw orientation";
-        check(output.window_px.is_none_or(inside), "output.window_px: outside the imprint", place);
-        check(sides(&output.sensor.size), "output.sensor.size: out of range", SIDES);
-        match output.sensor.kind {
-            SensorKind::Depth => {
-                let valid = output.range_m.is_some_and(|range| range.is_valid()) && output.range.is_none();
-                check(valid, "output.range_m: empty", "give [smallest, largest] depth in meters");
-            }
-            SensorKind::Color => {
-                let valid = output.range.is_some_and(|[lo, hi]| lo < hi && lo.is_finite() && hi.is_finite());
-                let valid = valid && output.range_m.is_none();
-                check(valid, "output.range: empty", "give [smallest, largest] difference on the 0..255 scale");
-                check(output.channels == 3, "output.channels: not a color picture's", "a color sensor has 3 channels");
-                check(shift.is_none(), "shift: not for a color picture", "remove it");
-                check(fit.is_none(), "fit: not for a color picture", "remove it");
-            }
+        check_output(output, &mut check);
+        if output.sensor.kind == SensorKind::Color {
+            check(shift.is_none(), "shift: not for a color picture", "remove it");
+            check(fit.is_none(), "fit: not for a color picture", "remove it");
         }
-        check(turn(output.rotation_deg), "output.rotation_deg: not supported", TURNS);
-        check((1..=4).contains(&output.channels), "output.channels: out of range", "1 to 4 channels can be used");
-        let luma = output.reduction != Reduction::Luma || output.channels == 3;
-        check(luma, "output.reduction: luma needs 3 channels", "use \"mean\"");
     }
     if let Some(s) = &shift {
         let finite = [s.pred_mean, s.pred_std, s.gt_mean, s.gt_std].iter().all(|v| v.is_finite());
