@@ -87,7 +87,7 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
         ..Default::default()
     };
     if let WgpuSetup::CreateNew(setup) = &mut native.wgpu_options.wgpu_setup {
-        setup.device_descriptor = Arc::new(Gpu::wanted);
+        setup.device_descriptor = Arc::new(Gpu::device_descriptor);
     }
     let mut options = Options::new(Arc::new(LiveServices::new()), open);
     options.reset = reset;

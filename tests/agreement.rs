@@ -659,7 +659,7 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
     studio.send(LabelsCommand::EndStroke.into());
     studio.send(LabelsCommand::CleanUp(studio.state.settings.mask.clean_up(CleanKind::Smooth)).into());
-    let drawn = studio.state.hand_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
+    let drawn = studio.state.drawn_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
     drop(studio);
     let stored =
         || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(finger).unwrap().mask.clone();

@@ -84,7 +84,7 @@ fn what_is_not_on_screen_is_not_computed() {
     bench.settle();
     assert_eq!(bench.services.source.loads(), 0, "no pane, no work");
     bench.send(panes(&[Pane::Log, Pane::Settings]));
-    assert!(bench.state.wanted().is_empty());
+    assert!(bench.state.demands().is_empty());
     bench.send(panes(&[Pane::GelDifference]));
     bench.settle();
     let loaded = bench.services.source.loads();

@@ -10,7 +10,7 @@ use std::process::Output;
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::{AcceptedPose, HandPose};
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::Registration;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::{ByImprint, MaskStore, StoredReview};
@@ -111,7 +111,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(cases[0].get("accepted").is_none());
     let store = MaskStore::for_dataset(&Dataset::open(&set).unwrap()).unwrap();
     let planar = PlanarPose { theta_rad: -0.1, y_m: 0.001, z_m: 0.002 };
-    let pose = HandPose { pitch_rad: 0.05, ..planar.into() };
+    let pose = ManualPose { pitch_rad: 0.05, ..planar.into() };
     let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
     let accepted = ByImprint { accepted, ..ByImprint::default() };
     let name = cases[0]["name"].as_str().unwrap();

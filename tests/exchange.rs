@@ -11,14 +11,14 @@ use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::label::{Marks, Provenance};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sim;
-use touch2touch_work::export::{ExportChoice, ExportSetup, HandMasks, Which, export_masks};
+use touch2touch_work::export::{DrawnMasks, ExportChoice, ExportSetup, Which, export_masks};
 use touch2touch_work::import::{Import, ImportSetup, import_masks, plan_import};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::exchange::{Format, MANIFEST, PARTS};
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_work::io::{images, npz};
 use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::labels::{Act, Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+use touch2touch_work::labels::{Act, DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
 use crate::support::run;
 
@@ -45,20 +45,20 @@ fn painted(root: &Path) -> Dataset {
             let ignored = (at != 2).then(|| Mask::from_fn(mask.width(), mask.height(), |x, y| x / 7 == 3 && y > 60));
             stored.masks.insert(MaskPlace::measured(pad), by(&mask, ignored.as_ref(), Provenance::hand("Anna")));
         }
-        Labels::of(&dataset).save(&entry.name, &stored, &Deed::named("test")).unwrap();
+        Labels::of(&dataset).save(&entry.name, &stored, &Operation::named("test")).unwrap();
     }
     dataset
 }
 
-fn by(mask: &Mask, ignored: Option<&Mask>, from: Provenance) -> HandMask {
-    let mut hand = HandMask::new(mask.clone(), from.clone());
+fn by(mask: &Mask, ignored: Option<&Mask>, from: Provenance) -> DrawnMask {
+    let mut hand = DrawnMask::new(mask.clone(), from.clone());
     hand.take_over(mask, ignored, from, false);
     hand
 }
 
 fn export(dataset: &Dataset, folder: &Path, format: Format) {
     let choice = ExportChoice { which: Which::Begun, format, ..ExportChoice::default() };
-    let masks = HandMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
+    let masks = DrawnMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
     let setup = ExportSetup { pairs: None, choice };
     let (plan, report) = export_masks(dataset, &masks, &setup, folder, None, &JobCx::unwatched()).unwrap();
     assert_eq!((plan.total(), report.counts.iter().sum::<usize>()), (8, 8), "{format:?}");
@@ -75,7 +75,7 @@ fn import(dataset: &Dataset, setup: &ImportSetup) -> Import {
     found
 }
 
-fn all(dataset: &Dataset) -> BTreeMap<(String, PadId), HandMask> {
+fn all(dataset: &Dataset) -> BTreeMap<(String, PadId), DrawnMask> {
     let labels = Labels::of(dataset);
     let load = |(pair, pad): (String, PadId)| {
         let hand = labels.load(&pair).unwrap().measured(pad).unwrap().clone();
@@ -216,14 +216,14 @@ fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
         stored.review = if at == 0 { Review::Done } else { Review::Todo };
         for hand in stored.masks.values_mut() {
             let all = hand.mask.map(|_| true);
-            *hand = HandMask::new(all, Provenance::Threshold { min_m: 0.001 });
+            *hand = DrawnMask::new(all, Provenance::Threshold { min_m: 0.001 });
             let column = Mask::from_fn(175, 140, |x, _| x == 5);
             let rect = touch2touch_core::label::Rect { x: 5, y: 0, width: 1, height: 140 };
             let (mask, marks) = (Arc::make_mut(&mut hand.mask), Arc::make_mut(&mut hand.marks));
             let anna = Provenance::hand("Anna");
             marks.paint(mask, (&column, rect), touch2touch_core::label::Paint::Contact, None, anna);
         }
-        labels.save(name, &stored, &Deed::named("test")).unwrap();
+        labels.save(name, &stored, &Operation::named("test")).unwrap();
     }
     let before = all(&dataset);
     let found = import(&dataset, &from(&folder));
@@ -249,7 +249,7 @@ fn what_people_did_stays_unless_asked_and_undo_brings_back_what_was() {
         assert!(old.as_ref().unwrap().is_same(&before[&of]) && new.as_ref().unwrap().is_same(&after[&of]));
     }
     // Asked for, all of it is taken; states stay.
-    let found = import(&dataset, &ImportSetup { over_hand: true, ..from(&folder) });
+    let found = import(&dataset, &ImportSetup { over_drawn: true, ..from(&folder) });
     assert_eq!((found.replaced, found.kept, found.judged), (8, 0, 0), "{found:?}");
     assert_eq!(labels.reviews().states, BTreeMap::from([(names[0].clone(), Review::Done)]));
     let again = import(&dataset, &from(&folder));

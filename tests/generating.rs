@@ -19,7 +19,7 @@ use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::generator::{GenerateError, Generator, Item, Observer};
 use touch2touch_work::job::JobCx;
-use touch2touch_work::models::{Models, Wanted};
+use touch2touch_work::models::{GenerateInput, Models};
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")
@@ -233,7 +233,7 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let recipe = |finger, seed| {
         PredictionKey::new(touch(finger), info.id.clone(), EngineChoice::Rten, &GenerateConfig { seed, ..config() })
     };
-    let item = |seed, difference| Wanted { difference, seed, size: [0, 0] };
+    let item = |seed, difference| GenerateInput { difference, seed, size: [0, 0] };
     assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());
     let both = [item(1, &a), item(1, &b)];
     let made = services.predict(&info, EngineChoice::Rten, &config(), &both, &cx).unwrap();
@@ -285,7 +285,7 @@ fn many_threads_of_a_pool_predict_and_mask_with_one_model() {
         let (generator, mask) = (bundle("generator"), bundle("mask"));
         let difference = image(0.0);
         let predicted = |seed| {
-            let wanted = [Wanted { difference: &difference, seed, size: [0, 0] }];
+            let wanted = [GenerateInput { difference: &difference, seed, size: [0, 0] }];
             let config = config();
             models.predict(&generator, EngineChoice::Rten, &config, &wanted, &JobCx::unwatched()).unwrap().remove(0).raw
         };

@@ -22,7 +22,7 @@ use touch2touch_work::infer::store::Store;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_work::job::{Cancel, JobCx};
-use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Revision};
+use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Revision};
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
 
@@ -163,15 +163,15 @@ fn what_was_changed_or_damaged_is_computed_again() {
     let labels = Labels::of(&dataset);
     let name = dataset.index.pairs[0].name.clone();
     let mask = Arc::new(Mask::from_fn(175, 140, |x, y| (40..140).contains(&x) && (60..80).contains(&y)));
-    let drawn = HandMask { revision: Revision(1), ..HandMask::new(mask, Provenance::told("Threshold")) };
+    let drawn = DrawnMask { revision: Revision(1), ..DrawnMask::new(mask, Provenance::told("Threshold")) };
     let mut drawn_on = PairLabels::default();
     drawn_on.draw(&MaskPlace::measured(lab::RIGHT), Some(drawn));
-    labels.save(&name, &drawn_on, &Deed::default()).unwrap();
+    labels.save(&name, &drawn_on, &Operation::default()).unwrap();
     let (hand, fresh) = run(&data, &setup(), &cache);
     assert_eq!(fresh, 1);
     assert_ne!(hand.scores[0].grasps[0].angle_error_rad, cold.scores[0].grasps[0].angle_error_rad);
     assert_eq!(run(&data, &Setup { hand: false, ..setup() }, &cache).1, 0, "left out, as before it was drawn");
-    labels.save(&name, &PairLabels::default(), &Deed::default()).unwrap();
+    labels.save(&name, &PairLabels::default(), &Operation::default()).unwrap();
     assert_eq!(run(&data, &setup(), &cache).1, 0, "taken back");
     // A touch.
     let sample = sim::simulate(&catalog::tools()[0], sim::random_grasp(77), 1, &sim::SimConfig::default());

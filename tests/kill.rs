@@ -25,7 +25,7 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, ExportCommand, LabelsCommand, LibraryCommand, Opened, Pane, ViewCommand};
 use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::labels::{HandMask, MaskPlace, PairLabels, Review};
+use touch2touch::app::labels::{DrawnMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
@@ -48,8 +48,8 @@ use touch2touch_work::io::exchange::{Format, MANIFEST, list};
 use touch2touch_work::io::images;
 use touch2touch_work::io::masks::{FOLDER, MaskStore};
 use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{Deed, Recovered};
-use touch2touch_work::models::Wanted;
+use touch2touch_work::labels::{Operation, Recovered};
+use touch2touch_work::models::GenerateInput;
 use touch2touch_work::prediction::Prediction;
 
 /// What the child plays: `FOLDER` and the script's seed.
@@ -91,7 +91,7 @@ impl DataSource for Source {
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
         self.live.load_labels(name)
     }
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError> {
         if self.saves { self.live.save_labels(name, labels, deed) } else { Ok(None) }
     }
     fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {
@@ -153,7 +153,7 @@ impl Services for Files {
         _: &BundleInfo,
         _: EngineChoice,
         _: &GenerateConfig,
-        _: &[Wanted<'_>],
+        _: &[GenerateInput<'_>],
         _: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         Err(TaskError::new("Generate", "there is no model"))
@@ -310,7 +310,7 @@ fn act(role: &str) -> ! {
 type Labels = (BTreeMap<MaskPlace, PackedMask>, Review);
 
 fn plain(labels: &PairLabels) -> Labels {
-    let mask = |(place, hand): (&MaskPlace, &HandMask)| (place.clone(), hand.pack());
+    let mask = |(place, hand): (&MaskPlace, &DrawnMask)| (place.clone(), hand.pack());
     (labels.masks.iter().map(mask).collect(), labels.review)
 }
 

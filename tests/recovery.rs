@@ -15,7 +15,9 @@ use touch2touch_work::error::TaskErrorKind;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::images;
 use touch2touch_work::io::masks::{FOLDER, MaskStore};
-use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review, Unsaved, recover, take_in};
+use touch2touch_work::labels::{
+    DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review, Unsaved, recover, take_in,
+};
 
 /// A folder of two pairs of pictures.
 fn pictures(root: &Path) -> Dataset {
@@ -37,7 +39,7 @@ fn square(base: &PairLabels, x: usize) -> PairLabels {
         .masks
         .get(&place)
         .cloned()
-        .unwrap_or_else(|| HandMask::new(Mask::filled(32, 32, false), Provenance::Nothing));
+        .unwrap_or_else(|| DrawnMask::new(Mask::filled(32, 32, false), Provenance::Nothing));
     let mut mask = (*hand.mask).clone();
     let touched = Mask::from_fn(32, 32, |a, b| (x..x + 4).contains(&a) && b < 4);
     let rect = touch2touch_core::label::Rect { x, y: 0, width: 4, height: 4 };
@@ -54,7 +56,7 @@ fn at(labels: &PairLabels, x: usize) -> bool {
 }
 
 fn unsaved(name: &str, labels: &PairLabels) -> Unsaved {
-    let deed = Deed { person: Some("Anna".into()), ..Deed::named("brush stroke") };
+    let deed = Operation { person: Some("Anna".into()), ..Operation::named("brush stroke") };
     Unsaved { name: name.into(), labels: labels.clone(), deed, repeat: None }
 }
 
@@ -70,14 +72,14 @@ fn what_waits_is_taken_in_at_the_next_opening_and_merged_with_what_others_did() 
     let (_, waiting, dataset) = set(dir.path());
     let labels = Labels::of(&dataset);
     let base = square(&labels.load("a").unwrap(), 0);
-    labels.save("a", &base, &Deed::named("first")).unwrap();
+    labels.save("a", &base, &Operation::named("first")).unwrap();
     // Two strokes that could not be saved, kept one after the other; meanwhile somebody else paints.
     let folder = labels.keep_waiting(&dataset, &[unsaved("a", &square(&base, 8))], &waiting).unwrap();
     let both = square(&square(&base, 8), 14);
     assert_eq!(labels.keep_waiting(&dataset, &[unsaved("a", &both)], &waiting).unwrap(), folder);
     let other = Labels::of(&dataset);
     let theirs = square(&other.load("a").unwrap(), 20);
-    other.save("a", &theirs, &Deed::named("theirs")).unwrap();
+    other.save("a", &theirs, &Operation::named("theirs")).unwrap();
 
     let fresh = Labels::of(&dataset);
     let found = recover(&dataset, &fresh, &waiting);
@@ -103,7 +105,7 @@ fn the_studio_keeps_and_takes_in_through_its_services() {
     let drawn = square(&opened.source.load_labels("a").unwrap(), 3);
     // Where the folder of labels should be made lies a file: that stops everybody, root as well.
     std::fs::write(root.join(FOLDER), "in the way").unwrap();
-    opened.source.save_labels("a", &drawn, &Deed::named("stroke")).unwrap_err();
+    opened.source.save_labels("a", &drawn, &Operation::named("stroke")).unwrap_err();
     opened.source.keep_labels(&[unsaved("a", &drawn)], None).unwrap();
     // It does not work yet: they go on waiting, and it is said.
     assert!(!services.open(&place).unwrap().recovered.failed.is_empty() || cfg!(not(unix)));
@@ -122,7 +124,7 @@ fn a_data_set_that_was_renamed_is_found_again_and_another_one_is_not_taken_for_i
     let drawn = square(&labels.load("a").unwrap(), 3);
     let renamed = dir.path().join("renamed");
     std::fs::rename(&root, &renamed).unwrap();
-    let err = labels.save("a", &drawn, &Deed::named("stroke")).unwrap_err();
+    let err = labels.save("a", &drawn, &Operation::named("stroke")).unwrap_err();
     assert_eq!(err.kind, TaskErrorKind::Lost, "{err}");
     assert!(!root.exists() && err.hint.unwrap().contains("elsewhere"));
     labels.keep_waiting(&dataset, &[unsaved("a", &drawn)], &waiting).unwrap();
@@ -159,7 +161,7 @@ fn what_of_a_journal_cannot_be_read_or_written_is_said_with_what_was_saved() {
     let (_, _, dataset) = set(dir.path());
     let labels = Labels::of(&dataset);
     let first = square(&labels.load("a").unwrap(), 3);
-    labels.save("a", &first, &Deed::named("stroke")).unwrap();
+    labels.save("a", &first, &Operation::named("stroke")).unwrap();
     let store = MaskStore::for_dataset(&dataset).unwrap();
     let file = store.journal_file("a");
     let whole = std::fs::read(&file).unwrap();
@@ -175,7 +177,7 @@ fn what_of_a_journal_cannot_be_read_or_written_is_said_with_what_was_saved() {
     assert!(text.contains("at most") && text.contains("bytes"), "{text}");
     std::fs::remove_file(&file).unwrap();
     std::fs::create_dir(&file).unwrap();
-    let err = labels.save("a", &square(&first, 12), &Deed::named("stroke")).unwrap_err();
+    let err = labels.save("a", &square(&first, 12), &Operation::named("stroke")).unwrap_err();
     assert!(err.why.contains("are saved, the record of what was done is not"), "{err}");
     assert!(at(&Labels::of(&dataset).load("a").unwrap(), 12), "and that is so");
 }

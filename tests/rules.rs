@@ -10,7 +10,7 @@ use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels, Review};
+use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
 use super::support::rust_files;
 
@@ -105,11 +105,11 @@ fn labels_are_the_same_by_whatever_way_the_data_set_is_opened() {
     for (at, pair) in dataset.index.pairs.iter().enumerate() {
         let mut one = labels.load(&pair.name).unwrap();
         for pad in lab::PADS {
-            let hand = HandMask::new(mask(at + pad.index()), Provenance::hand("a person"));
+            let hand = DrawnMask::new(mask(at + pad.index()), Provenance::hand("a person"));
             one.put(&MaskPlace::measured(pad), Some(hand));
         }
         one.review = Review::Flagged;
-        labels.save(&pair.name, &one, &Deed::named("test")).unwrap();
+        labels.save(&pair.name, &one, &Operation::named("test")).unwrap();
     }
     let (first, written) = (read(&root, false), files(labels.folder().unwrap()));
     assert!(first.len() == 3 && first.values().all(|one| one.masks.len() == 2 && one.review == Review::Flagged));

@@ -14,12 +14,12 @@ use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::sim;
 use touch2touch_work::bundles::{self, BundleKind, find};
 use touch2touch_work::error::TaskErrorKind;
-use touch2touch_work::export::{HandMasks, LeftOut};
+use touch2touch_work::export::{DrawnMasks, LeftOut};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::labels::{Deed, HandMask, ImprintOf, Labels, MaskPlace, Review};
+use touch2touch_work::labels::{DrawnMask, ImprintOf, Labels, MaskPlace, Operation, Review};
 use touch2touch_work::models::Models;
 use touch2touch_work::train::{TrainChoice, TrainSetup, Trained, plan, train};
 use touch2touch_work::tuning::Tuning;
@@ -44,18 +44,18 @@ pub(crate) fn corrected(root: &Path, grasps: u64) {
         let mut stored = labels.load(&entry.name).unwrap();
         for (pad, touch) in sample.pads.entries() {
             let truth = touch.depth().unwrap().truth.as_ref().unwrap().contact.clone();
-            let hand = HandMask::new(truth, Provenance::Hand { person: "Anna".into() });
+            let hand = DrawnMask::new(truth, Provenance::Hand { person: "Anna".into() });
             stored.draw(&MaskPlace::measured(pad), Some(hand));
         }
         stored.review = Review::Done;
-        labels.save(&entry.name, &stored, &Deed { person: Some("Anna".into()), ..Deed::default() }).unwrap();
+        labels.save(&entry.name, &stored, &Operation { person: Some("Anna".into()), ..Operation::default() }).unwrap();
     }
 }
 
 fn review(dataset: &Dataset, at: usize, review: Review) {
     let (labels, name) = (Labels::of(dataset), &dataset.index.pairs[at].name);
     let stored = labels.load(name).unwrap();
-    labels.save(name, &touch2touch_work::labels::PairLabels { review, ..stored }, &Deed::default()).unwrap();
+    labels.save(name, &touch2touch_work::labels::PairLabels { review, ..stored }, &Operation::default()).unwrap();
 }
 
 fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainSetup {
@@ -72,7 +72,7 @@ fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainS
 }
 
 fn go(dataset: &Dataset, setup: &TrainSetup, cx: &JobCx) -> Result<Trained, touch2touch_work::error::TaskError> {
-    let masks = HandMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
+    let masks = DrawnMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
     train(dataset, &masks, setup, &Models::new(None), cx)
 }
 
@@ -244,10 +244,10 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
     stored.draw(&MaskPlace { pad: place.pad, of }, Some(hand.clone()));
     let lost = ImprintOf::predicted("gone", &config, ShiftMode::Raw);
     stored.draw(&MaskPlace { pad: place.pad, of: lost }, Some(hand));
-    labels.save(name, &stored, &Deed::default()).unwrap();
+    labels.save(name, &stored, &Operation::default()).unwrap();
 
     let choice = TrainChoice { held_out_percent: 0, ..TrainChoice::default() };
-    let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
+    let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
     let planned = plan(&dataset, &masks, choice).unwrap();
     assert_eq!((planned.masks(), planned.predicted, planned.held_out), (6, 2, [0, 0]));
     let out = dir.path().join("trained");
@@ -259,7 +259,7 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
     // What was changed since and is not on the disk counts too.
     let changed =
         BTreeMap::from([(name.clone(), touch2touch_work::labels::PairLabels { review: Review::Flagged, ..stored })]);
-    let planned = plan(&dataset, &HandMasks { labels: &labels, changed: &changed }, choice).unwrap();
+    let planned = plan(&dataset, &DrawnMasks { labels: &labels, changed: &changed }, choice).unwrap();
     assert_eq!((planned.masks(), planned.left_out), (2, BTreeMap::from([(LeftOut::Flagged, 1)])));
 }
 
@@ -286,7 +286,7 @@ fn ignored_pixels_are_neither_learned_from_nor_scored() {
                     mask.iter_mut().zip(ignored.as_slice()).for_each(|(bit, ignored)| *bit ^= ignored);
                 }
             }
-            labels.save(&entry.name, &stored, &Deed::default()).unwrap();
+            labels.save(&entry.name, &stored, &Operation::default()).unwrap();
         }
         let out = dir.path().join(format!("{name}-trained"));
         let choice = TrainChoice { held_out_percent: 50, ..TrainChoice::default() };

@@ -19,8 +19,8 @@ use super::settings::state::{ColorRange, MaskTool, Workspace};
 use super::state::{Absent, State};
 use super::tasks::state::TaskKind;
 use super::workbench::state::{SceneTool, Section};
-use touch2touch_core::hand::HandAxis;
 use touch2touch_core::label::{CleanKind, Paint};
+use touch2touch_core::manual::PoseAxis;
 
 /// Factor by which a key press changes the brush.
 const BRUSH_STEP: f32 = 1.25;
@@ -118,7 +118,7 @@ fn follow(state: &State) -> Option<Command> {
 /// Whether the mask of the active finger was corrected.
 fn is_corrected(state: &State) -> bool {
     let finger = state.selection.finger;
-    state.hand_mask(state.worked_on(finger), finger).is_some()
+    state.drawn_mask(state.worked_on(finger), finger).is_some()
 }
 
 /// The shifts, one after the other; the refit, where there is one, comes after the last of the others.
@@ -174,7 +174,7 @@ fn toggle(state: &State, tool: SceneTool) -> Option<Command> {
     when(state.entry().is_some(), WorkbenchCommand::SetTool(next))
 }
 
-fn nudge(state: &State, axis: HandAxis, steps: f64) -> Option<Command> {
+fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
     when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 

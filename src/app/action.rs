@@ -238,17 +238,17 @@ macro_rules! actions {
         SixDof, Pose, "6-DoF", "Lets the pose tool leave the plane: x, pitch and yaw as well", [],
             state => does(WorkbenchCommand::SetSixDof(!state.workbench.six_dof));
         NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)],
-            state => nudge(state, HandAxis::Y, -1.0);
+            state => nudge(state, PoseAxis::Y, -1.0);
         NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)],
-            state => nudge(state, HandAxis::Y, 1.0);
+            state => nudge(state, PoseAxis::Y, 1.0);
         NudgeUp, Pose, "Nudge -z", "Moves the tool by 0.1 mm along -z, to the wrist; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowUp), shift(K::ArrowUp), ctrl(K::ArrowUp)],
-            state => nudge(state, HandAxis::Z, -1.0);
+            state => nudge(state, PoseAxis::Z, -1.0);
         NudgeDown, Pose, "Nudge +z", "Moves the tool by 0.1 mm along +z; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowDown), shift(K::ArrowDown), ctrl(K::ArrowDown)],
-            state => nudge(state, HandAxis::Z, 1.0);
+            state => nudge(state, PoseAxis::Z, 1.0);
         TurnLeft, Pose, "Turn -", "Turns the tool by -0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowLeft), alt_shift(K::ArrowLeft), ctrl_shift(K::ArrowLeft)],
-            state => nudge(state, HandAxis::Theta, -1.0);
+            state => nudge(state, PoseAxis::Theta, -1.0);
         TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_shift(K::ArrowRight)],
-            state => nudge(state, HandAxis::Theta, 1.0);
+            state => nudge(state, PoseAxis::Theta, 1.0);
         IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
         Accept, Pose, "Accept", "Makes the proposal that is shown the mask, or stores the pose set by hand with the pair", [plain(K::Enter)],

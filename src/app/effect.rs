@@ -14,7 +14,7 @@ use super::tasks::state::{TaskKind, Ticket};
 use super::view::state::UiRequest;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{Deed, Unsaved};
+use touch2touch_work::labels::{Operation, Unsaved};
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,7 +28,7 @@ pub struct LabelsToSave {
     /// What to write.
     pub labels: PairLabels,
     /// What was done.
-    pub deed: Deed,
+    pub deed: Operation,
     /// Who draws it a second time, apart from the pair's labels; `None` for these.
     pub repeat: Option<String>,
 }

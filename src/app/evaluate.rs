@@ -4,7 +4,7 @@ pub mod state;
 
 pub(crate) use state::GRASPS;
 pub use state::ScoreChoice;
-pub(crate) use state::{ScoreTable, SourceScores, Standing};
+pub(crate) use state::{Grade, ScoreTable, SourceScores};
 
 use std::path::PathBuf;
 use std::sync::Arc;

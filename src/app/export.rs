@@ -68,11 +68,11 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::AskImport(from) => {
             state.export.imports += 1;
             let asked = state.export.imports;
-            state.export.importing = from.map(|from| ImportForm { from, over_hand: false, asked });
+            state.export.importing = from.map(|from| ImportForm { from, over_drawn: false, asked });
         }
-        ExportCommand::ImportOverHand(over_hand) => {
+        ExportCommand::ImportOverHand(over_drawn) => {
             if let Some(form) = &mut state.export.importing {
-                form.over_hand = over_hand;
+                form.over_drawn = over_drawn;
             }
         }
         ExportCommand::Import => import(state, effects),

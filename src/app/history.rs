@@ -3,9 +3,9 @@
 use std::borrow::Cow;
 
 use super::keys::Revision;
-use super::labels::state::{Document, HandMask, MaskPlace, Review};
-use touch2touch_core::hand::AcceptedPose;
+use super::labels::state::{Document, DrawnMask, MaskPlace, Review};
 use touch2touch_core::label::PackedMask;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::labels::{Change, Past};
 
@@ -19,18 +19,18 @@ pub struct KeptMask {
 
 impl KeptMask {
     /// One of this run.
-    pub fn of(hand: &HandMask) -> Self {
+    pub fn of(hand: &DrawnMask) -> Self {
         Self { packed: hand.pack(), revision: Some(hand.revision) }
     }
 
-    fn of_earlier_run(hand: &HandMask) -> Self {
+    fn of_earlier_run(hand: &DrawnMask) -> Self {
         Self { packed: hand.pack(), revision: None }
     }
 
-    fn unpack(&self, doc: &mut Document) -> Option<HandMask> {
+    fn unpack(&self, doc: &mut Document) -> Option<DrawnMask> {
         let revision = self.revision.unwrap_or_else(|| doc.next_revision());
         // It was packed from a mask, so that it can be read; where it cannot, nothing is put in its place.
-        HandMask::unpack(&self.packed, revision).ok()
+        DrawnMask::unpack(&self.packed, revision).ok()
     }
 }
 
@@ -284,8 +284,8 @@ mod tests {
     use touch2touch_core::rig::{PadId, lab};
     use touch2touch_work::labels::ImprintOf;
 
-    fn hand(doc: &mut Document, pair: &str, finger: PadId) -> HandMask {
-        let hand = HandMask::new(Mask::filled(8, 4, false), Provenance::Nothing);
+    fn hand(doc: &mut Document, pair: &str, finger: PadId) -> DrawnMask {
+        let hand = DrawnMask::new(Mask::filled(8, 4, false), Provenance::Nothing);
         doc.labels.entry(pair.into()).or_default().put(&MaskPlace::measured(finger), Some(hand.clone()));
         hand
     }
@@ -293,7 +293,7 @@ mod tests {
     /// The edit that makes 2 x 2 pixels from `(x, 1)` on the contact.
     fn edit(doc: &mut Document, pair: &str, finger: PadId, x: usize) -> Edit {
         let full = Mask::from_fn(8, 4, |px, py| (x..x + 2).contains(&px) && (1..3).contains(&py));
-        let hand = HandMask { revision: doc.next_revision(), ..HandMask::new(full, Provenance::Nothing) };
+        let hand = DrawnMask { revision: doc.next_revision(), ..DrawnMask::new(full, Provenance::Nothing) };
         Edit::Mask { pair: pair.into(), place: MaskPlace::measured(finger), mask: Some(KeptMask::of(&hand)) }
     }
 
@@ -311,16 +311,16 @@ mod tests {
         let mut edit = edit(&mut doc, "a", lab::RIGHT, 6);
         let copy = edit.clone();
         edit.swap(&mut doc);
-        let there = doc.hand_mask("a", &place).unwrap();
+        let there = doc.drawn_mask("a", &place).unwrap();
         assert!(there.mask[(7, 2)] && there.revision > before.revision);
         edit.swap(&mut doc);
-        assert_eq!(doc.hand_mask("a", &place), Some(&before), "with its revision: results of it are still good");
+        assert_eq!(doc.drawn_mask("a", &place), Some(&before), "with its revision: results of it are still good");
         assert_eq!(edit, copy);
         // A mask of an earlier run gets a revision that nothing has.
         let mut edit =
             Edit::Mask { pair: "a".into(), place: place.clone(), mask: Some(KeptMask::of_earlier_run(&before)) };
         edit.swap(&mut doc);
-        assert_eq!(doc.hand_mask("a", &place).unwrap().revision.0, doc.last_revision);
+        assert_eq!(doc.drawn_mask("a", &place).unwrap().revision.0, doc.last_revision);
     }
 
     #[test]
@@ -334,9 +334,9 @@ mod tests {
         assert!(history.undo(&mut doc, "c", &lab::PADS.map(MaskPlace::measured)).is_none());
         assert!(history.undo(&mut doc, "a", &[MaskPlace::measured(lab::RIGHT)]).is_some());
         assert!(history.undo(&mut doc, "a", &[MaskPlace::measured(lab::RIGHT)]).is_none());
-        assert!(!doc.hand_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("a", &MaskPlace::measured(lab::LEFT)).unwrap().mask[(0, 1)]);
-        assert!(doc.hand_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
+        assert!(!doc.drawn_mask("a", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
+        assert!(doc.drawn_mask("a", &MaskPlace::measured(lab::LEFT)).unwrap().mask[(0, 1)]);
+        assert!(doc.drawn_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
         // A prediction that is not on screen is not touched either.
         let predicted =
             MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted(PredictedId::verbatim("a prediction".into())) };

@@ -17,7 +17,7 @@ pub use super::results::mask::MaskVersion;
 pub use super::results::pose::PoseKey;
 pub use super::results::prediction::PredictionKey;
 pub(crate) use super::results::run::RunKey;
-pub(crate) use super::results::versus::{ApartKey, VersusKey};
+pub(crate) use super::results::versus::{CloudDifferenceKey, VersusKey};
 pub use touch2touch_core::pose::{Registration, RegistrationChoice};
 
 use touch2touch_core::dataset::PairId;

@@ -9,7 +9,7 @@ pub(super) mod unsaved;
 pub use batch::{ImportMasks, ProposeAll};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
 pub(crate) use state::{Changed, Merged};
-pub use state::{Document, HandMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
+pub use state::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 pub use unsaved::UnsavedCommand;
 
 use std::borrow::Cow;
@@ -23,13 +23,13 @@ use super::settings;
 use super::state::{Lookup, State};
 use super::tasks::state::Level;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::hand::AcceptedPose;
-use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Seen, Sight};
+use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Sight, VisiblePixels};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::cloud::seen;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::labels::{Act, Deed, note, system_person};
+use touch2touch_work::labels::{Act, Operation, note, system_person};
 use touch2touch_work::propose::accepted;
 
 /// What can happen to the document.
@@ -158,18 +158,18 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
 /// The mask in force as a hand takes it up; an empty one where none can be had.
 ///
 /// `None` while it is being computed: a correction must not start from something else than what is shown.
-fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<HandMask> {
-    if let Some(hand) = state.hand_mask(source, finger) {
+fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<DrawnMask> {
+    if let Some(hand) = state.drawn_mask(source, finger) {
         return Some(hand.clone());
     }
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            Some(HandMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe)))
+            Some(DrawnMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe)))
         }
         (Lookup::Waiting | Lookup::Stale(_), Ok(_)) => None,
         _ => {
             let [width, height] = state.imprint(source, finger).ready()?.size();
-            Some(HandMask::new(Mask::filled(width, height, false), Provenance::Nothing))
+            Some(DrawnMask::new(Mask::filled(width, height, false), Provenance::Nothing))
         }
     }
 }
@@ -201,7 +201,7 @@ impl State {
     }
 
     /// Where the pixels of a finger's imprint lie in a 3D picture.
-    fn seen(&self, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<Seen, TaskError> {
+    fn seen(&self, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<VisiblePixels, TaskError> {
         let sample = self.sample().ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;
         let imprints = sample.rig.pads().map(|pad| self.imprint(source, pad).ready()).collect();
         seen(sample, &imprints, finger, sight)
@@ -300,7 +300,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let name = stroke.drawing.name();
     let name = if stroke.drawing.sight.is_some() { format!("{name} in 3D") } else { name.to_owned() };
     let how = serde_json::to_value(&stroke.drawing).ok();
-    record(state, &pair, Deed { how, ..Deed::named(name.clone()) }, edit, effects);
+    record(state, &pair, Operation { how, ..Operation::named(name.clone()) }, edit, effects);
     let (source, mask, before) = (stroke.source, Some(stroke.start.mask), stroke.pose);
     let revision = state.document.next_revision();
     state.document.changed = Some(Changed { pair, source, name: name.into(), finger, revision, mask, before });
@@ -313,7 +313,7 @@ pub(super) fn merged(state: &mut State, name: &str, merged: &Merged, effects: &m
         end_stroke(state, effects);
     }
     for (place, theirs) in &merged.now.masks {
-        let (given, mine) = (merged.given.masks.get(place), state.document.hand_mask(name, place));
+        let (given, mine) = (merged.given.masks.get(place), state.document.drawn_mask(name, place));
         let mut both = match (mine, given) {
             (Some(mine), given) => mine.merged(given, theirs),
             (None, None) => theirs.clone(),
@@ -339,7 +339,7 @@ fn cancel_stroke(state: &mut State) {
 }
 
 /// Records a change that was made; `edit` is its inverse. The pair counts as begun, and is saved.
-fn record(state: &mut State, pair: &str, deed: Deed, edit: Edit, effects: &mut Vec<Effect>) {
+fn record(state: &mut State, pair: &str, deed: Operation, edit: Edit, effects: &mut Vec<Effect>) {
     let mut edits = vec![edit];
     if state.document.review(pair) == Review::Todo {
         let before = state.document.set_review(pair, Review::InProgress);
@@ -364,14 +364,20 @@ fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
     if !hand.clean(clean_up, &state.rig()) {
         return state.log.info(format!("{what}: nothing to change"));
     }
-    let deed = Deed { how: serde_json::to_value(clean_up).ok(), ..Deed::named(what) };
+    let deed = Operation { how: serde_json::to_value(clean_up).ok(), ..Operation::named(what) };
     set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
-fn set_hand_mask(state: &mut State, deed: Deed, place: MaskPlace, mask: Option<HandMask>, effects: &mut Vec<Effect>) {
+fn set_hand_mask(
+    state: &mut State,
+    deed: Operation,
+    place: MaskPlace,
+    mask: Option<DrawnMask>,
+    effects: &mut Vec<Effect>,
+) {
     let pair = state.pair_name().to_owned();
     let revision = state.document.next_revision();
-    let mask = mask.map(|mask| KeptMask::of(&HandMask { revision, ..mask }));
+    let mask = mask.map(|mask| KeptMask::of(&DrawnMask { revision, ..mask }));
     let (source, finger, name) = (place.of.source(), place.pad, deed.name.clone());
     let before = state.shown_pose_key(source);
     let shown = state.mask_in_force(source, finger).ok().map(|mask| mask.mask.clone());
@@ -392,8 +398,8 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(place) = state.mask_place(source, finger) else { return };
     match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            let adopted = HandMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe));
-            set_hand_mask(state, Deed::named("automatic mask taken over"), place, Some(adopted), effects);
+            let adopted = DrawnMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe));
+            set_hand_mask(state, Operation::named("automatic mask taken over"), place, Some(adopted), effects);
         }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
@@ -427,13 +433,13 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
         }
     };
     state.selection.proposing = false;
-    let drawn = state.hand_mask(source, finger);
-    let hand = accepted(drawn, &proposal, state.settings.mask.over_hand);
+    let drawn = state.drawn_mask(source, finger);
+    let hand = accepted(drawn, &proposal, state.settings.mask.over_drawn);
     if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
         return state.log.info(format!("{WHAT}: the mask is so already"));
     }
     let how = serde_json::to_value(&proposal.provenance).ok();
-    let deed = Deed { how, ..Deed::named("proposal accepted") };
+    let deed = Operation { how, ..Operation::named("proposal accepted") };
     set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
@@ -442,8 +448,8 @@ fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     let finger = state.selection.finger;
     let source = state.worked_on(finger);
     let Some(place) = state.mask_place(source, finger) else { return };
-    if state.hand_mask(source, finger).is_some() && check_editable(state, "Remove the correction") {
-        set_hand_mask(state, Deed::named("correction removed"), place, None, effects);
+    if state.drawn_mask(source, finger).is_some() && check_editable(state, "Remove the correction") {
+        set_hand_mask(state, Operation::named("correction removed"), place, None, effects);
     }
 }
 
@@ -466,7 +472,7 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
         return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
     }
     let copy = other.copied(from);
-    set_hand_mask(state, Deed::named("mask of the other imprint taken over"), place, Some(copy), effects);
+    set_hand_mask(state, Operation::named("mask of the other imprint taken over"), place, Some(copy), effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -478,7 +484,7 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     let before = state.document.set_review(&pair, review);
     let edit = Edit::Review { pair: pair.clone(), review: before };
     state.history.record(Gesture { name: "review state".into(), edits: vec![edit] });
-    save_pair(state, &pair, Deed::named("review state"), effects);
+    save_pair(state, &pair, Operation::named("review state"), effects);
 }
 
 fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
@@ -489,7 +495,7 @@ fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>
     let before = state.document.set_note(pair, text);
     let edit = Edit::Note { pair: pair.to_owned(), note: before };
     state.history.record(Gesture { name: "note".into(), edits: vec![edit] });
-    save_pair(state, pair, Deed::named("note"), effects);
+    save_pair(state, pair, Operation::named("note"), effects);
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
@@ -529,7 +535,7 @@ pub(super) fn set_accepted(
     }
     edits.iter_mut().for_each(|edit| edit.swap(&mut state.document));
     state.history.record(Gesture { name: name.into(), edits });
-    save_pair(state, &pair, Deed::named(name), effects);
+    save_pair(state, &pair, Operation::named(name), effects);
 }
 
 fn undo(state: &mut State, effects: &mut Vec<Effect>) {
@@ -557,7 +563,7 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
             // What the last change did is said, and shown, no more: it may be what was taken back.
             state.document.changed = None;
             state.log.info(format!("{how}: {name}"));
-            save_pair(state, pair, Deed { act, ..Deed::named(name) }, effects);
+            save_pair(state, pair, Operation { act, ..Operation::named(name) }, effects);
             state.reorder();
         }
         None => state.log.info(format!("{how}: nothing on screen to change")),
@@ -565,13 +571,13 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
 }
 
 /// Writes the labels of a pair of the open data set, which were changed.
-fn save_pair(state: &mut State, name: &str, deed: Deed, effects: &mut Vec<Effect>) {
+fn save_pair(state: &mut State, name: &str, deed: Operation, effects: &mut Vec<Effect>) {
     // Whether that works is to be said anew.
     state.document.failed.remove(name);
     save_again(state, name, deed, effects);
 }
 
-fn save_again(state: &mut State, name: &str, mut deed: Deed, effects: &mut Vec<Effect>) {
+fn save_again(state: &mut State, name: &str, mut deed: Operation, effects: &mut Vec<Effect>) {
     let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
     deed.person = repeat.clone().or_else(|| state.known_person());
     let Some(open) = &state.library.open else { return };
@@ -596,7 +602,7 @@ fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let unsaved: Vec<String> = state.document.unsaved.iter().cloned().collect();
     for name in unsaved {
-        save_again(state, &name, Deed::named("saved again"), effects);
+        save_again(state, &name, Operation::named("saved again"), effects);
     }
     settings::save(state, effects);
     state.log.push(Level::Info, "Labels and preferences are being written", None, None);

@@ -38,10 +38,10 @@ pub(crate) enum Dock {
     Right(u8),
 }
 
-/// What is computed while a pane is on screen. Everything but [`Need::Thumbnails`], [`Need::Scores`] and
-/// [`Need::LabelStats`] is of the selected pair and begins with its tensors and labels.
+/// What is computed while a pane is on screen. Everything but [`Demand::Thumbnails`], [`Demand::Scores`] and
+/// [`Demand::LabelStats`] is of the selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Need {
+pub enum Demand {
     /// Nothing besides the tensors and labels.
     Pair,
     /// The imprint of a side, with its mask where masks are drawn.
@@ -243,9 +243,9 @@ macro_rules! define {
             }
 
             /// What is computed for it.
-            pub fn needs(self) -> &'static [Need] {
+            pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
-                use Need::{
+                use Demand::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, LabelStats, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
                     Steps, Thumbnails, Training, Versus,
                 };
@@ -286,7 +286,8 @@ impl Pane {
 
     /// Whether it shows something of the selected pair.
     pub(crate) fn is_of_pair(self) -> bool {
-        let of_all = |need: &Need| matches!(need, Need::Thumbnails | Need::Scores | Need::LabelStats | Need::Training);
+        let of_all =
+            |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::LabelStats | Demand::Training);
         self.needs().iter().any(|need| !of_all(need))
     }
 }

@@ -7,14 +7,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use super::demand::Demands;
 use super::jobs::{Job, Lane};
 use super::keys::{DatasetSeq, ImprintSource, PairKey, TouchKey};
 use super::services::SharedServices;
 use super::state::{Absent, Lookup, State};
-use super::wanted::Wanted;
 use touch2touch_work::error::TaskError;
 
-pub mod ahead;
 pub mod ambiguity;
 pub mod basin;
 pub mod cache;
@@ -35,6 +34,7 @@ pub mod mask_plan;
 pub mod picture;
 pub mod pose;
 pub mod prediction;
+pub mod prefetch;
 pub mod preview;
 pub mod proposal;
 pub mod run;
@@ -240,7 +240,7 @@ results! {
     /// A prediction with one of several seeds: kept with the others.
     Seed(prediction::SeedKey);
     /// A prediction of the pair on screen that nobody asked for: kept with the others.
-    Ahead(ahead::AheadKey);
+    Prefetch(prefetch::PrefetchKey);
     /// Several predictions of one touch.
     Ensemble(ensemble::EnsembleKey) in ensembles, 32 * MIB;
     /// A prediction in meters, as large as the bubble image.
@@ -254,7 +254,7 @@ results! {
     /// Any two imprints of a touch against each other.
     Versus(versus::VersusKey) in versus, 64 * MIB;
     /// How far the points of one cloud lie from another.
-    Apart(versus::ApartKey) in apart, 16 * MIB;
+    Apart(versus::CloudDifferenceKey) in apart, 16 * MIB;
     /// The depth chain of a prediction, stage by stage.
     Ledger(ledger::LedgerKey) in ledgers, 24 * MIB;
     /// What a GelSlim image leaves open.

@@ -17,7 +17,7 @@ use super::jobs::Lane;
 use super::keys::{DatasetSeq, Request, TouchKey};
 use super::library::state::Place;
 use super::results::Preview;
-use super::results::preview::PreviewWish;
+use super::results::preview::PreviewRequest;
 use super::services::SharedServices;
 use super::state::State;
 use super::tasks::state::Ticket;
@@ -38,7 +38,7 @@ pub(crate) type Wake = Arc<dyn Fn() + Send + Sync>;
 pub(super) enum JobId {
     /// Started by a person.
     Task(Ticket),
-    /// Wanted by a pane.
+    /// Demands by a pane.
     Request(Request),
     /// Writing the labels of a pair.
     SaveLabels(DatasetSeq, String),
@@ -65,10 +65,10 @@ pub struct Runtime {
     /// Pictures on the way, only the latest of each touch.
     previews: Arc<std::sync::Mutex<LatestPreviews>>,
     /// What of them would be looked at.
-    preview_wish: Arc<std::sync::Mutex<PreviewWish>>,
+    preview_wish: Arc<std::sync::Mutex<PreviewRequest>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
-    follower: Option<follow::Job>,
+    follower: Option<follow::FollowTask>,
     /// When labels that could not be written are tried again.
     retry_at: Option<Instant>,
     /// Folders that labels were kept in so far: each such job is one of its own.
@@ -148,7 +148,7 @@ impl Runtime {
         if wish != *lock(&self.preview_wish) {
             *lock(&self.preview_wish) = wish;
         }
-        let wanted = state.wanted();
+        let wanted = state.demands();
         if wanted != state.tasks.demanded {
             self.run(state, Answer::Demanded(wanted), &mut ui);
         }

@@ -29,8 +29,8 @@ use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
-use touch2touch_work::labels::{Deed, Recovered, Told, Unsaved};
-use touch2touch_work::models::{Models, Wanted};
+use touch2touch_work::labels::{JournalHistory, Operation, Recovered, Unsaved};
+use touch2touch_work::models::{GenerateInput, Models};
 use touch2touch_work::prediction::Prediction;
 use touch2touch_work::tool::{UnitSet, set_unit};
 
@@ -100,8 +100,8 @@ pub trait DataSource: Send + Sync {
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError>;
 
     /// What was done to them before, and what was taken back of it.
-    fn past(&self, _name: &str, _labels: &PairLabels) -> Told {
-        Told::default()
+    fn past(&self, _name: &str, _labels: &PairLabels) -> JournalHistory {
+        JournalHistory::default()
     }
 
     /// Writes the labels of a pair, so that a kill at any moment leaves the old or the new ones, and says what was done. The
@@ -109,7 +109,7 @@ pub trait DataSource: Send + Sync {
     ///
     /// # Errors
     /// If they cannot be written.
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError>;
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError>;
 
     /// Writes labels that could not be written where they belong into a folder; `None` = where they wait for the next opening.
     /// Where they are then.
@@ -132,7 +132,13 @@ pub trait DataSource: Send + Sync {
     ///
     /// # Errors
     /// As [`DataSource::save_labels`], and where there is no place for it.
-    fn save_repeat(&self, _person: &str, _name: &str, _labels: &PairLabels, _deed: &Deed) -> Result<(), TaskError> {
+    fn save_repeat(
+        &self,
+        _person: &str,
+        _name: &str,
+        _labels: &PairLabels,
+        _deed: &Operation,
+    ) -> Result<(), TaskError> {
         Err(TaskError::new("Save the repeat", "this source keeps none"))
     }
 
@@ -229,7 +235,7 @@ pub trait Services: Send + Sync {
         bundle: &BundleInfo,
         engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError>;
 

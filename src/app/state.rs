@@ -11,7 +11,7 @@ use super::inspect::state::Inspect;
 use super::keys::{PairKey, TouchKey};
 use super::labels::state::Document;
 use super::library::state::Library;
-use super::pane::Need;
+use super::pane::Demand;
 use super::results::Results;
 use super::seeds::state::Seeds;
 use super::settings::state::Settings;
@@ -111,7 +111,7 @@ impl State {
     }
 
     /// Whether a pane on screen needs something.
-    pub(super) fn needs(&self, need: Need) -> bool {
+    pub(super) fn needs(&self, need: Demand) -> bool {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
     }
 

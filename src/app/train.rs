@@ -18,7 +18,7 @@ use super::tasks;
 use super::tasks::state::{Level, TaskKind};
 use touch2touch_work::bundles::{self, BundleInfo};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::export::HandMasks;
+use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::train::{self, TrainSetup, Trained};
@@ -75,7 +75,7 @@ impl Errand for Train {
         })?;
         let unfinished = services.unfinished_folder().map(Into::into);
         let setup = TrainSetup { out: train::new_folder(models, dataset), unfinished, ..self.setup };
-        let masks = HandMasks { labels: &Labels::of(dataset), changed: &self.changed };
+        let masks = DrawnMasks { labels: &Labels::of(dataset), changed: &self.changed };
         let trained = train::train(dataset, &masks, &setup, services.models(), cx)?;
         let bundle = bundles::open("Open the trained bundle", trained.bundle.as_path())?;
         Ok((Arc::new(trained), bundle))

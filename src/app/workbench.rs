@@ -3,7 +3,7 @@
 pub mod state;
 
 pub(crate) use state::SECTION_REACH_M;
-pub use state::{HandTry, Layer, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
+pub use state::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 
@@ -12,7 +12,7 @@ use super::inspect::InspectCommand;
 use super::keys::{ImprintSource, Request, RunKey};
 use super::state::State;
 use super::{inspect, labels};
-use touch2touch_core::hand::{self, AcceptedPose, HandAxis, HandCost, HandPose};
+use touch2touch_core::manual::{self, AcceptedPose, ManualCost, ManualPose, PoseAxis};
 use touch2touch_work::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
@@ -36,9 +36,9 @@ pub enum WorkbenchCommand {
     /// The side that the pointer is over.
     SetSide(ImprintSource),
     /// Moves the tool along one axis, meters or radians.
-    Nudge(HandAxis, f64),
+    Nudge(PoseAxis, f64),
     /// Puts the tool somewhere.
-    SetHandPose(HandPose),
+    SetHandPose(ManualPose),
     /// Registers from where the tool is.
     StartIcp,
     /// Takes the pose over into the document.
@@ -79,7 +79,7 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
             bench.six_dof = on;
             // A tilt that can no longer be changed must not stay unseen.
             if let Some(hand) = bench.hand.as_ref().filter(|hand| !on && !hand.pose.is_planar()) {
-                let flat = HandPose::from(hand.pose.planar);
+                let flat = ManualPose::from(hand.pose.planar);
                 put(state, |_| flat);
             }
         }
@@ -114,27 +114,27 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
 }
 
 /// What a pose costs with the contact points of an imprint; `None` while cloud or model are not there.
-fn cost_of(state: &State, source: ImprintSource, pose: HandPose) -> Option<HandCost> {
+fn cost_of(state: &State, source: ImprintSource, pose: ManualPose) -> Option<ManualCost> {
     let clouds = state.cloud(source).ready()?;
     let tool = &state.tool().ready()?.model;
-    Some(hand::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
+    Some(manual::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
 }
 
 /// The pose being set for the side in hand; begins one if there is none.
-fn hold(state: &State) -> Option<HandTry> {
+fn hold(state: &State) -> Option<ManualTry> {
     let (pair, source) = (state.pair_key()?, state.workbench.side);
     if let Some(hand) = state.workbench.hand(source).filter(|hand| hand.pair == pair) {
         return Some(hand.clone());
     }
     // Without a model there is nothing to be moved.
     state.tool().ready()?;
-    let began = state.hand_begins(source);
+    let began = state.manual_begins(source);
     let cost = cost_of(state, source, began);
-    Some(HandTry { pair, source, pose: began, began, cost, began_cost: cost, icp: None, from_icp: None })
+    Some(ManualTry { pair, source, pose: began, began, cost, began_cost: cost, icp: None, from_icp: None })
 }
 
 /// Puts the tool where `to` says, from where it is. A pose that is not finite changes nothing.
-fn put(state: &mut State, to: impl FnOnce(HandPose) -> HandPose) {
+fn put(state: &mut State, to: impl FnOnce(ManualPose) -> ManualPose) {
     let Some(mut hand) = hold(state) else { return };
     let pose = to(hand.pose);
     if !pose.is_finite() {
@@ -187,7 +187,7 @@ fn start_icp(state: &mut State) {
 pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
     let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
     let source = hand.source;
-    let Some(pose) = state.results.runs.get(key).map(|run| HandPose::from(run.grasp_from_object)) else { return };
+    let Some(pose) = state.results.runs.get(key).map(|run| ManualPose::from(run.grasp_from_object)) else { return };
     let cost = cost_of(state, source, pose);
     if let Some(hand) = &mut state.workbench.hand {
         hand.pose = pose;

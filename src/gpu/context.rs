@@ -62,7 +62,7 @@ impl Gpu {
 
     /// What the window asks an adapter for. Of a GL driver all that it has: the toolkit asks such a driver for what a browser
     /// has, and that is no storage buffers.
-    pub fn wanted(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let required_limits = match adapter.get_info().backend {
             wgpu::Backend::Gl => adapter.limits(),
             // Room for the pictures of large screens.

@@ -53,7 +53,7 @@ pub struct Run {
 
 /// Pipelines and textures.
 #[derive(Debug)]
-pub struct Sheet {
+pub struct TriangleSheet {
     layout: wgpu::BindGroupLayout,
     flat: [wgpu::RenderPipeline; 2],
     textured: [wgpu::RenderPipeline; 2],
@@ -74,14 +74,14 @@ struct Texture {
 
 /// A picture of the window's size, and how it is put on the window.
 #[derive(Clone, Debug)]
-pub struct Kept {
+pub struct FramePicture {
     size: [u32; 2],
     view: wgpu::TextureView,
     bindings: wgpu::BindGroup,
     pipeline: wgpu::RenderPipeline,
 }
 
-impl Kept {
+impl FramePicture {
     /// Width and height, pixels.
     pub fn size(&self) -> [u32; 2] {
         self.size
@@ -98,7 +98,7 @@ impl Kept {
 /// Premultiplied colors over what is there.
 const OVER: wgpu::BlendState = wgpu::BlendState::PREMULTIPLIED_ALPHA_BLENDING;
 
-impl Sheet {
+impl TriangleSheet {
     /// For pictures and a window of `format`.
     ///
     /// # Errors
@@ -108,7 +108,7 @@ impl Sheet {
         gpu.guarded("building the pipelines of the window", || {
             let device = &gpu.device;
             let layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
-                label: Some("Sheet::layout"),
+                label: Some("TriangleSheet::layout"),
                 entries: &[
                     wgpu::BindGroupLayoutEntry {
                         binding: 0,
@@ -164,7 +164,7 @@ impl Sheet {
             };
             let sampler = |filter| {
                 device.create_sampler(&wgpu::SamplerDescriptor {
-                    label: Some("Sheet::sampler"),
+                    label: Some("TriangleSheet::sampler"),
                     mag_filter: filter,
                     min_filter: filter,
                     ..Default::default()
@@ -174,9 +174,9 @@ impl Sheet {
                 [Some(OVER), None].map(|blend| build(label, ["vs_main", fragment], bound, blend))
             };
             Ok(Self {
-                flat: two("Sheet::flat", "fs_flat", false),
-                textured: two("Sheet::textured", "fs_tinted", true),
-                whole: build("Sheet::whole", ["vs_whole", "fs_copied"], true, None),
+                flat: two("TriangleSheet::flat", "fs_flat", false),
+                textured: two("TriangleSheet::textured", "fs_tinted", true),
+                whole: build("TriangleSheet::whole", ["vs_whole", "fs_copied"], true, None),
                 samplers: [wgpu::FilterMode::Linear, wgpu::FilterMode::Nearest].map(sampler),
                 layout,
                 textures: BTreeMap::new(),
@@ -200,7 +200,7 @@ impl Sheet {
 
     fn bind(&self, gpu: &Gpu, view: &wgpu::TextureView, nearest: bool) -> wgpu::BindGroup {
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("Sheet::texture"),
+            label: Some("TriangleSheet::texture"),
             layout: &self.layout,
             entries: &[
                 wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) },
@@ -213,18 +213,18 @@ impl Sheet {
     }
 
     /// An empty picture of `size` pixels and `format`, which must be that of the sheet.
-    pub fn picture(&self, gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> Kept {
+    pub fn picture(&self, gpu: &Gpu, size: [u32; 2], format: wgpu::TextureFormat) -> FramePicture {
         let usage = wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING;
-        let view =
-            texture(gpu, "Sheet::picture", size, format, usage).create_view(&wgpu::TextureViewDescriptor::default());
+        let view = texture(gpu, "TriangleSheet::picture", size, format, usage)
+            .create_view(&wgpu::TextureViewDescriptor::default());
         let bindings = self.bind(gpu, &view, true);
-        Kept { size, view, bindings, pipeline: self.whole.clone() }
+        FramePicture { size, view, bindings, pipeline: self.whole.clone() }
     }
 
     /// Makes or replaces a texture of `size` pixels, row by row; `rgba` premultiplied.
     pub fn set(&mut self, gpu: &Gpu, key: u64, size: [u32; 2], rgba: &[u8], nearest: bool) {
         let usage = wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST;
-        let own = texture(gpu, "Sheet::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
+        let own = texture(gpu, "TriangleSheet::texture", size, wgpu::TextureFormat::Rgba8Unorm, usage);
         write(gpu, &own, [0; 2], size, rgba);
         let bindings = self.bind(gpu, &own.create_view(&wgpu::TextureViewDescriptor::default()), nearest);
         let opaque = rgba.chunks_exact(4).all(|p| p[3] == 255);
@@ -263,21 +263,21 @@ impl Sheet {
     pub fn paint(
         &mut self,
         gpu: &Gpu,
-        picture: &Kept,
+        picture: &FramePicture,
         corners: &[Corner],
         indices: &[u32],
         runs: &[Run],
     ) -> Result<(), GpuError> {
         gpu.guarded("painting the window", || {
             let usage = wgpu::BufferUsages::VERTEX;
-            let corners = Elements::upload(gpu, "Sheet::corners", corners, usage, self.corners.take())?;
+            let corners = Elements::upload(gpu, "TriangleSheet::corners", corners, usage, self.corners.take())?;
             let usage = wgpu::BufferUsages::INDEX;
-            let indices = Elements::upload(gpu, "Sheet::indices", indices, usage, self.indices.take())?;
-            let label = Some("Sheet::encoder");
+            let indices = Elements::upload(gpu, "TriangleSheet::indices", indices, usage, self.indices.take())?;
+            let label = Some("TriangleSheet::encoder");
             let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
             {
                 let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                    label: Some("Sheet::pass"),
+                    label: Some("TriangleSheet::pass"),
                     color_attachments: &[Some(wgpu::RenderPassColorAttachment {
                         view: &picture.view,
                         depth_slice: None,

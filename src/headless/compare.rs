@@ -15,7 +15,7 @@ use super::{Output, ToolArgs, VerbResult};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::{PadId, PerPad, Text};
 use touch2touch_core::sample::Sample;

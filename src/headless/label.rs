@@ -9,8 +9,8 @@ use super::{Output, VerbResult, find_pair};
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::{Ground, Provenance};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
@@ -21,7 +21,7 @@ use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{
-    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, note, system_person, take_in,
+    DrawnMask, ImprintOf, ImprintSource, Labels, MaskPlace, Operation, PairLabels, Review, note, system_person, take_in,
 };
 use touch2touch_work::models::Models;
 use touch2touch_work::propose::{self, Proposal, ProposeSetup, accepted};
@@ -56,7 +56,11 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let before = stored.clone();
         change(args, (&dataset, &labels, id), &mut stored)?;
         if stored != before {
-            labels.save(&entry.name, &stored, &Deed { person: args.person.clone(), ..Deed::named("label") })?;
+            labels.save(
+                &entry.name,
+                &stored,
+                &Operation { person: args.person.clone(), ..Operation::named("label") },
+            )?;
         }
         pairs.push(Stored::new(&entry.name, &stored, &dataset));
     } else {
@@ -194,13 +198,13 @@ fn change(
                 let model = found.model.as_deref().unwrap_or_default();
                 let start = match drawn.filter(|_| one.basis == MaskBasis::Hand) {
                     Some(hand) => hand.clone(),
-                    None => HandMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
+                    None => DrawnMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
                 };
                 let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
                 if let Some(proposal) = &proposed[pad] {
                     let imprint = found.imprints[pad].as_ref();
                     let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
-                    hand = accepted(drawn, proposal, args.over_hand);
+                    hand = accepted(drawn, proposal, args.over_drawn);
                 }
                 if let Some(imprint) = &found.imprints[pad] {
                     for (drawing, touches) in args.draw.iter().zip(&mut drawn_on) {

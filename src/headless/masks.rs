@@ -23,7 +23,7 @@ use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::agreement::{Agreements, compare_labels};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::export::{Automatic, ExportChoice, ExportSetup, HandMasks, LeftOut, Which, export_masks, plan};
+use touch2touch_work::export::{Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
 use touch2touch_work::feel::{Felt, Touch};
 use touch2touch_work::io::exchange::{ExportReport, Format};
 use touch2touch_work::job::JobCx;
@@ -136,7 +136,7 @@ pub(super) struct ExportArgs {
     test_in_train: bool,
     /// Count only pixels that a person painted: all others are ignored, in `ignore/` beside the masks.
     #[arg(long)]
-    hand_checked: bool,
+    manual_checked: bool,
     /// Sends all pairs of a tool to the same part.
     #[arg(long)]
     by_tool: bool,
@@ -199,7 +199,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         choice: ExportChoice {
             which: args.pairs,
             test_in_train: args.test_in_train,
-            hand_checked: args.hand_checked,
+            manual_checked: args.manual_checked,
             by_tool: args.by_tool,
             seed: args.split_seed,
             format: args.format,
@@ -229,7 +229,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         Ok(found.mask.clone())
     };
     let labels = Labels::of(&dataset);
-    let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
+    let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
     let (plan, written) = if args.dry_run {
         (plan(&dataset, &masks, &setup)?, None)
     } else {

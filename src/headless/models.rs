@@ -9,7 +9,7 @@ use super::recipe::RuntimeArg;
 use super::{Common, Output, VerbResult};
 use touch2touch_work::infer::bundle::Bundle;
 use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
-use touch2touch_work::infer::{runtime, trial};
+use touch2touch_work::infer::{runtime, sandbox};
 
 /// What can be done with a bundle.
 #[derive(Debug, Subcommand)]
@@ -67,7 +67,7 @@ fn check(args: &BundleArgs) -> VerbResult {
             output.step("manifest and files");
             for engine in engines {
                 output.message(engine.label());
-                match trial::check(&bundle, engine) {
+                match sandbox::check(&bundle, engine) {
                     Ok(()) => report.engines.push(engine),
                     Err(refusal) => report.problems.push(refusal.to_string()),
                 }
@@ -101,13 +101,13 @@ fn check(args: &BundleArgs) -> VerbResult {
 fn attempt(args: &TryArgs) -> VerbResult {
     // Also where the first process is gone and cannot end this one.
     std::thread::spawn(|| {
-        std::thread::sleep(2 * trial::TIME);
+        std::thread::sleep(2 * sandbox::TIME);
         std::process::exit(1);
     });
     let output = Output::new(Common { json: false }, "trying", 1);
     let bundle = Bundle::open(&args.path)?;
     let mut written = Ok(());
-    let taken = trial::run(&bundle, args.engine.choice(), &mut |text| {
+    let taken = sandbox::run(&bundle, args.engine.choice(), &mut |text| {
         if written.is_ok() {
             written = output.line(&text, || text.to_owned());
         }

@@ -17,7 +17,7 @@ use super::{Output, VerbResult, seeds};
 use touch2touch_core::align::Ask;
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel};
 use touch2touch_work::doubts;
 use touch2touch_work::feel::{Touch, feel};
@@ -30,7 +30,7 @@ use touch2touch_work::tool::load_tool;
 
 pub(super) use args::{Engines, EnginesParser, PoseArgs, parse_start};
 use args::{Imprints, registration};
-use report::{Accepted, Case, Report, summary, text};
+use report::{Accepted, PoseRow, Report, summary, text};
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
@@ -94,7 +94,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 notes.take(&output, misgiving(&recipe, &sample).as_slice());
             }
             let pair = PairId(id as u32);
-            let asked = Asked {
+            let asked = PairInput {
                 name: &entry.name,
                 stem: stem.as_deref(),
                 influence: influence.as_deref(),
@@ -130,7 +130,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
 }
 
 /// A pair as `pose` asks for it.
-struct Asked<'a> {
+struct PairInput<'a> {
     name: &'a str,
     /// Where pictures of it go.
     stem: Option<&'a Path>,
@@ -143,8 +143,8 @@ struct Asked<'a> {
 }
 
 /// One case per engine for one pair and one kind of imprint.
-fn pose_cases(args: &PoseArgs, asked: &Asked<'_>, models: &Models) -> anyhow::Result<Vec<Case>> {
-    let Asked { name, stem, influence, touch, tool, recipe, accepted } = *asked;
+fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
+    let PairInput { name, stem, influence, touch, tool, recipe, accepted } = *asked;
     let (sample, imprint) = (touch.sample, recipe.imprint);
     let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = felt.contact();
@@ -175,7 +175,7 @@ fn pose_cases(args: &PoseArgs, asked: &Asked<'_>, models: &Models) -> anyhow::Re
             influence::write(stem, (&contact.clouds(sample)?, sample, tool), (imprint, engine), found)
         });
         let influence = influence.transpose()?;
-        Ok(Case {
+        Ok(PoseRow {
             name: name.to_owned(),
             engine: engine.to_string(),
             imprint: imprint.key(),

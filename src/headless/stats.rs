@@ -17,7 +17,7 @@ use touch2touch_work::imprint::chain_of;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::models::Wanted;
+use touch2touch_work::models::GenerateInput;
 use touch2touch_work::pairs;
 use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
@@ -70,7 +70,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     };
     let chain = chain_of(&models.chains(generating.bundle)?, &generating.bundle.id, ShiftMode::Raw)?;
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
-    let predict = |wanted: Wanted<'_>, cx: &JobCx| {
+    let predict = |wanted: GenerateInput<'_>, cx: &JobCx| {
         let made = models.predict(generating.bundle, generating.engine, generating.config, &[wanted], cx)?;
         made.into_iter().next().ok_or_else(|| TaskError::new("Predict", "no answer"))
     };

@@ -180,9 +180,9 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// A column of figures: heading, tooltip, value.
-type Figure = (&'static str, &'static str, fn(&Scored) -> Option<String>);
+type FitColumn = (&'static str, &'static str, fn(&Scored) -> Option<String>);
 
-const FIGURES: [Figure; 7] = [
+const FIGURES: [FitColumn; 7] = [
     (
         "PSNR dB",
         "Pictures whose scale was lost are both stretched to 0..1, where noise decides; else peak 22.5 mm",

@@ -13,7 +13,7 @@ use strum::IntoEnumIterator as _;
 
 use super::cx::{Cx, Shared};
 use super::dialogs::Purpose;
-use super::kept::Kept;
+use super::kept::KeptFrame;
 use super::pane::{Docking, Panes};
 use super::scene_view::Device;
 use super::screenshot::Shot;
@@ -111,7 +111,7 @@ impl StudioApp {
             log::error!("No 3D views: {why}");
         }
         if let Some(state) = cc.wgpu_render_state.as_ref().filter(|_| !options.whole_frames)
-            && let Err(error) = Kept::install(&cc.egui_ctx, state)
+            && let Err(error) = KeptFrame::install(&cc.egui_ctx, state)
         {
             log::error!("Every frame is painted whole: {error}");
         }
@@ -170,7 +170,7 @@ impl StudioApp {
 
     /// Pixels of the window painted so far, where only what changed is painted. For tests.
     pub fn painted(&self, ctx: &egui::Context) -> Option<u64> {
-        ctx.with_plugin(|kept: &mut Kept| kept.painted())
+        ctx.with_plugin(|kept: &mut KeptFrame| kept.painted())
     }
 
     /// Whether nothing runs, nothing waits and nothing is to be executed.

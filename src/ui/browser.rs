@@ -15,7 +15,7 @@ use super::widget::empty;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::{Command, LibraryCommand, Pane};
-use crate::app::evaluate::{ScoreChoice, SourceScores, Standing};
+use crate::app::evaluate::{Grade, ScoreChoice, SourceScores};
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
 use crate::app::tasks::TaskKind;
@@ -357,9 +357,9 @@ pub(super) fn score_color(p: &Palette, source: &SourceScores, metric: Metric, va
     match (metric, source.standing(metric, value)) {
         (Metric::Angle, _) if value.is_nan() => p.wrong,
         (Metric::Angle, _) => error_color(p, value),
-        (_, Standing::Worst) => p.wrong,
-        (_, Standing::Poor) => p.caution,
-        (_, Standing::Fine) => p.text,
+        (_, Grade::Worst) => p.wrong,
+        (_, Grade::Poor) => p.caution,
+        (_, Grade::Fine) => p.text,
     }
 }
 

@@ -17,7 +17,7 @@ use eframe::egui::{
 };
 use eframe::egui_wgpu::{Callback, CallbackResources, CallbackTrait, RenderState};
 
-use crate::gpu::sheet::{self, Corner, Fill, Run, Sheet};
+use crate::gpu::sheet::{self, Corner, Fill, Run, TriangleSheet};
 use crate::gpu::{Gpu, GpuError, wgpu};
 
 /// Side of a tile, physical pixels.
@@ -29,11 +29,11 @@ const RECTS: usize = 8;
 const LARGE_PX: f32 = 4096.0;
 
 /// Paints what changed. A plugin of the toolkit: it takes each frame's shapes and textures and gives one picture back.
-pub(super) struct Kept {
+pub(super) struct KeptFrame {
     gpu: Gpu,
     format: wgpu::TextureFormat,
-    sheet: Sheet,
-    picture: Option<Arc<sheet::Kept>>,
+    sheet: TriangleSheet,
+    picture: Option<Arc<sheet::FramePicture>>,
     /// Changes of each texture so far.
     versions: BTreeMap<TextureId, u64>,
     /// What each tile was painted from.
@@ -82,7 +82,7 @@ impl Block {
 }
 
 /// The kept picture on the window.
-struct Shown(Arc<sheet::Kept>);
+struct Shown(Arc<sheet::FramePicture>);
 
 impl CallbackTrait for Shown {
     fn paint(&self, _: PaintCallbackInfo, pass: &mut wgpu::RenderPass<'static>, _: &CallbackResources) {
@@ -90,7 +90,7 @@ impl CallbackTrait for Shown {
     }
 }
 
-impl Kept {
+impl KeptFrame {
     /// Installs itself in `ctx`; returns whether it did: only where a program draws and the window has plain bytes.
     ///
     /// # Errors
@@ -102,7 +102,7 @@ impl Kept {
         if !gpu.software || !plain {
             return Ok(false);
         }
-        let mut sheet = Sheet::new(&gpu, format)?;
+        let mut sheet = TriangleSheet::new(&gpu, format)?;
         sheet.prove(&gpu, format)?;
         let (versions, tiles) = (BTreeMap::new(), Vec::new());
         ctx.add_plugin(Self { gpu, format, sheet, picture: None, versions, tiles, painted: 0 });
@@ -154,7 +154,7 @@ impl Kept {
     }
 
     /// The picture of this size; a new one, and every tile to be painted, if there is none.
-    fn picture(&mut self, size: [u32; 2]) -> Arc<sheet::Kept> {
+    fn picture(&mut self, size: [u32; 2]) -> Arc<sheet::FramePicture> {
         match &self.picture {
             Some(picture) if picture.size() == size => picture.clone(),
             _ => {
@@ -175,9 +175,9 @@ fn key(id: TextureId) -> u64 {
     }
 }
 
-impl Plugin for Kept {
+impl Plugin for KeptFrame {
     fn debug_name(&self) -> &'static str {
-        "Kept"
+        "KeptFrame"
     }
 
     fn output_hook(&mut self, ctx: &Context, output: &mut FullOutput) {
@@ -196,7 +196,7 @@ impl Plugin for Kept {
             let triangles = triangles(&primitives, &self.sheet, ppp, size);
             let tiles = tiles(&primitives, &triangles, &self.versions, grid);
             let blocks = blocks(grid, |at| self.tiles.get(at).is_none_or(|old| old.hash != tiles[at].hash));
-            let mut jobs = Jobs { ppp, size, ..Jobs::default() };
+            let mut jobs = FrameMesh { ppp, size, ..FrameMesh::default() };
             for block in &blocks {
                 let [x0, y0] = block.min.map(|v| v * TILE);
                 let [x1, y1] = [0, 1].map(|axis| (block.max[axis] * TILE).min(size[axis]));
@@ -231,7 +231,7 @@ impl Plugin for Kept {
 }
 
 /// All triangles that can be seen, in the order in which they are painted.
-fn triangles(primitives: &[ClippedPrimitive], sheet: &Sheet, ppp: f32, size: [u32; 2]) -> Vec<Triangle> {
+fn triangles(primitives: &[ClippedPrimitive], sheet: &TriangleSheet, ppp: f32, size: [u32; 2]) -> Vec<Triangle> {
     let screen = Rect::from_min_size(Pos2::ZERO, vec2(size[0] as f32, size[1] as f32));
     let mut all = Vec::new();
     for (index, job) in primitives.iter().enumerate() {
@@ -411,7 +411,7 @@ fn blocks(grid: [u32; 2], changed: impl Fn(usize) -> bool) -> Vec<Block> {
 
 /// What is sent to the device for one frame.
 #[derive(Default)]
-struct Jobs {
+struct FrameMesh {
     ppp: f32,
     size: [u32; 2],
     corners: Vec<Corner>,
@@ -419,7 +419,7 @@ struct Jobs {
     runs: Vec<Run>,
 }
 
-impl Jobs {
+impl FrameMesh {
     /// A place on the window, points, in clip space.
     fn corner(&mut self, v: Vertex) -> u32 {
         let at = [

@@ -275,7 +275,7 @@ fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
         Err(Lookup::Absent(absent)) => absent.text().to_owned(),
         Err(_) => "…".to_owned(),
     };
-    let color = if cx.state.hand_mask(source, finger).is_some() { cx.p.strong } else { cx.p.weak };
+    let color = if cx.state.drawn_mask(source, finger).is_some() { cx.p.strong } else { cx.p.weak };
     let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
     let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
     ui.add(label).on_hover_text(format!("The mask in force. {text}"));

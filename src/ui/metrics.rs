@@ -14,7 +14,7 @@ use crate::app::command::{LabelsCommand, Pane};
 use crate::app::keys::{ImprintSource, Registration};
 use crate::app::state::{Absent, Lookup};
 use strum::IntoEnumIterator as _;
-use touch2touch_core::hand::{HandPose, PoseDifference};
+use touch2touch_core::manual::{ManualPose, PoseDifference};
 use touch2touch_core::postprocess::{Severity, Stage, Stats};
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
@@ -137,7 +137,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 /// A pose that a person set, in place of the button that takes the registered one over.
-fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: HandPose) {
+fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: ManualPose) {
     let angle = hand.planar.inverse().theta_rad;
     let mut text = format!("Accepted by hand: {}", units::text_deg(angle));
     if let Some(truth) = cx.state.truth() {

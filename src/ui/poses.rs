@@ -10,7 +10,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::state::Lookup;
 use crate::app::workbench::PoseOf;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 use touch2touch_work::verdict::Verdict;
 

@@ -30,7 +30,7 @@ const NUMBER: f32 = 62.0;
 pub(super) type Memory = ();
 
 /// A column of numbers.
-type Column<'a> = (&'a SourceScores, Metric);
+type ScoreColumn<'a> = (&'a SourceScores, Metric);
 
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
@@ -74,11 +74,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 /// The columns that there is room for, each source's together: the most telling metrics of all sources first.
-fn columns(sources: &[SourceScores], width: f32) -> Vec<Column<'_>> {
+fn columns(sources: &[SourceScores], width: f32) -> Vec<ScoreColumn<'_>> {
     let room = ((width - NAMES.iter().sum::<f32>() - 20.0) / NUMBER).max(1.0) as usize;
     let metrics = Metric::iter().filter(|metric| *metric != Metric::Seconds);
     let telling = metrics.flat_map(|metric| sources.iter().map(move |source| (source, metric)));
-    let taken: Vec<Column<'_>> = telling.filter(|(source, metric)| source.has(*metric)).take(room).collect();
+    let taken: Vec<ScoreColumn<'_>> = telling.filter(|(source, metric)| source.has(*metric)).take(room).collect();
     let of = |source: &SourceScores| {
         let name = source.name.clone();
         taken.iter().copied().filter(move |(taken, _)| taken.name == name).collect::<Vec<_>>()
@@ -96,7 +96,7 @@ fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
     (names, (0..numbers).map(|at| cell(start + at as f32 * width, width)).collect())
 }
 
-fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
+fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
     let p = cx.p;
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), HEAD), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, p.line));
@@ -171,7 +171,7 @@ fn source_name(cx: &Cx<'_>, ui: &Ui, source: Option<(&SourceScores, Rect)>, rect
 }
 
 /// The means over the pairs of the list.
-fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[Column<'_>]) {
+fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     ui.painter().hline(rect.x_range(), rect.bottom(), (1.0, cx.p.line));
     let (names, numbers) = cells(rect, columns.len());
@@ -200,7 +200,7 @@ fn put(ui: &Ui, cell: Rect, text: &str, color: Color32) {
     ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, FontId::proportional(12.0), color);
 }
 
-fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, pair: PairId, columns: &[Column<'_>]) {
+fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, pair: PairId, columns: &[ScoreColumn<'_>]) {
     let p = cx.p;
     let Some(entry) = cx.state.library.entry(pair) else { return };
     let selected = cx.state.selection.pair == Some(pair);

@@ -13,7 +13,7 @@ use crate::app::tasks::TaskKind;
 use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::train::{Told, Trained};
+use touch2touch_work::train::{MaskScore, Trained};
 
 /// Nothing is kept between frames.
 pub(super) type Memory = ();
@@ -173,7 +173,7 @@ fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
             ui.label(caption(heading, cx.p)).on_hover_text(tip);
         }
         ui.end_row();
-        let row = |ui: &mut Ui, before: Told, after: Told| {
+        let row = |ui: &mut Ui, before: MaskScore, after: MaskScore| {
             let color = if after.iou < before.iou { cx.p.caution } else { cx.p.text };
             ui.label(RichText::new(change(before.iou, after.iou)).color(color).size(SMALL));
             ui.label(RichText::new(change(before.dice, after.dice)).color(color).size(SMALL));

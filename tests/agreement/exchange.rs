@@ -39,7 +39,7 @@ fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
     }
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
     studio.send(LibraryCommand::Select(PairId(0)).into());
-    let hand = |studio: &Studio| studio.state.hand_mask(ImprintSource::Measured, lab::RIGHT).cloned().unwrap();
+    let hand = |studio: &Studio| studio.state.drawn_mask(ImprintSource::Measured, lab::RIGHT).cloned().unwrap();
     let before = hand(&studio);
     studio.send(ExportCommand::AskImport(Some(exported.clone())).into());
     let key = studio.state.import_plan_key().expect("the form is open");

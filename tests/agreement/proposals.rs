@@ -1,7 +1,7 @@
 //! Proposals: nothing changes before they are accepted, hand work stays, and the verb makes the same masks.
 
 use touch2touch::app::command::ViewCommand;
-use touch2touch::app::labels::{HandMask, Review};
+use touch2touch::app::labels::{DrawnMask, Review};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
@@ -46,8 +46,8 @@ fn why(studio: &Studio) -> String {
     )
 }
 
-fn hand(studio: &Studio) -> Option<HandMask> {
-    studio.state.hand_mask(MEASURED, lab::RIGHT).cloned()
+fn hand(studio: &Studio) -> Option<DrawnMask> {
+    studio.state.drawn_mask(MEASURED, lab::RIGHT).cloned()
 }
 
 #[test]
@@ -126,7 +126,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     studio.send(prefer(move |s| s.mask = mask.clone()).into());
     strokes(&mut studio);
     let painted = hand(&studio).unwrap();
-    let checked = painted.marks.hand_checked();
+    let checked = painted.marks.manual_checked();
     let accept = |studio: &mut Studio| {
         studio.send(ViewCommand::Propose(true).into());
         let proposed = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
@@ -140,7 +140,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
         let from = if *by_hand { &painted.mask } else { &proposed };
         assert_eq!(kept.mask.as_slice()[i], from.as_slice()[i], "pixel {i}");
     }
-    studio.send(prefer(move |s| s.mask.over_hand = true).into());
+    studio.send(prefer(move |s| s.mask.over_drawn = true).into());
     accept(&mut studio);
     assert!(*hand(&studio).unwrap().mask == proposed);
     for _ in 0..2 {
@@ -161,7 +161,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     studio.send(LabelsCommand::StrokeTo([110.0, 70.0]).into());
     studio.send(LabelsCommand::EndStroke.into());
     let through = hand(&studio).unwrap();
-    let mine = |hand: &HandMask, i: usize| {
+    let mine = |hand: &DrawnMask, i: usize| {
         matches!(hand.marks.at(i % 175, i / 175), Some(Provenance::Hand { .. })) && !checked.as_slice()[i]
     };
     let mut touched = 0;
@@ -196,11 +196,11 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
     let [anna, ben] = &mut windows;
     rectangle(anna, [2.0, 2.0], [20.0, 20.0]);
     rectangle(ben, [150.0, 100.0], [170.0, 130.0]);
-    let who = |hand: &HandMask, x, y| match hand.marks.at(x, y) {
+    let who = |hand: &DrawnMask, x, y| match hand.marks.at(x, y) {
         Some(Provenance::Hand { person }) => person.clone(),
         _ => String::new(),
     };
-    let both = |hand: &HandMask| {
+    let both = |hand: &DrawnMask| {
         assert!(hand.mask[(10, 10)] && hand.mask[(160, 110)]);
         assert_eq!([who(hand, 10, 10), who(hand, 160, 110)], ["anna", "ben"]);
     };
@@ -242,7 +242,7 @@ fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_
 
     // On screen at once, hand work as it was, and one undo takes it back.
     let made = hand(&studio).unwrap();
-    let checked = painted.marks.hand_checked();
+    let checked = painted.marks.manual_checked();
     assert!(!made.is_same(&painted) && checked.as_slice().contains(&true));
     let kept = |(i, by_hand): (usize, &bool)| !by_hand || made.mask.as_slice()[i] == painted.mask.as_slice()[i];
     assert!(checked.as_slice().iter().enumerate().all(kept), "what was painted stays");
@@ -293,7 +293,7 @@ fn proposing_for_many_stops_between_pairs_and_keeps_what_was_done() {
             carry_from: None,
         },
         pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
-        over_hand: false,
+        over_drawn: false,
         person: None,
     };
     let labeled = || {

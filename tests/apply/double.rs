@@ -34,8 +34,8 @@ use touch2touch_work::infer::bundle::SensorPair;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
-use touch2touch_work::labels::{Deed, Recovered, Unsaved};
-use touch2touch_work::models::Wanted;
+use touch2touch_work::labels::{Operation, Recovered, Unsaved};
+use touch2touch_work::models::GenerateInput;
 use touch2touch_work::prediction::Prediction;
 
 /// `[width, height]` of the imprints of [`Source`].
@@ -175,7 +175,7 @@ impl DataSource for Source {
         Ok(self.labels.lock().unwrap().get(name).cloned().unwrap_or_default())
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels, _: &Deed) -> Result<Option<PairLabels>, TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, _: &Operation) -> Result<Option<PairLabels>, TaskError> {
         assert!(!self.damaged.lock().unwrap().contains(name), "a damaged file must not be written over");
         if self.full_disk.load(Ordering::Relaxed) {
             return Err(TaskError::new("Save the labels", "no space left"));
@@ -199,7 +199,7 @@ impl DataSource for Source {
         Ok(self.repeats.lock().unwrap().get(name).cloned().unwrap_or_default())
     }
 
-    fn save_repeat(&self, _: &str, name: &str, labels: &PairLabels, _: &Deed) -> Result<(), TaskError> {
+    fn save_repeat(&self, _: &str, name: &str, labels: &PairLabels, _: &Operation) -> Result<(), TaskError> {
         if self.full_disk.load(Ordering::Relaxed) {
             return Err(TaskError::new("Save the repeat", "no space left"));
         }
@@ -327,7 +327,7 @@ impl Services for Double {
         bundle: &BundleInfo,
         _: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         self.batches.fetch_add(1, Ordering::Relaxed);
@@ -382,7 +382,7 @@ impl Double {
         &self,
         bundle: &BundleInfo,
         config: &GenerateConfig,
-        item: &Wanted<'_>,
+        item: &GenerateInput<'_>,
         cx: &JobCx,
     ) -> Result<Prediction, TaskError> {
         self.generated.fetch_add(1, Ordering::Relaxed);

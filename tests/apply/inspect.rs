@@ -56,7 +56,7 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     // A closed pane asks for nothing.
     bench.send(panes(&[Pane::Log]));
     send(&mut bench, InspectCommand::Plane(Plane::YZ));
-    assert!(bench.state.wanted().is_empty());
+    assert!(bench.state.demands().is_empty());
     // Back at a plane that was there, nothing is computed again.
     send(&mut bench, InspectCommand::Plane(Plane::AngleY));
     bench.send(panes(&[Pane::BasinMap]));
@@ -175,7 +175,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
 fn a_map_that_is_given_up_is_not_computed_until_asked_for() {
     let mut bench = bench(&[Pane::SceneMeasured]);
     bench.send(panes(&[Pane::BasinMap]));
-    let wants_map = |bench: &Bench| bench.state.wanted().iter().any(|r| matches!(r, Request::Basin(_)));
+    let wants_map = |bench: &Bench| bench.state.demands().iter().any(|r| matches!(r, Request::Basin(_)));
     assert!(wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 1);
     let stop = Action::CancelJobs.command(&bench.state).unwrap();
     bench.send(stop);

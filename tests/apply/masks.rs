@@ -87,7 +87,7 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
     bench.send(prefer(|s| s.mask.tool = MaskTool::Brush));
     stroke(&mut bench, lab::RIGHT, [900.0, -900.0], [f32::NAN, 1.0]);
     bench.settle();
-    assert!(bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
+    assert!(bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
     assert!(Action::Undo.command(&bench.state).is_none());
     assert_eq!(bench.services.source.saves.load(Ordering::Relaxed), 0);
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
@@ -96,7 +96,7 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
     bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     stroke(&mut bench, lab::RIGHT, [21.0, 1.0], [22.0, 1.0]);
     assert_eq!(mask(&bench, lab::RIGHT), before);
-    let hand = bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).unwrap();
+    let hand = bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).unwrap();
     assert!(hand.marks.has_hand_work());
     assert!(Action::Undo.command(&bench.state).is_some());
 }
@@ -181,7 +181,7 @@ fn clean_ups_work_on_the_mask_in_force() {
         bench.send(LabelsCommand::Undo);
         assert_eq!(count(&mask(&bench, lab::RIGHT)), expected);
     }
-    assert!(bench.state.document.hand_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
+    assert!(bench.state.document.drawn_mask("tool_a/data_0", &MaskPlace::measured(lab::RIGHT)).is_none());
 }
 
 #[test]
@@ -418,7 +418,7 @@ fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
     bench.settle();
     assert_eq!(bench.state.pair_name(), first);
     assert_eq!(bench.state.document.review(&first), Review::Todo);
-    assert!(bench.state.hand_mask(MEASURED, lab::RIGHT).is_none(), "it looks as if nobody had drawn on it");
+    assert!(bench.state.drawn_mask(MEASURED, lab::RIGHT).is_none(), "it looks as if nobody had drawn on it");
     assert!(Action::Undo.command(&bench.state).is_none());
     stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [2.0, 14.0]);
     bench.settle();
@@ -438,7 +438,7 @@ fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
     bench.send(LibraryCommand::First);
     bench.settle();
     assert_eq!(bench.state.pair_name(), first);
-    assert_eq!(*bench.state.hand_mask(MEASURED, lab::RIGHT).unwrap().mask, *stored.measured(lab::RIGHT).unwrap().mask);
+    assert_eq!(*bench.state.drawn_mask(MEASURED, lab::RIGHT).unwrap().mask, *stored.measured(lab::RIGHT).unwrap().mask);
     assert_eq!(bench.services.source.labels.lock().unwrap()[&first], stored);
     assert_eq!(bench.errors(), 0, "{:?}", bench.log());
 }

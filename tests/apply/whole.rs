@@ -43,7 +43,7 @@ fn the_pose_follows_the_mask() {
     };
     bench.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px, erase: false });
     bench.send(LabelsCommand::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
-    assert!(bench.state.wanted().is_empty());
+    assert!(bench.state.demands().is_empty());
     assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
     bench.send(LabelsCommand::EndStroke);
     bench.settle();
@@ -92,7 +92,7 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     assert!(matches!(shown, Lookup::Stale(_)) && shown.shown().unwrap().angle_rad == provisional.angle_rad);
     assert!(bench.state.provisional_pose(MEASURED).is_some());
     assert!(Action::AcceptMeasuredPose.command(&bench.state).is_none());
-    assert_eq!(bench.state.wanted().first(), Some(&Request::Pose(key(&bench))));
+    assert_eq!(bench.state.demands().first(), Some(&Request::Pose(key(&bench))));
 }
 
 #[test]

@@ -8,8 +8,8 @@ use serde_json::Value;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::hand::{AcceptedPose, HandPose};
 use touch2touch_core::label::{Marks, Provenance, paint_where};
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::lab;
@@ -145,8 +145,8 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
     store.save_review("plain", &read).unwrap();
     assert!(text("plain").contains("\"version\":1") && !text("plain").contains("by_hand"));
 
-    let tilted = HandPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
-    for pose in [HandPose::from(planar), tilted] {
+    let tilted = ManualPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
+    for pose in [ManualPose::from(planar), tilted] {
         let by_hand = Some(AcceptedPose { pose, by_hand: true });
         let accepted = ByImprint { accepted: [None, by_hand], ..ByImprint::default() };
         let review = StoredReview { review: "todo".into(), accepted, ..StoredReview::default() };

@@ -6,7 +6,7 @@ use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
-use touch2touch_core::ambiguity::Touch;
+use touch2touch_core::ambiguity::TouchKind;
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::FlagKind;
@@ -109,7 +109,7 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     rig.send(LibraryCommand::Open(Place::Path(folder.path().to_owned())));
     rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
-    assert_eq!(state.ambiguity(lab::RIGHT).unwrap().kind, Touch::BareShaft);
+    assert_eq!(state.ambiguity(lab::RIGHT).unwrap().kind, TouchKind::BareShaft);
     let split = state.comparison(lab::RIGHT).ready().unwrap().split.unwrap();
     assert!(split.seen.pixels > 1000 && split.invented.pixels > 10 * split.seen.pixels);
     for label in ["Seen ", "Invented ", "The gel shows a bare shaft"] {

@@ -124,8 +124,8 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(rig.stored(&pair, lab::RIGHT), None);
     rig.stroke("Measured imprint right", &[[0.1, 0.5], [0.3, 0.45], [0.6, 0.55], [0.9, 0.5]]);
     let state = rig.harness.state().state();
-    assert!(state.document.hand_mask(&pair, &MaskPlace::measured(lab::RIGHT)).is_some());
-    assert!(state.document.hand_mask(&pair, &MaskPlace::measured(lab::LEFT)).is_none(), "only the finger painted on");
+    assert!(state.document.drawn_mask(&pair, &MaskPlace::measured(lab::RIGHT)).is_some());
+    assert!(state.document.drawn_mask(&pair, &MaskPlace::measured(lab::LEFT)).is_none(), "only the finger painted on");
     let painted = area(&rig);
     assert!(painted > automatic, "{painted} > {automatic}");
     let after = state.pose(ImprintSource::Measured).ready().expect("a pose after the stroke").clone();

@@ -133,7 +133,7 @@ fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
         rig.harness.step();
     }
     rig.settle();
-    assert!(state(&rig).hand_mask(MEASURED, lab::RIGHT).is_some());
+    assert!(state(&rig).drawn_mask(MEASURED, lab::RIGHT).is_some());
 }
 
 #[test]

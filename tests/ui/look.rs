@@ -14,8 +14,8 @@ use touch2touch::app::settings::{
 use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::HandAxis;
 use touch2touch_core::label::Paint;
+use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim::Fault;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
@@ -82,8 +82,8 @@ fn pictures_for_the_docs() {
         rig.send(Command::Workbench(WorkbenchCommand::SetBothClouds(false)));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Pose)));
         rig.send(Command::Workbench(WorkbenchCommand::SetSixDof(true)));
-        rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Y, 0.002)));
-        rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::Pitch, 0.1)));
+        rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::Y, 0.002)));
+        rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::Pitch, 0.1)));
         rig.shoot(&format!("{name}-demo-align-hand"));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Look)));
         rig.send(prefer(|s| s.workspace = Workspace::Label));

@@ -109,7 +109,7 @@ fn the_most_uncertain_come_first_by_key_and_say_why() {
 }
 
 fn drawn(rig: &Rig) -> Option<Mask> {
-    let hand = state(rig).hand_mask(ImprintSource::Measured, lab::RIGHT)?;
+    let hand = state(rig).drawn_mask(ImprintSource::Measured, lab::RIGHT)?;
     Some((*hand.mask).clone())
 }
 

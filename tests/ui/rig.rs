@@ -31,7 +31,7 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair, write_tools};
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::{JobCx, PreviewPicture};
-use touch2touch_work::models::Wanted;
+use touch2touch_work::models::GenerateInput;
 use touch2touch_work::prediction::Prediction;
 
 /// The program's services with a generator that answers at once.
@@ -106,7 +106,7 @@ impl Services for QuickGenerator {
         bundle: &BundleInfo,
         _engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         let steps = config.steps;
@@ -142,7 +142,7 @@ impl Services for QuickGenerator {
             gate.pass();
         }
         let chains = Arc::new(chains);
-        let one = |item: &Wanted<'_>| {
+        let one = |item: &GenerateInput<'_>| {
             // Three channels around one picture, as three-channel decoders give it.
             let mean = picture(item.difference, item.seed);
             let raw = RawPrediction { channels: [-0.02, 0.0, 0.02].map(|off| mean.map(|v| v + off)).to_vec() };

@@ -8,9 +8,9 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
-use touch2touch::app::workbench::{HandTry, Layer, PoseOf, SceneTool, WorkbenchCommand};
+use touch2touch::app::workbench::{Layer, ManualTry, PoseOf, SceneTool, WorkbenchCommand};
 use touch2touch_core::align::reason::Reason;
-use touch2touch_core::hand::{HandAxis, PoseDifference, STEP_M, STEP_RAD};
+use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::MaskStore;
@@ -66,7 +66,7 @@ impl Rig {
         self.settle();
     }
 
-    fn hand(&self) -> HandTry {
+    fn hand(&self) -> ManualTry {
         self.model().workbench.hand(MEASURED).expect("a pose in hand").clone()
     }
 
@@ -111,12 +111,12 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     assert_eq!(rig.model().workbench.tool, SceneTool::Pose);
     let began = rig.model().shown_pose(MEASURED).unwrap();
     for (modifiers, key, axis, by) in [
-        (Modifiers::NONE, Key::ArrowRight, HandAxis::Y, STEP_M),
-        (Modifiers::SHIFT, Key::ArrowLeft, HandAxis::Y, -10.0 * STEP_M),
-        (Modifiers::CTRL, Key::ArrowDown, HandAxis::Z, 0.1 * STEP_M),
-        (Modifiers::NONE, Key::ArrowUp, HandAxis::Z, -STEP_M),
-        (Modifiers::ALT, Key::ArrowRight, HandAxis::Theta, STEP_RAD),
-        (Modifiers::ALT | Modifiers::SHIFT, Key::ArrowLeft, HandAxis::Theta, -10.0 * STEP_RAD),
+        (Modifiers::NONE, Key::ArrowRight, PoseAxis::Y, STEP_M),
+        (Modifiers::SHIFT, Key::ArrowLeft, PoseAxis::Y, -10.0 * STEP_M),
+        (Modifiers::CTRL, Key::ArrowDown, PoseAxis::Z, 0.1 * STEP_M),
+        (Modifiers::NONE, Key::ArrowUp, PoseAxis::Z, -STEP_M),
+        (Modifiers::ALT, Key::ArrowRight, PoseAxis::Theta, STEP_RAD),
+        (Modifiers::ALT | Modifiers::SHIFT, Key::ArrowLeft, PoseAxis::Theta, -10.0 * STEP_RAD),
     ] {
         let before = rig.model().workbench.hand(MEASURED).map_or(began, |hand| hand.pose);
         rig.press(modifiers, key);
@@ -160,7 +160,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
 fn handles_move_and_turn_the_tool_and_not_the_view() {
     let Some(mut rig) = Rig::aligned() else { return };
     rig.press(Modifiers::NONE, Key::Z);
-    let began = rig.model().hand_begins(MEASURED);
+    let began = rig.model().manual_begins(MEASURED);
     let origin = rig.harness.state().on_screen(MEASURED, [began.x_m, began.planar.y_m, began.planar.z_m]).unwrap();
     rig.drag(origin, vec2(30.0, 18.0));
     let moved = rig.hand().pose;
@@ -179,10 +179,10 @@ fn handles_move_and_turn_the_tool_and_not_the_view() {
     rig.drag(corner, vec2(40.0, 0.0));
     assert_eq!(rig.hand().pose, turned);
     // Out of the plane only when asked for, and back again.
-    rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::X, 1e-3)));
+    rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::X, 1e-3)));
     assert!(rig.hand().pose.is_planar());
     rig.send(Action::SixDof.command(rig.model()).unwrap());
-    rig.send(Command::Workbench(WorkbenchCommand::Nudge(HandAxis::X, 1e-3)));
+    rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::X, 1e-3)));
     assert_eq!(rig.hand().pose.x_m, 1e-3);
     rig.shoot("test-six-dof");
     rig.send(Action::SixDof.command(rig.model()).unwrap());

@@ -24,7 +24,7 @@ use touch2touch_work::cloud::{clouds, contact_points};
 use touch2touch_work::imprint::{imprints_of, measured};
 use touch2touch_work::influence::influence;
 use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{HandMask, ImprintSource};
+use touch2touch_work::labels::{DrawnMask, ImprintSource};
 use touch2touch_work::mask::{MaskChoice, MaskInputs, MaskSource};
 use touch2touch_work::models::{Masking, Models};
 use touch2touch_work::pose::pose;
@@ -338,7 +338,7 @@ fn proposals(
         let masks = true_masks(from)?;
         each("carried from another grasp", &mut |pad, imprint| {
             let mut labels = touch2touch_work::labels::PairLabels::default();
-            let hand = masks[pad].clone().map(|mask| HandMask::new(mask, Provenance::Truth));
+            let hand = masks[pad].clone().map(|mask| DrawnMask::new(mask, Provenance::Truth));
             labels.draw(&touch2touch_work::labels::MaskPlace::measured(pad), hand);
             let to = Side { sample: &case.sample, pad, imprint };
             Ok(propose::carried_from_pair("another", (&from.sample, &labels), to)?.mask)
@@ -371,7 +371,7 @@ fn stroke(size: [usize; 2], radius_px: f32) -> Stroke {
     let [width, height] = size;
     let imprint = DepthMap::filled(width, height, 0.005);
     let (mut moves, mut ends, mut largest) = (Vec::new(), Vec::new(), 0.0f64);
-    let mut hand = HandMask::new(Mask::filled(width, height, false), Provenance::Nothing);
+    let mut hand = DrawnMask::new(Mask::filled(width, height, false), Provenance::Nothing);
     for stroke in 0..STROKES {
         let at = |i: usize| {
             let t = i as f32 / MOVES as f32;
@@ -424,7 +424,7 @@ fn follow(
             let pad = lab::PADS[stroke % lab::PADS.len()];
             let (Some(mask), Some(imprint_of_it)) = (masks.get_mut(pad), imprint(pad)) else { continue };
             size = Some(imprint_of_it.size());
-            let mut hand = HandMask::new(mask.clone(), Provenance::Nothing);
+            let mut hand = DrawnMask::new(mask.clone(), Provenance::Nothing);
             let mut touched = mask.map(|_| false);
             let Some(at) = edge(mask, stroke) else { continue };
             let paint = if stroke < STROKES_EACH / 2 { Paint::Contact } else { Paint::Free };

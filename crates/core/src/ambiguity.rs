@@ -27,7 +27,7 @@ const TOUCHED: f64 = 1.5;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ambiguity {
     /// What was found.
-    pub kind: Touch,
+    pub kind: TouchKind,
     /// The direction in which the picture changes least, radians in 0..π, from the image's x towards its y (down).
     pub direction_rad: f64,
     /// How much it changes when moved that way: 0 not at all, 1 nothing in common.
@@ -39,7 +39,7 @@ pub struct Ambiguity {
 /// Kinds of touches by what they tell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, strum::EnumIter)]
 #[serde(rename_all = "snake_case")]
-pub enum Touch {
+pub enum TouchKind {
     /// The picture tells where on the tool it is.
     Distinct,
     /// Nothing but parallel ridges: the position along them cannot be known.
@@ -52,21 +52,21 @@ impl Ambiguity {
     /// The warning, if one is due.
     pub fn warning(&self) -> Option<&'static str> {
         match self.kind {
-            Touch::Distinct => None,
-            Touch::BareShaft => Some(
+            TouchKind::Distinct => None,
+            TouchKind::BareShaft => Some(
                 "The gel shows a bare shaft: where along it the tool is held cannot be known from this image. What the \
                  prediction shows beyond the GelSlim's window is one of many possibilities.",
             ),
-            Touch::Nothing => Some("Nothing touches the gel: the prediction has nothing to go by."),
+            TouchKind::Nothing => Some("Nothing touches the gel: the prediction has nothing to go by."),
         }
     }
 
     /// A few words for beside a picture.
     pub fn caption(&self) -> Option<&'static str> {
         match self.kind {
-            Touch::Distinct => None,
-            Touch::BareShaft => Some("bare shaft: place along it unknown"),
-            Touch::Nothing => Some("nothing touches the gel"),
+            TouchKind::Distinct => None,
+            TouchKind::BareShaft => Some("bare shaft: place along it unknown"),
+            TouchKind::Nothing => Some("nothing touches the gel"),
         }
     }
 }
@@ -99,9 +99,9 @@ pub fn ambiguity(difference: &RgbGrid) -> Option<Ambiguity> {
         .map(|direction| (direction, change(direction)))
         .min_by(|a, b| a.1.total_cmp(&b.1))?;
     let kind = match () {
-        () if signal < TOUCHED => Touch::Nothing,
-        () if change <= UNCHANGED => Touch::BareShaft,
-        () => Touch::Distinct,
+        () if signal < TOUCHED => TouchKind::Nothing,
+        () if change <= UNCHANGED => TouchKind::BareShaft,
+        () => TouchKind::Distinct,
     };
     Some(Ambiguity { kind, direction_rad, change, signal })
 }

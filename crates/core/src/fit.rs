@@ -34,7 +34,7 @@ const GAIN_PRIOR: f64 = 0.1;
 
 /// A prediction with what was measured.
 #[derive(Clone, Copy, Debug)]
-pub struct Case<'a> {
+pub struct FitPair<'a> {
     /// What the generator drew, meters, at the decoder's size and in its orientation.
     pub prediction: &'a DepthMap,
     /// What was measured, likewise; where it is not finite nothing is learnt.
@@ -77,7 +77,7 @@ type Pixels = Vec<f64>;
 ///
 /// # Cost
 /// About 10 ms per pair of 128 x 128 pixels, and 16 bytes per pixel and pair.
-pub fn closed_form(cases: &[Case<'_>], pads: usize) -> Result<Vec<Option<Correction>>, FitError> {
+pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Correction>>, FitError> {
     let size = check(cases)?;
     let offsets = offsets(cases, pads);
     // Everything after the offset, before the line is known.
@@ -128,7 +128,7 @@ pub fn closed_form(cases: &[Case<'_>], pads: usize) -> Result<Vec<Option<Correct
     Ok(found)
 }
 
-fn check(cases: &[Case<'_>]) -> Result<[usize; 2], FitError> {
+fn check(cases: &[FitPair<'_>]) -> Result<[usize; 2], FitError> {
     let expected = cases.first().ok_or(FitError::NoPairs)?.prediction.size();
     for (case, one) in cases.iter().enumerate() {
         for found in [one.prediction.size(), one.target.size()] {

@@ -38,7 +38,7 @@ pub use morphology::{fill_holes, grow, islands, largest_island, shrink};
 pub use packed::{PackError, PackedMask};
 pub use paint::Paint;
 pub use provenance::{CadPose, Provenance};
-pub use sight::{Layers, Seen, Sight};
+pub use sight::{Layers, Sight, VisiblePixels};
 
 /// A rectangle of pixels; `x`, `y` is its top-left one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

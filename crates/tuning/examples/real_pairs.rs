@@ -119,7 +119,7 @@ fn cpu_seconds() -> f64 {
 }
 
 /// What is asked for on the command line.
-struct Asked {
+struct Options {
     config: Config,
     folds: usize,
     only: Option<usize>,
@@ -130,7 +130,7 @@ struct Asked {
     simtest: Vec<Pair>,
 }
 
-fn asked() -> Outcome<Asked> {
+fn asked() -> Outcome<Options> {
     let mut words = std::env::args().skip(1);
     let folder = words.next().ok_or("say which folder the pairs are in")?;
     let named: BTreeMap<String, String> = words
@@ -152,7 +152,7 @@ fn asked() -> Outcome<Asked> {
         threads: named.get("threads").map(|value| value.parse()).transpose()?,
         ..Config::default()
     };
-    Ok(Asked {
+    Ok(Options {
         config,
         folds: number("folds", 3.0)? as usize,
         only: named.get("only").map(|value| value.parse()).transpose()?,
@@ -165,7 +165,7 @@ fn asked() -> Outcome<Asked> {
 }
 
 fn main() -> Outcome<()> {
-    let Asked { config, folds, only, sampler, closed, real, sim, simtest } = asked()?;
+    let Options { config, folds, only, sampler, closed, real, sim, simtest } = asked()?;
     let mut sums = [[0.0; 3]; 4];
     let run: Vec<usize> = (0..folds.max(1)).filter(|fold| only.is_none_or(|only| only == *fold)).collect();
     for &fold in &run {

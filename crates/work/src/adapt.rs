@@ -27,7 +27,7 @@ use crate::io::memory::peak_mib;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::fit::{FitError, FitSource, Fitted, PadFit, closed_form, doubts, folds, left_out};
 use touch2touch_core::grid::{DepthMap, Grid};
-use touch2touch_core::lattice::template;
+use touch2touch_core::markers::template;
 use touch2touch_core::postprocess::Correction;
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::Scale;
@@ -38,7 +38,7 @@ pub use super::tuning::Tuning;
 pub(crate) use adapted::MOST_SHOWN;
 pub(crate) use adapted::PadSummary;
 pub use adapted::{Adapted, HeldBack};
-use gather::{Touch, gather};
+use gather::{FitTouch, gather};
 pub use score::Scored;
 #[cfg(feature = "tune")]
 use tune::tune;
@@ -103,7 +103,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     }
     cx.progress(0, 0, "fitting");
     let fitting = Instant::now();
-    let cases: Vec<_> = touches.iter().map(Touch::case).collect();
+    let cases: Vec<_> = touches.iter().map(FitTouch::case).collect();
     let pads = dataset.rig.pads().len();
     let mut corrections = closed_form(&cases, pads).map_err(fail)?;
     let fit_seconds = fitting.elapsed().as_secs_f64();
@@ -196,7 +196,7 @@ fn references(pictures: &[Option<DepthMap>]) -> Vec<Option<&DepthMap>> {
     pictures.iter().map(Option::as_ref).collect()
 }
 
-fn shown(touch: &Touch, after: &DepthMap) -> HeldBack {
+fn shown(touch: &FitTouch, after: &DepthMap) -> HeldBack {
     HeldBack {
         pair: touch.id,
         name: touch.name.clone(),
@@ -267,7 +267,7 @@ struct Tuned {
 fn tune(
     _: &AdaptSetup,
     _: Tuning,
-    _: &[Touch],
+    _: &[FitTouch],
     _: &[Option<Correction>],
     _: &[usize],
     _: &Rig,
@@ -276,7 +276,7 @@ fn tune(
     Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Fit in closed form."))
 }
 
-fn source(dataset: &Dataset, bundle: &BundleInfo, touches: &[Touch]) -> FitSource {
+fn source(dataset: &Dataset, bundle: &BundleInfo, touches: &[FitTouch]) -> FitSource {
     let mut pairs: Vec<String> = touches.iter().map(|t| t.name.clone()).collect();
     pairs.dedup();
     let mut pictures: Vec<String> = touches.iter().map(|t| input_digest(&t.picture)[..DIGITS].to_owned()).collect();
@@ -294,7 +294,7 @@ fn source(dataset: &Dataset, bundle: &BundleInfo, touches: &[Touch]) -> FitSourc
 }
 
 /// The corrections with what the lattice of each pad looks like, where pictures were fitted.
-fn summaries(fitted: &Fitted, touches: &[Touch], rig: &Rig) -> Vec<PadSummary> {
+fn summaries(fitted: &Fitted, touches: &[FitTouch], rig: &Rig) -> Vec<PadSummary> {
     let summary = fitted.pads.entries().map(|(pad, fit)| PadSummary {
         pad: rig.pad_key(pad).into_owned(),
         touches: touches.iter().filter(|t| t.pad == pad).count(),
@@ -305,7 +305,7 @@ fn summaries(fitted: &Fitted, touches: &[Touch], rig: &Rig) -> Vec<PadSummary> {
     summary.collect()
 }
 
-fn with_lattices(touches: &[Touch], corrections: Vec<Option<Correction>>) -> PerPad<PadFit> {
+fn with_lattices(touches: &[FitTouch], corrections: Vec<Option<Correction>>) -> PerPad<PadFit> {
     let with = |(pad, correction): (usize, Option<Correction>)| {
         let own = touches.iter().filter(|t| t.pad.index() == pad && t.scale == Scale::Assumed);
         let signatures: Vec<&Grid<f32>> = own.filter_map(|t| t.signature.as_ref()).collect();
@@ -314,7 +314,7 @@ fn with_lattices(touches: &[Touch], corrections: Vec<Option<Correction>>) -> Per
     corrections.into_iter().enumerate().map(with).collect()
 }
 
-fn remark(touches: &[Touch], doubt: &touch2touch_core::fit::Doubt) -> Remark {
+fn remark(touches: &[FitTouch], doubt: &touch2touch_core::fit::Doubt) -> Remark {
     let mut why = format!(
         "the others expect something else: off by {:.2} mm where half of the pairs are off by less than {:.2} mm",
         doubt.residual_m * 1e3,

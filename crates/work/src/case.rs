@@ -12,7 +12,8 @@ use super::error::TaskError;
 use super::feel::{Touch, feel};
 use super::job::JobCx;
 use super::labels::{
-    Deed, HandMask, ImprintOf, ImprintSource, Labels, MaskPlace, PairLabels, Review, by_imprint, note, of_imprints,
+    DrawnMask, ImprintOf, ImprintSource, Labels, MaskPlace, Operation, PairLabels, Review, by_imprint, note,
+    of_imprints,
 };
 use super::models::Models;
 use super::recipe::{Model, ModelName, Recipe, Stage};
@@ -27,8 +28,8 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::PackedMask;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units::{angle_error, mm};
@@ -173,7 +174,7 @@ fn mask_hash(mask: &Mask) -> String {
 
 impl CaseLabels {
     fn of(labels: &PairLabels) -> Self {
-        let mask = |(place, hand): (&MaskPlace, &HandMask)| CaseMask {
+        let mask = |(place, hand): (&MaskPlace, &DrawnMask)| CaseMask {
             finger: place.pad,
             of: place.of.clone(),
             mask: hand.pack(),
@@ -195,7 +196,7 @@ impl CaseLabels {
         };
         for mask in &self.masks {
             let hand =
-                HandMask::unpack(&mask.mask, Default::default()).map_err(|err| TaskError::from_error(WHAT, &err))?;
+                DrawnMask::unpack(&mask.mask, Default::default()).map_err(|err| TaskError::from_error(WHAT, &err))?;
             if mask.finger.index() >= 16 {
                 return Err(TaskError::new(WHAT, "it has a mask of a finger that no gripper has"));
             }
@@ -430,7 +431,7 @@ impl OpenedCase {
         if self.labels.is_empty() || !store.load(&self.case.pair)?.is_empty() {
             return Ok(());
         }
-        store.save(&self.case.pair, &self.labels, &Deed::named("opened with a case")).map(drop)
+        store.save(&self.case.pair, &self.labels, &Operation::named("opened with a case")).map(drop)
     }
 }
 
@@ -528,7 +529,7 @@ mod tests {
 
     fn drawn() -> PairLabels {
         let mask = Mask::from_fn(175, 140, |x, y| (60..110).contains(&x) && (40..90).contains(&y));
-        let hand = HandMask::new(mask, Provenance::Threshold { min_m: 0.005 });
+        let hand = DrawnMask::new(mask, Provenance::Threshold { min_m: 0.005 });
         let masks = [(MaskPlace::measured(lab::RIGHT), hand)].into();
         PairLabels { masks, review: Review::Flagged, ..PairLabels::default() }
     }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use super::error::TaskError;
 use touch2touch_core::cloud;
 use touch2touch_core::grid::{DepthMap, Mask};
-use touch2touch_core::label::{Seen, Sight};
+use touch2touch_core::label::{Sight, VisiblePixels};
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::{DepthCamera, Sample};
 
@@ -122,7 +122,12 @@ pub fn contact_points(
 ///
 /// # Errors
 /// If the finger has no imprint or no camera, or as [`finger_cloud`].
-pub fn seen(sample: &Sample, imprints: &PerPad<&DepthMap>, pad: PadId, sight: &Sight) -> Result<Seen, TaskError> {
+pub fn seen(
+    sample: &Sample,
+    imprints: &PerPad<&DepthMap>,
+    pad: PadId,
+    sight: &Sight,
+) -> Result<VisiblePixels, TaskError> {
     const WHAT: &str = "Draw in 3D";
     let mut lifted = PerPad::default();
     for other in sample.rig.pads() {
@@ -142,7 +147,7 @@ pub fn seen(sample: &Sample, imprints: &PerPad<&DepthMap>, pad: PadId, sight: &S
     let own = lifted[pad].as_ref().ok_or_else(lacks)?;
     let others: Vec<&[DVec3]> =
         lifted.entries().filter(|(other, _)| *other != pad).map(|(_, points)| points.points.as_slice()).collect();
-    Ok(Seen::new(sight, (&own.points, &own.pixels), &others))
+    Ok(VisiblePixels::new(sight, (&own.points, &own.pixels), &others))
 }
 
 #[cfg(test)]

@@ -31,7 +31,7 @@ impl Deviation {
 
 /// How far the points of a cloud lie from another of the same cameras.
 #[derive(Clone, Debug)]
-pub struct Apart {
+pub struct CloudDifference {
     /// Of each point, in the order of the first cloud, meters: positive where its imprint is the deeper one; NaN of a
     /// finger that the other cloud lacks.
     pub points: PerPad<Vec<f32>>,
@@ -39,7 +39,7 @@ pub struct Apart {
     pub contact_rms_m: f64,
 }
 
-impl Apart {
+impl CloudDifference {
     /// Bytes held.
     pub fn bytes(&self) -> usize {
         4 * self.points.iter().flatten().map(Vec::len).sum::<usize>()
@@ -48,7 +48,7 @@ impl Apart {
 
 /// Measures the points of `a` against those of `b`. `imprints` are those that the two clouds were made of: they say which
 /// is deeper.
-pub fn apart(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> Apart {
+pub fn cloud_difference(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> CloudDifference {
     let (mut squares, mut count) = (0.0, 0usize);
     let mut points = PerPad::default();
     for (pad, cloud) in a.fingers.entries() {
@@ -67,7 +67,7 @@ pub fn apart(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> Apart
         }
         points[pad] = Some(found);
     }
-    Apart { points, contact_rms_m: if count == 0 { f64::NAN } else { (squares / count as f64).sqrt() } }
+    CloudDifference { points, contact_rms_m: if count == 0 { f64::NAN } else { (squares / count as f64).sqrt() } }
 }
 
 /// Measures the contact points of both fingers against the model at a pose.

@@ -23,7 +23,7 @@ use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::mask::MaskChoice;
 use crate::models;
-use kept::Kept;
+use kept::KeptScores;
 use methods::Models;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
@@ -159,7 +159,7 @@ pub fn evaluate(
     if total == 0 {
         return Err(TaskError::new(WHAT, "the data set has no pairs"));
     }
-    let book = Kept::open(dataset, setup, &models, &sheets, &work, false);
+    let book = KeptScores::open(dataset, setup, &models, &sheets, &work, false);
     let missing = |tool: &ToolWork| ToolWork {
         tool: tool.tool.clone(),
         ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
@@ -252,7 +252,7 @@ pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Resul
     let (all, sheets) = (models, models.sheets().clone());
     let models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
-    let book = Kept::open(dataset, setup, &models, &sheets, &work, true);
+    let book = KeptScores::open(dataset, setup, &models, &sheets, &work, true);
     let mut scores = models.empty_scores();
     for (at, scores) in scores.iter_mut().enumerate() {
         let mut entries: Vec<_> = work.iter().flat_map(|tool| book.of(at, &tool.ids)).collect();

@@ -9,7 +9,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
 use super::job::JobCx;
-use super::labels::{HandMask, Labels, PairLabels, Review};
+use super::labels::{DrawnMask, Labels, PairLabels, Review};
 use crate::io::dataset::Dataset;
 use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure, PARTS};
 use touch2touch_core::dataset::{PairId, Split};
@@ -23,14 +23,14 @@ const WHAT: &str = "Export masks";
 
 /// The masks drawn by hand on measured imprints: those on the disk, and over them what was changed since.
 #[derive(Clone, Copy, Debug)]
-pub struct HandMasks<'a> {
+pub struct DrawnMasks<'a> {
     /// What is stored.
     pub labels: &'a Labels,
     /// What is newer, by pair name.
     pub changed: &'a BTreeMap<String, PairLabels>,
 }
 
-impl HandMasks<'_> {
+impl DrawnMasks<'_> {
     /// The pairs and fingers that have one.
     pub(super) fn all(&self, rig: &Rig) -> BTreeSet<(String, PadId)> {
         let mut all: BTreeSet<(String, PadId)> = self.labels.masks().into_iter().collect();
@@ -52,7 +52,7 @@ impl HandMasks<'_> {
     }
 
     /// The mask of one finger, if it has one.
-    fn get(&self, pair: &str, finger: PadId) -> Result<Option<HandMask>, TaskError> {
+    fn get(&self, pair: &str, finger: PadId) -> Result<Option<DrawnMask>, TaskError> {
         Ok(self.of_pair(pair)?.measured(finger).cloned())
     }
 
@@ -94,7 +94,7 @@ pub struct ExportChoice {
     /// Whether all pairs of a tool go to the same part.
     pub by_tool: bool,
     /// Whether only pixels that a person painted count; all others are ignored.
-    pub hand_checked: bool,
+    pub manual_checked: bool,
     /// Decides which pair lands in which part.
     pub seed: u64,
     /// In which form.
@@ -191,7 +191,7 @@ fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
 ///
 /// # Errors
 /// If the masks cannot be divided.
-pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, setup: &ExportSetup) -> Result<Plan, TaskError> {
+pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, setup: &ExportSetup) -> Result<Plan, TaskError> {
     let choice = setup.choice;
     let (drawn, reviews) = (masks.all(&dataset.rig), masks.reviews());
     let all = || (0..dataset.index.pairs.len() as u32).map(PairId).collect::<Vec<_>>();
@@ -239,7 +239,7 @@ pub type Automatic<'a> = &'a mut dyn FnMut(PairId, &Sample, PadId, Option<&str>)
 /// was.
 pub fn export_masks(
     dataset: &Dataset,
-    masks: &HandMasks<'_>,
+    masks: &DrawnMasks<'_>,
     setup: &ExportSetup,
     folder: &Path,
     mut automatic: Option<Automatic<'_>>,
@@ -277,10 +277,10 @@ pub fn export_masks(
             false => None,
         };
         let (mask, ignored) = match (by_hand, automatic.as_mut()) {
-            (Some(hand), _) => ((*hand.mask).clone(), hand.unsaid(setup.choice.hand_checked)),
+            (Some(hand), _) => ((*hand.mask).clone(), hand.unsaid(setup.choice.manual_checked)),
             (None, Some(automatic)) => {
                 let mask = automatic(plan.ids[at], &sample, entry.finger, entry.tool.as_deref())?;
-                let unsaid = setup.choice.hand_checked.then(|| mask.map(|_| true));
+                let unsaid = setup.choice.manual_checked.then(|| mask.map(|_| true));
                 (mask, unsaid)
             }
             (None, None) => return Err(TaskError::new(WHAT, "its mask disappeared").into()),

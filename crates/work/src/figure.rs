@@ -18,7 +18,7 @@ use super::prediction::{Prediction, made_with};
 use crate::io::atomic;
 use crate::io::dataset::Dataset;
 use crate::io::images;
-use sheet::Sheet;
+use sheet::FigureLayout;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -236,7 +236,7 @@ struct Row {
 /// A figure, ready to be written.
 #[derive(Debug)]
 pub struct Figure {
-    sheet: Sheet,
+    sheet: FigureLayout,
     /// Rows drawn.
     pub rows: usize,
     /// What each row is of: pair and finger.
@@ -302,7 +302,7 @@ pub fn figure(
     look.check(rows.len(), &dataset.rig)?;
     let of = rows.iter().map(|row| [row.name.clone(), row.finger.clone()]).collect();
     let count = rows.len();
-    Ok(Figure { sheet: Sheet::new(look.clone(), &rows, &setup.note, &dataset.rig), rows: count, of })
+    Ok(Figure { sheet: FigureLayout::new(look.clone(), &rows, &setup.note, &dataset.rig), rows: count, of })
 }
 
 /// One picture, in the colors and the orientation of its pane.

@@ -9,7 +9,7 @@ use serde::Serialize;
 use super::error::{Remark, TaskError};
 use super::imprint::measured;
 use super::job::JobCx;
-use super::labels::{Deed, HandMask, Labels, MaskPlace, PairLabels};
+use super::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels};
 use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use crate::io::exchange::{self, ExportEntry, Format, Listed, ReadError, Stems};
@@ -30,7 +30,7 @@ pub struct ImportSetup {
     /// Its form; `None` = the one that lies there.
     pub format: Option<Format>,
     /// Whether what was painted by hand is replaced as well, also of pairs that somebody judged.
-    pub over_hand: bool,
+    pub over_drawn: bool,
     /// Who asked; else whom the system says.
     pub person: Option<String>,
 }
@@ -109,7 +109,7 @@ pub fn plan_import(dataset: &Dataset, setup: &ImportSetup, cx: &JobCx) -> Result
     go(dataset, setup, false, cx)
 }
 
-/// Takes masks over. What a person painted stays and so do judged pairs, unless `over_hand`; review states stay in any case.
+/// Takes masks over. What a person painted stays and so do judged pairs, unless `over_drawn`; review states stay in any case.
 /// Each pair's change is a line of its journal, which undo takes back. Stops early when told to.
 ///
 /// # Errors
@@ -138,7 +138,7 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
         }
         let Some(entry) = dataset.index.get(pair) else { continue };
         cx.progress(done as u64, total, &entry.name);
-        let job = Job { dataset, labels: &labels, setup, write };
+        let job = ImportRun { dataset, labels: &labels, setup, write };
         let one = caught(|| job.one((pair, &entry.name), &masks, &mut found));
         if let Err(err) = one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
             found.refused.push(Remark { name: entry.name.clone(), why: err.why });
@@ -199,14 +199,14 @@ fn matched<'a>(
 
 /// What is the same for all pairs.
 #[derive(Clone, Copy)]
-struct Job<'a> {
+struct ImportRun<'a> {
     dataset: &'a Dataset,
     labels: &'a Labels,
     setup: &'a ImportSetup,
     write: bool,
 }
 
-impl Job<'_> {
+impl ImportRun<'_> {
     fn one(
         self,
         (pair, name): (PairId, &str),
@@ -216,7 +216,7 @@ impl Job<'_> {
         let mut stored = self.labels.load(name)?;
         let sample = self.dataset.load(pair).map_err(|err| TaskError::from_error(WHAT, &err))?;
         let imprints = measured(&sample);
-        let judged = stored.review.is_judged() && !self.setup.over_hand;
+        let judged = stored.review.is_judged() && !self.setup.over_drawn;
         // Counted only once the whole pair is saved.
         let (mut here, mut how) = (Import::default(), Vec::new());
         for (&pad, listed) in masks {
@@ -227,8 +227,8 @@ impl Job<'_> {
         }
         if !how.is_empty() {
             if self.write {
-                let how = Some(serde_json::json!({ "files": how, "over_hand": self.setup.over_hand }));
-                let deed = Deed { person: self.setup.person.clone(), how, ..Deed::named("import of masks") };
+                let how = Some(serde_json::json!({ "files": how, "over_drawn": self.setup.over_drawn }));
+                let deed = Operation { person: self.setup.person.clone(), how, ..Operation::named("import of masks") };
                 self.labels.save(name, &stored, &deed)?;
             }
             found.changed.push(name.to_owned());
@@ -269,9 +269,9 @@ impl Job<'_> {
         }
         let mut hand = match old {
             Some(old) => old.clone(),
-            None => HandMask::new(Mask::filled(size[0], size[1], false), by.clone()),
+            None => DrawnMask::new(Mask::filled(size[0], size[1], false), by.clone()),
         };
-        let [changed, kept] = hand.take_over(&mask, ignored.as_ref(), by, !self.setup.over_hand);
+        let [changed, kept] = hand.take_over(&mask, ignored.as_ref(), by, !self.setup.over_drawn);
         match (old.is_some(), changed, kept) {
             (true, 0, 0) => counts.same += 1,
             _ if judged => counts.judged += 1,

@@ -20,6 +20,6 @@ mod library;
 pub mod mask;
 mod onnx_header;
 pub mod runtime;
+pub mod sandbox;
 pub mod sheets;
 pub mod store;
-pub mod trial;

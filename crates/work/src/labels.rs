@@ -8,7 +8,7 @@ mod recovery;
 mod stored;
 
 pub(crate) use accepted::{by_imprint, of_imprints};
-pub use journal::{Act, Change, Deed, Past, Told};
+pub use journal::{Act, Change, JournalHistory, Operation, Past};
 #[cfg(test)]
 pub(crate) use record::MaskRecord;
 pub use record::Record;
@@ -27,8 +27,8 @@ use crate::io::masks;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{DepthMap, Mask};
-use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance, merge};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
@@ -218,7 +218,7 @@ pub struct Revision(pub u64);
 
 /// A mask that a person corrected.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HandMask {
+pub struct DrawnMask {
     /// The contact, in raw bubble orientation, as large as the imprint.
     pub mask: Arc<Mask>,
     /// Where each pixel comes from, and which are ignored.
@@ -227,7 +227,7 @@ pub struct HandMask {
     pub revision: Revision,
 }
 
-impl HandMask {
+impl DrawnMask {
     /// A mask whose pixels are all of one provenance.
     pub fn new(mask: impl Into<Arc<Mask>>, from: Provenance) -> Self {
         let mask = mask.into();
@@ -240,13 +240,13 @@ impl HandMask {
         self.marks.base().text()
     }
 
-    /// The pixels of which it says nothing: those that are ignored, and with `hand_checked` all that no person painted.
-    pub fn unsaid(&self, hand_checked: bool) -> Option<Mask> {
+    /// The pixels of which it says nothing: those that are ignored, and with `manual_checked` all that no person painted.
+    pub fn unsaid(&self, manual_checked: bool) -> Option<Mask> {
         let ignored = self.marks.ignored();
-        if !hand_checked {
+        if !manual_checked {
             return ignored.cloned();
         }
-        let checked = self.marks.hand_checked();
+        let checked = self.marks.manual_checked();
         let (width, height) = (checked.width(), checked.height());
         Some(Mask::from_fn(width, height, |x, y| !checked[(x, y)] || self.marks.is_ignored(x, y)))
     }
@@ -274,14 +274,14 @@ impl HandMask {
     }
 
     /// Takes another mask's pixels over where they differ; see [`Marks::replace`].
-    pub fn replace(&mut self, new: &Mask, by: Provenance, keep_hand: bool) -> bool {
-        Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_hand)
+    pub fn replace(&mut self, new: &Mask, by: Provenance, keep_manual: bool) -> bool {
+        Arc::make_mut(&mut self.marks).replace(Arc::make_mut(&mut self.mask), new, by, keep_manual)
     }
 
     /// Takes another mask over with what it ignores; see [`Marks::take_over`].
-    pub fn take_over(&mut self, new: &Mask, ignored: Option<&Mask>, by: Provenance, keep_hand: bool) -> [usize; 2] {
+    pub fn take_over(&mut self, new: &Mask, ignored: Option<&Mask>, by: Provenance, keep_manual: bool) -> [usize; 2] {
         let (mask, marks) = (Arc::make_mut(&mut self.mask), Arc::make_mut(&mut self.marks));
-        marks.take_over(mask, new, ignored, by, keep_hand)
+        marks.take_over(mask, new, ignored, by, keep_manual)
     }
 
     /// Cleans it up; whether anything changed. Sizes are those of the rig's depth images.
@@ -340,7 +340,7 @@ pub fn system_person() -> Option<String> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairLabels {
     /// Corrected masks.
-    pub masks: BTreeMap<MaskPlace, HandMask>,
+    pub masks: BTreeMap<MaskPlace, DrawnMask>,
     /// The review state.
     pub review: Review,
     /// Accepted `grasp_from_object` poses, by the imprint that they were made from.
@@ -377,17 +377,17 @@ impl PairLabels {
     }
 
     /// The mask drawn by hand on the measured imprint of a pad.
-    pub fn measured(&self, pad: PadId) -> Option<&HandMask> {
+    pub fn measured(&self, pad: PadId) -> Option<&DrawnMask> {
         self.masks.get(&MaskPlace::measured(pad))
     }
 
     /// The mask drawn by hand on an imprint, if it is as large.
-    pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&HandMask> {
+    pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&DrawnMask> {
         self.masks.get(place).filter(|hand| hand.mask.size() == imprint.size())
     }
 
     /// Puts a mask in its place, or takes it away; returns what was there.
-    pub fn put(&mut self, place: &MaskPlace, mask: Option<HandMask>) -> Option<HandMask> {
+    pub fn put(&mut self, place: &MaskPlace, mask: Option<DrawnMask>) -> Option<DrawnMask> {
         match mask {
             Some(mask) => self.masks.insert(place.clone(), mask),
             None => self.masks.remove(place),
@@ -395,7 +395,7 @@ impl PairLabels {
     }
 
     /// Corrects a mask, or takes the correction back; the pair counts as begun.
-    pub fn draw(&mut self, place: &MaskPlace, mask: Option<HandMask>) {
+    pub fn draw(&mut self, place: &MaskPlace, mask: Option<DrawnMask>) {
         self.put(place, mask);
         if self.review == Review::Todo {
             self.review = Review::InProgress;

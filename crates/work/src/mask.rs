@@ -11,7 +11,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::cloud::{Clouds, clouds, contact_points};
 use super::error::TaskError;
-use super::labels::{HandMask, ImprintOf, MaskPlace, PairLabels};
+use super::labels::{DrawnMask, ImprintOf, MaskPlace, PairLabels};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::contact::{self, ContactMask, LAB_CAD_DISTANCE_M, MaskBasis};
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -222,7 +222,7 @@ impl<'a> MaskInputs<'a> {
     }
 
     /// The mask that a person drew on this imprint of a pad.
-    fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a HandMask> {
+    fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a DrawnMask> {
         self.labels?.drawn(&MaskPlace { pad, of: self.of?.clone() }, imprint)
     }
 }
@@ -374,7 +374,7 @@ mod tests {
         let imprint = DepthMap::from_fn(175, 140, |x, _| if x < 60 { 0.008 } else { 0.0 });
         let sample = Sample::default();
         let drawn = Mask::from_fn(175, 140, |x, _| x > 170);
-        let hand = HandMask::new(drawn.clone(), Provenance::Nothing);
+        let hand = DrawnMask::new(drawn.clone(), Provenance::Nothing);
         let mut labels = PairLabels::default();
         labels.draw(&MaskPlace::measured(lab::LEFT), Some(hand));
         let inputs = MaskInputs::measured(&sample, None, Some(&labels));

@@ -33,7 +33,7 @@ const LISTED: usize = 16;
 
 /// A prediction to be made.
 #[derive(Clone, Copy, Debug)]
-pub struct Wanted<'a> {
+pub struct GenerateInput<'a> {
     /// The condition: [`touch2touch_core::sample::PadTouch::picture`] of the sensor that the bundle starts from.
     pub difference: &'a RgbGrid,
     /// Seed of its noise.
@@ -64,7 +64,7 @@ pub struct Models {
     sheets: Arc<Sheets>,
     generator: Mutex<Loaded<Generator>>,
     mask_model: Mutex<Loaded<MaskModel>>,
-    ways: Mutex<BTreeMap<Arc<str>, Ways>>,
+    outputs: Mutex<BTreeMap<Arc<str>, OutputChains>>,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -89,16 +89,16 @@ fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
 
 /// What becomes of a bundle's pictures: ways to meters, steps to a color picture, and how large its condition is.
 #[derive(Clone, Debug, Default)]
-struct Ways {
+struct OutputChains {
     chains: Chains,
     fit: Option<Arc<Fitted>>,
     color: Option<ColorChain>,
     input: [usize; 2],
 }
 
-fn ways_of(spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> Ways {
+fn output_chains_of(spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
     let chain = |mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()));
-    Ways {
+    OutputChains {
         chains: Arc::new(ShiftMode::iter().map(chain).collect()),
         fit: fit.cloned(),
         color: spec.color_chain(),
@@ -162,20 +162,20 @@ impl Models {
     /// # Errors
     /// If the bundle cannot be opened.
     pub fn chains(&self, bundle: &BundleInfo) -> Result<Chains, TaskError> {
-        Ok(self.ways(bundle)?.chains)
+        Ok(self.outputs(bundle)?.chains)
     }
 
-    fn ways(&self, bundle: &BundleInfo) -> Result<Ways, TaskError> {
-        if let Some(known) = lock(&self.ways).get(&bundle.id) {
+    fn outputs(&self, bundle: &BundleInfo) -> Result<OutputChains, TaskError> {
+        if let Some(known) = lock(&self.outputs).get(&bundle.id) {
             return Ok(known.clone());
         }
         let opened = bundle.open(&format!("Open {}", bundle.name))?;
-        Ok(opened.generator().map(|spec| self.ways_to(bundle, spec, opened.fit())).unwrap_or_default())
+        Ok(opened.generator().map(|spec| self.output_chains_by(bundle, spec, opened.fit())).unwrap_or_default())
     }
 
     /// The same of a bundle that is open already.
-    fn ways_to(&self, bundle: &BundleInfo, spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> Ways {
-        lock(&self.ways).entry(bundle.id.clone()).or_insert_with(|| ways_of(spec, fit)).clone()
+    fn output_chains_by(&self, bundle: &BundleInfo, spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
+        lock(&self.outputs).entry(bundle.id.clone()).or_insert_with(|| output_chains_of(spec, fit)).clone()
     }
 
     /// Predictions; one answer for each, in order. What was made before is not made
@@ -188,7 +188,7 @@ impl Models {
         bundle: &BundleInfo,
         engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
@@ -201,15 +201,15 @@ impl Models {
         bundle: &BundleInfo,
         engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Option<Vec<Result<Prediction, TaskError>>> {
         let what = || format!("Generate with {}", bundle.name);
-        let run = |wanted: &[Wanted<'_>]| {
+        let run = |wanted: &[GenerateInput<'_>]| {
             let predict = || self.predict(bundle, engine, config, wanted, cx);
             caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
         };
-        let one = |wanted: &Wanted<'_>| {
+        let one = |wanted: &GenerateInput<'_>| {
             let made = run(std::slice::from_ref(wanted))?.pop();
             made.ok_or_else(|| TaskError::new(what(), "the generator gave no prediction"))
         };
@@ -227,7 +227,7 @@ impl Models {
         bundle: &BundleInfo,
         engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         let what = format!("Generate with {}", bundle.name);
@@ -244,7 +244,7 @@ impl Models {
         let mut keys = Vec::new();
         if let Some(store) = store {
             let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
-            let recipe = |(item, at): (&Wanted<'_>, &usize)| {
+            let recipe = |(item, at): (&GenerateInput<'_>, &usize)| {
                 let config = GenerateConfig { seed: item.seed, ..*config };
                 KeptKey::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
             };
@@ -255,9 +255,9 @@ impl Models {
             }
         }
         let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
-        let Ways { chains, fit, color, .. } = if fresh.is_empty() {
+        let OutputChains { chains, fit, color, .. } = if fresh.is_empty() {
             // Nothing has to be loaded to show what is there.
-            self.ways(bundle)?
+            self.outputs(bundle)?
         } else {
             outside_of_pools(|| {
                 let mut loaded = lock(&self.generator);
@@ -265,11 +265,11 @@ impl Models {
                     cx.progress(0, config.steps.into(), "loading the model");
                     open_generator(bundle, engine)
                 })?;
-                let ways = self.ways_to(bundle, generator.spec(), generator.fit());
+                let outputs = self.output_chains_by(bundle, generator.spec(), generator.fit());
                 let begin = std::time::Instant::now();
                 let items: Vec<Item> =
                     fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
-                let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &ways.chains };
+                let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &outputs.chains };
                 let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
                 let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
                 for (&at, raw) in fresh.iter().zip(made) {
@@ -280,7 +280,7 @@ impl Models {
                     }
                     answers[at] = Some((raw, each, false));
                 }
-                Ok::<_, TaskError>(ways)
+                Ok::<_, TaskError>(outputs)
             })?
         };
         let prediction = |(raw, seconds, kept)| Prediction {
@@ -323,10 +323,10 @@ impl Models {
         engine: EngineChoice,
         config: &GenerateConfig,
     ) -> Result<Prediction, TaskError> {
-        let [width, height] = self.ways(bundle)?.input;
+        let [width, height] = self.outputs(bundle)?.input;
         let blank = RgbGrid::filled(width, height, [0.0; 3]);
         // Both fingers of a grasp go through the model together.
-        let item = |seed| Wanted { difference: &blank, seed, size: [0, 0] };
+        let item = |seed| GenerateInput { difference: &blank, seed, size: [0, 0] };
         let both = [item(config.seed), item(config.seed.wrapping_add(1))];
         let made = self.make(None, bundle, engine, config, &both, &JobCx::unwatched())?.pop();
         made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model gave no answer"))
@@ -342,7 +342,7 @@ impl Models {
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
             let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
-            let Ok(Ways { chains, fit, color, .. }) = self.ways(bundle) else { continue };
+            let Ok(OutputChains { chains, fit, color, .. }) = self.outputs(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
                 EngineKind::Rten => EngineChoice::Rten,
@@ -493,7 +493,7 @@ fn no_mask_model() -> TaskError {
 
 /// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is
 /// whose.
-fn distinct<'a>(wanted: &[Wanted<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) {
+fn distinct<'a>(wanted: &[GenerateInput<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) {
     let mut images: Vec<&RgbGrid> = Vec::new();
     let mut of = |difference: &'a RgbGrid| match images.iter().position(|known| std::ptr::eq(*known, difference)) {
         Some(at) => at,
@@ -509,7 +509,7 @@ fn distinct<'a>(wanted: &[Wanted<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) {
 /// Progress, Cancel and previews of a run.
 struct Follow<'a> {
     cx: &'a JobCx,
-    wanted: &'a [Wanted<'a>],
+    wanted: &'a [GenerateInput<'a>],
     /// Which of them are made.
     fresh: &'a [usize],
     chains: &'a Chains,

@@ -5,7 +5,7 @@ use std::borrow::Cow;
 use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::job::JobCx;
-use super::models::{Models, Wanted};
+use super::models::{GenerateInput, Models};
 use super::prediction::Prediction;
 use crate::infer::engine::EngineChoice;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -69,7 +69,7 @@ impl Generating<'_> {
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         let picture = self.picture(sample, pad)?.ok_or_else(|| self.no_input(&sample.rig))?;
-        let wanted = |&seed: &u64| Wanted { difference: &picture, seed, size: [0, 0] };
+        let wanted = |&seed: &u64| GenerateInput { difference: &picture, seed, size: [0, 0] };
         models.predict(self.bundle, self.engine, self.config, &seeds.iter().map(wanted).collect::<Vec<_>>(), cx)
     }
 
@@ -78,7 +78,7 @@ impl Generating<'_> {
     /// # Errors
     /// As [`Models::predict`].
     pub fn of(self, models: &Models, pictures: &[Cow<'_, RgbGrid>], cx: &JobCx) -> Result<Vec<Prediction>, TaskError> {
-        let wanted = |difference| Wanted { difference, seed: self.config.seed, size: [0, 0] };
+        let wanted = |difference| GenerateInput { difference, seed: self.config.seed, size: [0, 0] };
         let wanted: Vec<_> = pictures.iter().map(|picture| wanted(&**picture)).collect();
         models.predict(self.bundle, self.engine, self.config, &wanted, cx)
     }
@@ -92,8 +92,9 @@ impl Generating<'_> {
         Ok(found)
     }
 
-    fn wanted<'p>(self, pictures: &'p [Picture<'_>]) -> Vec<Wanted<'p>> {
-        let wanted = |(.., difference): &'p Picture<'_>| Wanted { difference, seed: self.config.seed, size: [0, 0] };
+    fn wanted<'p>(self, pictures: &'p [Picture<'_>]) -> Vec<GenerateInput<'p>> {
+        let wanted =
+            |(.., difference): &'p Picture<'_>| GenerateInput { difference, seed: self.config.seed, size: [0, 0] };
         pictures.iter().map(wanted).collect()
     }
 

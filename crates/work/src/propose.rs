@@ -13,15 +13,15 @@ use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::error::TaskError;
-use super::labels::{HandMask, ImprintSource, MaskPlace, PairLabels, Review};
+use super::labels::{DrawnMask, ImprintSource, MaskPlace, PairLabels, Review};
 use super::mask::MaskRecipe;
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::hand::HandPose;
 use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
+use touch2touch_core::manual::ManualPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -174,7 +174,7 @@ pub fn cad_distances(
     (imprint, of): (&DepthMap, ImprintSource),
     (sample, pad): (&Sample, PadId),
     tool: &ToolModel,
-    grasp_from_object: HandPose,
+    grasp_from_object: ManualPose,
 ) -> Result<Grid<f64>, TaskError> {
     let (imprint, camera) = (smooth_imprint(imprint, of, &sample.rig), camera_of(sample, pad)?);
     let object_from_grasp = grasp_from_object.to_affine().inverse();
@@ -194,13 +194,13 @@ pub fn near_cad(distances: &Grid<f64>, within_m: f32, at: CadPose) -> Proposal {
 ///
 /// # Errors
 /// If nothing was painted.
-pub fn grown(imprint: &DepthMap, hand: Option<&HandMask>) -> Result<Proposal, TaskError> {
+pub fn grown(imprint: &DepthMap, hand: Option<&DrawnMask>) -> Result<Proposal, TaskError> {
     let nothing = || {
         TaskError::new(WHAT, "there is nothing to grow from")
             .with_hint("Paint a short stroke of contact, and with the right button one where there is none.")
     };
     let hand = hand.ok_or_else(nothing)?;
-    let painted = hand.marks.hand_checked();
+    let painted = hand.marks.manual_checked();
     let which = |contact: bool| {
         let (painted, mask) = (painted.as_slice(), hand.mask.as_slice());
         let seeds = painted.iter().zip(mask).map(|(painted, in_contact)| *painted && *in_contact == contact);
@@ -294,12 +294,12 @@ pub fn carries_from(index: &Index, to: PairId, review: impl Fn(&str) -> Review) 
 }
 
 /// The mask that accepting a proposal whole makes. Of the one that was drawn, what a person painted stays unless
-/// `over_hand`, and ignored pixels stay so.
+/// `over_drawn`, and ignored pixels stay so.
 #[must_use]
-pub fn accepted(drawn: Option<&HandMask>, proposal: &Proposal, over_hand: bool) -> HandMask {
-    let Some(drawn) = drawn else { return HandMask::new(proposal.mask.clone(), proposal.provenance.clone()) };
+pub fn accepted(drawn: Option<&DrawnMask>, proposal: &Proposal, over_drawn: bool) -> DrawnMask {
+    let Some(drawn) = drawn else { return DrawnMask::new(proposal.mask.clone(), proposal.provenance.clone()) };
     let mut hand = drawn.clone();
-    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_hand);
+    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_drawn);
     hand
 }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::job::JobCx;
-use super::models::Wanted;
+use super::models::GenerateInput;
 use super::prediction::Prediction;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
@@ -46,7 +46,7 @@ pub struct StatisticsSetup {
 pub fn statistics(
     setup: &StatisticsSetup,
     load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
-    mut predict: impl FnMut(Wanted<'_>, &JobCx) -> Result<Prediction, TaskError>,
+    mut predict: impl FnMut(GenerateInput<'_>, &JobCx) -> Result<Prediction, TaskError>,
     cx: &JobCx,
 ) -> Result<(ShiftStatistics, Vec<TaskError>), TaskError> {
     let (mut fit, mut failed) = (ShiftFit::default(), Vec::new());
@@ -74,7 +74,7 @@ pub fn statistics(
                 continue;
             };
             cx.check(WHAT)?;
-            let wanted = Wanted { difference: &picture, seed: setup.config.seed, size: [0, 0] };
+            let wanted = GenerateInput { difference: &picture, seed: setup.config.seed, size: [0, 0] };
             let added = predict(wanted, &quiet).and_then(|made| {
                 let chain = super::imprint::chain(&made, ShiftMode::Raw)?;
                 engine.clone_from(&made.engine);

@@ -19,16 +19,16 @@ pub enum Subject {
     /// What was measured.
     Measured,
     /// A prediction.
-    Predicted(Wish),
+    Predicted(RecipeChange),
     /// The mean of predictions with so many seeds.
-    Mean(Wish, usize),
+    Mean(RecipeChange, usize),
     /// The prediction of another program that lies beside the pair as a picture.
     Stored,
 }
 
 /// Which prediction: what is `None` is as the settings (of the studio) or the options (of a verb) say.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct Wish {
+pub struct RecipeChange {
     /// The generator, by its bundle's name.
     pub bundle: Option<String>,
     /// Denoising steps.
@@ -77,11 +77,11 @@ impl Mapping {
 impl Subject {
     /// The prediction that the settings make.
     pub fn shown() -> Self {
-        Self::Predicted(Wish::default())
+        Self::Predicted(RecipeChange::default())
     }
 
     /// Whether something is predicted for it.
-    pub fn wish(&self) -> Option<&Wish> {
+    pub fn wish(&self) -> Option<&RecipeChange> {
         match self {
             Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
             Self::Measured | Self::Stored => None,
@@ -136,7 +136,7 @@ impl FromStr for Subject {
     fn from_str(text: &str) -> Result<Self, String> {
         use strum::IntoEnumIterator as _;
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
-        let (mut wish, mut seeds) = (Wish::default(), None);
+        let (mut wish, mut seeds) = (RecipeChange::default(), None);
         for part in rest.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let (key, value) = part.split_once('=').ok_or_else(|| format!("\"{part}\" is not KEY=VALUE"))?;
             let wrong = || format!("{key} cannot be \"{value}\"");
@@ -149,7 +149,7 @@ impl FromStr for Subject {
                 _ => return Err(format!("{key} is none of bundle, seed, steps, shift, seeds")),
             }
         }
-        let nothing_else = wish == Wish::default() && seeds.is_none();
+        let nothing_else = wish == RecipeChange::default() && seeds.is_none();
         match name.trim() {
             "measured" if nothing_else => Ok(Self::Measured),
             "stored" if nothing_else => Ok(Self::Stored),
@@ -181,7 +181,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let wish = Wish {
+        let wish = RecipeChange {
             bundle: Some("fitted".into()),
             steps: Some(50),
             seed: Some(u64::MAX),
@@ -200,7 +200,7 @@ mod tests {
             assert_eq!(serde_json::from_str::<Subject>(&json).unwrap(), subject);
             assert!(!subject.label().is_empty());
         }
-        assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(Wish::default(), 8));
+        assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(RecipeChange::default(), 8));
     }
 
     #[test]

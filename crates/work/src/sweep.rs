@@ -140,7 +140,7 @@ type Made = Result<PerPad<Prediction>, TaskError>;
 /// or it was told to stop before the first was done.
 pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx) -> Result<Sweep, TaskError> {
     let start = Instant::now();
-    let job = Job::new(dataset, setup, models, cx)?;
+    let job = SweepRun::new(dataset, setup, models, cx)?;
     let (mut left_out, mut tools) = (Vec::new(), BTreeMap::new());
     let mut rows: BTreeMap<ImprintSource, Vec<Vec<Outcome>>> = BTreeMap::new();
     let (mut done, mut posed, total) = (0, 0, setup.pairs.len());
@@ -224,7 +224,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
 }
 
 /// What is the same for all pairs.
-struct Job<'a> {
+struct SweepRun<'a> {
     dataset: &'a Dataset,
     setup: &'a SweepSetup,
     models: &'a Models,
@@ -239,7 +239,7 @@ struct Job<'a> {
     sees: bool,
 }
 
-impl<'a> Job<'a> {
+impl<'a> SweepRun<'a> {
     fn new(dataset: &'a Dataset, setup: &'a SweepSetup, models: &'a Models, cx: &'a JobCx) -> Result<Self, TaskError> {
         let fail = |why: String| TaskError::new(WHAT, why);
         let dial = setup.values.first().ok_or_else(|| fail("there are no values to turn it to".into()))?.dial();

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
-use super::export::{HandMasks, LeftOut};
+use super::export::{DrawnMasks, LeftOut};
 use super::job::JobCx;
 use super::labels::{ImprintOf, MaskPlace, Review};
 use super::models::Models;
@@ -27,7 +27,7 @@ use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::units::counted;
 
 pub use super::error::Remark;
-pub use trained::{Told, Trained};
+pub use trained::{MaskScore, Trained};
 
 /// What it is called in errors.
 const WHAT: &str = "Train the mask model";
@@ -191,7 +191,7 @@ impl TrainPlan {
 ///
 /// # Errors
 /// If there is no place for labels.
-pub fn plan(dataset: &Dataset, masks: &HandMasks<'_>, choice: TrainChoice) -> Result<TrainPlan, TaskError> {
+pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, choice: TrainChoice) -> Result<TrainPlan, TaskError> {
     masks.labels.folder()?;
     let (reviews, drawn) = (masks.reviews(), masks.all(&dataset.rig));
     let mut plan = TrainPlan::default();
@@ -277,7 +277,7 @@ pub fn new_folder(models: &Path, dataset: &Dataset) -> PathBuf {
 #[cfg(feature = "tune")]
 pub fn train(
     dataset: &Dataset,
-    masks: &HandMasks<'_>,
+    masks: &DrawnMasks<'_>,
     setup: &TrainSetup,
     models: &Models,
     cx: &JobCx,
@@ -295,7 +295,7 @@ pub fn train(
 /// # Errors
 /// Always.
 #[cfg(not(feature = "tune"))]
-pub fn train(_: &Dataset, _: &HandMasks<'_>, _: &TrainSetup, _: &Models, _: &JobCx) -> Result<Trained, TaskError> {
+pub fn train(_: &Dataset, _: &DrawnMasks<'_>, _: &TrainSetup, _: &Models, _: &JobCx) -> Result<Trained, TaskError> {
     Err(TaskError::new(WHAT, "this program was built without tuning").with_hint("Build it with the feature \"tune\"."))
 }
 

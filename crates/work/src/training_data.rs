@@ -133,7 +133,7 @@ pub fn write_shards(
             let text = format!("shard {} of {count}: pair {} of {all}", shard + 1, at + 1);
             cx.progress(at as u64, all as u64, text);
             let chunk: Vec<usize> = (at..range.end.min(at + CHUNK)).collect();
-            let read: Vec<Result<Vec<Touch>, Remark>> = chunk.into_par_iter().map(|at| reader.read(at)).collect();
+            let read: Vec<Result<Vec<ShardTouch>, Remark>> = chunk.into_par_iter().map(|at| reader.read(at)).collect();
             for pair in read {
                 match pair {
                     Ok(touches) => touches.into_iter().try_for_each(|touch| {
@@ -202,7 +202,7 @@ impl Known {
     }
 }
 
-struct Touch {
+struct ShardTouch {
     record: Record,
     known: Known,
 }
@@ -285,7 +285,7 @@ impl<'a> Reader<'a> {
         sha256(text.to_string().as_bytes())[..16].to_owned()
     }
 
-    fn read(&self, at: usize) -> Result<Vec<Touch>, Remark> {
+    fn read(&self, at: usize) -> Result<Vec<ShardTouch>, Remark> {
         match self.source {
             TouchSource::Dataset(dataset, labels, _) => self.measured(dataset, labels, at),
             TouchSource::Simulator { mix, condition, seed, .. } => {
@@ -310,7 +310,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn measured(&self, dataset: &Dataset, labels: &Labels, at: usize) -> Result<Vec<Touch>, Remark> {
+    fn measured(&self, dataset: &Dataset, labels: &Labels, at: usize) -> Result<Vec<ShardTouch>, Remark> {
         let entry = dataset.index.get(self.pairs[at]);
         let name = entry.map(|entry| entry.name.clone()).unwrap_or_default();
         let fail = |why: String| Remark { name: name.clone(), why };
@@ -339,7 +339,7 @@ impl<'a> Reader<'a> {
 }
 
 /// A touch without what only the simulator or people know; `None` where a sensor felt nothing.
-fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<Touch> {
+fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<ShardTouch> {
     let felt = sample.pad(pad)?;
     let (picture, depth) = (felt.picture(lab::GELSLIM_ID)?, felt.depth()?);
     let size = [lab::BUBBLE.width, lab::BUBBLE.height];
@@ -358,7 +358,7 @@ fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<
         origin: Origin::Measured,
         unseen: false,
     };
-    Some(Touch { record, known: Known::Not })
+    Some(ShardTouch { record, known: Known::Not })
 }
 
 /// The contact by hand, else near the CAD model at the true pose.

@@ -14,7 +14,7 @@ use serde::Serialize;
 use crate::io::folders;
 
 #[cfg(feature = "tune")]
-pub(super) use kept::Kept;
+pub(super) use kept::KeptRun;
 #[cfg(feature = "tune")]
 pub(super) use runs::{Look, Runs, steps_within};
 

@@ -2,7 +2,7 @@
 
 use super::pose::PoseResult;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 
 /// Limits of a good and of a usable angle, radians: the paper's.

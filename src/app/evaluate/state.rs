@@ -92,7 +92,7 @@ pub struct SourceScores {
 
 /// How a value stands among those of all pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Standing {
+pub(crate) enum Grade {
     /// Among the better seven tenths.
     Fine,
     /// Among the three worst tenths.
@@ -123,13 +123,13 @@ impl SourceScores {
     }
 
     /// How a value of a metric stands among those of all pairs.
-    pub(crate) fn standing(&self, metric: Metric, value: f64) -> Standing {
+    pub(crate) fn standing(&self, metric: Metric, value: f64) -> Grade {
         let bad = metric.badness(value);
         match self.metrics.get(&metric) {
-            _ if value.is_nan() => Standing::Worst,
-            Some([worst, _]) if bad > *worst => Standing::Worst,
-            Some([_, poor]) if bad > *poor => Standing::Poor,
-            _ => Standing::Fine,
+            _ if value.is_nan() => Grade::Worst,
+            Some([worst, _]) if bad > *worst => Grade::Worst,
+            Some([_, poor]) if bad > *poor => Grade::Poor,
+            _ => Grade::Fine,
         }
     }
 }

@@ -10,7 +10,7 @@ use super::super::state::State;
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
-use touch2touch_work::subject::{Subject, Wish};
+use touch2touch_work::subject::{RecipeChange, Subject};
 use touch2touch_work::sweep::Setting;
 
 fn command(verb: &str) -> Words {
@@ -141,12 +141,12 @@ impl State {
 
     /// A subject with the folder of its bundle in place of the bundle's name.
     fn placed(&self, subject: &Subject) -> Subject {
-        let placed = |wish: &Wish| {
+        let placed = |wish: &RecipeChange| {
             let bundle = wish.bundle.as_ref().map(|name| {
                 let found = self.library.bundles.iter().find(|bundle| bundle.name == *name);
                 found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
             });
-            Wish { bundle, ..wish.clone() }
+            RecipeChange { bundle, ..wish.clone() }
         };
         match subject {
             Subject::Predicted(wish) => Subject::Predicted(placed(wish)),

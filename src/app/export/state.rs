@@ -103,7 +103,7 @@ pub struct ImportForm {
     /// The folder or file.
     pub from: PathBuf,
     /// Whether what was painted by hand is replaced as well.
-    pub over_hand: bool,
+    pub over_drawn: bool,
     /// Which asking it is: files may be others than at the one before.
     pub(in crate::app) asked: u64,
 }
@@ -130,8 +130,8 @@ impl State {
     /// What is imported as the form says, while it is open.
     pub(crate) fn import_setup(&self) -> Option<ImportSetup> {
         let form = self.export.importing.as_ref()?;
-        let (from, over_hand, person) = (form.from.clone(), form.over_hand, self.known_person());
-        Some(ImportSetup { from, format: None, over_hand, person })
+        let (from, over_drawn, person) = (form.from.clone(), form.over_drawn, self.known_person());
+        Some(ImportSetup { from, format: None, over_drawn, person })
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PairKey, PoseBits, RegistrationChoice};
-use super::super::pane::Need;
+use super::super::pane::Demand;
 pub(crate) use super::super::results::inspection::Inspection;
 use super::super::state::State;
 use super::super::workbench::state::Layer;
@@ -127,8 +127,8 @@ impl State {
 
     /// Whether something on screen shows a step of an imprint's registration.
     pub(crate) fn shows_steps(&self, source: ImprintSource) -> bool {
-        let lines = self.workbench.layer == Layer::Correspondences && self.needs(Need::Scene(source));
-        self.inspect.source == source && (lines || self.needs(Need::Steps))
+        let lines = self.workbench.layer == Layer::Correspondences && self.needs(Demand::Scene(source));
+        self.inspect.source == source && (lines || self.needs(Demand::Steps))
     }
 
     /// The step that the 3D view of a side shows instead of the registered pose.

@@ -31,7 +31,7 @@ impl State {
         BatchSetup {
             propose: ProposeSetup { source: mask.proposal, recipe, pose: None, carry_from: None },
             pairs: self.library.order.clone(),
-            over_hand: mask.over_hand,
+            over_drawn: mask.over_drawn,
             person: self.known_person(),
         }
     }

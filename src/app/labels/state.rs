@@ -6,11 +6,11 @@ use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, PoseKey, Revision};
 use touch2touch_core::grid::{DepthMap, Mask};
-use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, Seen};
+use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, VisiblePixels};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::label_stats::LabelStats;
-pub use touch2touch_work::labels::{HandMask, MaskPlace, PairLabels, Review};
+pub use touch2touch_work::labels::{DrawnMask, MaskPlace, PairLabels, Review};
 use touch2touch_work::propose::Proposal;
 
 /// What happened when the stored labels of a pair were read.
@@ -116,13 +116,13 @@ pub struct Stroke {
     /// What is let through of a proposal.
     pub(in crate::app) proposed: Option<Arc<Proposal>>,
     /// Where its pixels lie in the 3D picture that it is drawn on.
-    pub(in crate::app) seen: Option<Seen>,
+    pub(in crate::app) seen: Option<VisiblePixels>,
     /// The pose before the stroke, as [`Changed::before`].
     pub(in crate::app) pose: Option<PoseKey>,
     /// The hand mask before the stroke; `None` if there was none.
-    pub(in crate::app) before: Option<HandMask>,
+    pub(in crate::app) before: Option<DrawnMask>,
     /// What is drawn on: the mask in force before the stroke.
-    pub(in crate::app) start: HandMask,
+    pub(in crate::app) start: DrawnMask,
     /// The pixels that were touched.
     pub(in crate::app) touched: Mask,
     /// Who draws.
@@ -131,11 +131,11 @@ pub struct Stroke {
 
 impl Stroke {
     /// Draws on the mask: what a brush did since its first `from` points, anything else anew. Whether it touched anything.
-    pub(in crate::app) fn draw_on(&mut self, hand: &mut HandMask, imprint: &DepthMap, from: usize) -> bool {
+    pub(in crate::app) fn draw_on(&mut self, hand: &mut DrawnMask, imprint: &DepthMap, from: usize) -> bool {
         let mut undone = false;
         if !matches!(self.drawing.tool, DrawTool::Brush { .. }) {
             undone = !hand.is_same(&self.start);
-            *hand = HandMask { revision: hand.revision, ..self.start.clone() };
+            *hand = DrawnMask { revision: hand.revision, ..self.start.clone() };
             self.touched.as_mut_slice().fill(false);
         }
         let proposed = self.proposed.as_ref().map(|proposal| &proposal.mask);
@@ -191,7 +191,7 @@ impl Document {
     }
 
     /// The corrected mask of one imprint.
-    pub fn hand_mask(&self, name: &str, place: &MaskPlace) -> Option<&HandMask> {
+    pub fn drawn_mask(&self, name: &str, place: &MaskPlace) -> Option<&DrawnMask> {
         self.labels.get(name)?.masks.get(place)
     }
 

@@ -10,7 +10,7 @@ use crate::app::state::State;
 use crate::app::tasks::state::Level;
 use crate::app::view::state::UiRequest;
 use touch2touch_work::error::TaskErrorKind;
-use touch2touch_work::labels::{Deed, Unsaved};
+use touch2touch_work::labels::{Operation, Unsaved};
 
 /// What can happen to labels that are not on the disk.
 #[derive(Clone, Debug)]
@@ -56,7 +56,7 @@ pub(in crate::app) fn step(state: &mut State, command: UnsavedCommand, effects: 
 fn retry(state: &mut State, effects: &mut Vec<Effect>) {
     let failed: Vec<String> = state.document.failed.keys().cloned().collect();
     for name in failed {
-        save_again(state, &name, Deed::named("saved again"), effects);
+        save_again(state, &name, Operation::named("saved again"), effects);
     }
 }
 
@@ -144,7 +144,7 @@ impl State {
         let one = |name: &String| {
             let repeat = self.document.repeats.get(name).map(|repeating| repeating.person.clone());
             let person = repeat.clone().or_else(|| self.known_person());
-            let deed = Deed { person, ..Deed::named("saved elsewhere") };
+            let deed = Operation { person, ..Operation::named("saved elsewhere") };
             Some(Unsaved { name: name.clone(), labels: self.document.finished(name)?, deed, repeat })
         };
         self.document.unsaved.iter().filter_map(one).collect()

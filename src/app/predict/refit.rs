@@ -15,7 +15,7 @@ use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
-use touch2touch_work::models::Wanted;
+use touch2touch_work::models::GenerateInput;
 use touch2touch_work::pairs;
 use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
@@ -68,7 +68,7 @@ impl Errand for Refit {
             dataset: source.title().to_owned(),
             bundle,
         };
-        let predict = |wanted: Wanted<'_>, cx: &JobCx| {
+        let predict = |wanted: GenerateInput<'_>, cx: &JobCx| {
             let made = access.services.predict(&setup.bundle, recipe.runtime, &setup.config, &[wanted], cx)?;
             made.into_iter().next().ok_or_else(|| TaskError::new(TITLE, "no answer"))
         };

@@ -1,7 +1,7 @@
 //! What a GelSlim image leaves open.
 
 use super::imprint::gone;
-use super::{Computes, Job, Lane, SharedServices, State, TouchKey, Wanted};
+use super::{Computes, Demands, Job, Lane, SharedServices, State, TouchKey};
 use touch2touch_core::ambiguity::{Ambiguity, ambiguity};
 use touch2touch_core::rig::PadId;
 
@@ -33,7 +33,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn ambiguity(&mut self, finger: PadId, touch: TouchKey) {
         if self.state.gelslim(finger).ready().is_some() {
             self.ask(AmbiguityKey(touch));

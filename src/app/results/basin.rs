@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::pose::{PoseKey, Registered};
-use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::align::basin::{Basin, Plane};
 use touch2touch_work::pose::basin;
 
@@ -62,9 +62,9 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn basin(&mut self) {
-        if let (true, Ok(Some(key))) = (self.state.needs(Need::Basin), self.state.basin_key()) {
+        if let (true, Ok(Some(key))) = (self.state.needs(Demand::Basin), self.state.basin_key()) {
             self.ask(key);
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::Latest;
 use super::imprint::{Imprint, ImprintKey};
 use super::mask::{MaskKey, MaskVersion};
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
+use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State};
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_work::cloud::{Clouds, clouds};
@@ -115,7 +115,7 @@ impl State {
             if self.imprint_of(imprint.clone()).ready().is_none() {
                 return Err(Vec::new());
             }
-            if let Some(hand) = self.hand_mask_on(&imprint) {
+            if let Some(hand) = self.drawn_mask_on(&imprint) {
                 parts[finger] = Some((imprint.clone(), Some(MaskVersion::Hand(hand.revision))));
                 continue;
             }
@@ -142,7 +142,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// Asks for the cloud and the tool; whether both are there.
     pub(crate) fn cloud(&mut self, source: ImprintSource) -> bool {
         let state = self.state;

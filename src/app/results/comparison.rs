@@ -1,7 +1,7 @@
 //! A prediction against the measurement: one pair of imprints among those that can be compared.
 
 use super::versus::VersusKey;
-use super::{Absent, ImprintSource, Lookup, State, TouchKey, Wanted};
+use super::{Absent, Demands, ImprintSource, Lookup, State, TouchKey};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::compare::Comparison;
 
@@ -21,7 +21,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn comparison(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.shown(touch) else { return };

@@ -1,7 +1,7 @@
 //! Signed distances between contact points and the registered model.
 
 use super::pose::{PoseKey, Registered};
-use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_work::deviation::{Deviation, deviation};
 
 /// The distances at a registered pose.
@@ -30,7 +30,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The distances of an imprint, once its pose is there.
     pub(crate) fn deviation(&mut self, source: ImprintSource) {
         let state = self.state;

@@ -2,7 +2,7 @@
 
 use super::super::export::state::ImportForm;
 use super::super::keys::{DatasetSeq, Revision};
-use super::{Computes, Job, Lane, SharedServices, State, Wanted};
+use super::{Computes, Demands, Job, Lane, SharedServices, State};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::import::{Import, plan_import};
 
@@ -46,7 +46,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn import_plan(&mut self) {
         // Over what is on the disk: a stroke must have come there first.
         let at_rest = self.state.document.stroke.is_none() && self.state.document.unsaved.is_empty();

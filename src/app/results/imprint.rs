@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::super::keys::ShiftMode;
 use super::picture::PictureKey;
 use super::prediction::PredictionKey;
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
+use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::rig::{PadId, SensorKind};
 use touch2touch_core::sample::Sample;
@@ -182,7 +182,7 @@ impl State {
     pub fn imprint(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
         match self.imprint_key(source, finger) {
             Ok(key) => self.imprint_of(key),
-            Err(Absent::NoPrediction) if self.ahead(finger).is_some() => Lookup::Waiting,
+            Err(Absent::NoPrediction) if self.prefetch(finger).is_some() => Lookup::Waiting,
             Err(absent) => Lookup::Absent(absent),
         }
     }
@@ -204,7 +204,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn imprint(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.shown(touch).cloned() else { return };

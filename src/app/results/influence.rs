@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::pose::{PoseKey, Registered};
-use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_work::influence::{Influence, influence};
 
 /// The influence of the pixels on a registered angle.
@@ -38,7 +38,7 @@ impl Computes for InfluenceKey {
 impl State {
     /// Whether the influence of the pixels is shown over an imprint.
     pub(crate) fn shows_influence(&self, source: ImprintSource) -> bool {
-        self.selection.influence && self.needs(Need::Imprint(source))
+        self.selection.influence && self.needs(Demand::Imprint(source))
     }
 
     /// The recipe of the influence; `None` while, or where, there is no pose.
@@ -64,7 +64,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The influence of the pixels, where it is shown and the pose is there.
     pub(crate) fn influence(&mut self, source: ImprintSource) {
         let state = self.state;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::super::keys::RegistrationChoice;
 use super::pose::Registered;
 use super::run::RunKey;
-use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::align::{AlignReport, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::Counterparts;
@@ -148,7 +148,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The steps that are looked at, or the recorded registration that they are of.
     pub(crate) fn inspection(&mut self) {
         let state = self.state;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::super::pane::Need;
-use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
+use super::super::pane::Demand;
+use super::{Computes, DatasetSeq, Demands, Job, Lane, SharedServices, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_work::label_stats::LabelStats;
 
@@ -55,10 +55,10 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// What the mask tools say about the data set.
     pub(crate) fn label_stats(&mut self) {
-        if self.state.needs(Need::LabelStats)
+        if self.state.needs(Demand::LabelStats)
             && let Some(key) = self.state.label_stats_key()
         {
             self.ask(key);

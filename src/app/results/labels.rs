@@ -6,7 +6,7 @@ use super::super::labels::state::{PairLabels, Stored};
 use super::super::tasks::state::Level;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::Told;
+use touch2touch_work::labels::JournalHistory;
 
 /// The labels stored for a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -22,7 +22,7 @@ pub struct LabelsKey {
 pub struct Read {
     labels: PairLabels,
     /// What was done before.
-    told: Told,
+    told: JournalHistory,
 }
 
 impl LabelsKey {
@@ -43,7 +43,7 @@ impl Computes for LabelsKey {
         Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
             if let Some(person) = repeat {
                 let labels = source.load_repeat(&person, &name)?;
-                return Ok(Read { labels, told: Told::default() });
+                return Ok(Read { labels, told: JournalHistory::default() });
             }
             let labels = source.load_labels(&name)?;
             let told = source.past(&name, &labels);

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::pose::PoseKey;
 use super::run::RunKey;
-use super::{Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::layers::{LayerResult, layers};
@@ -48,7 +48,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The layers of an imprint, or the recorded registration that they need.
     pub(crate) fn layers(&mut self, source: ImprintSource) {
         let state = self.state;

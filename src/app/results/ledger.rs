@@ -2,7 +2,7 @@
 
 use super::super::keys::ShiftMode;
 use super::prediction::PredictionKey;
-use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
+use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State, TouchKey};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::ledger::{LedgerResult, of_prediction};
 
@@ -40,7 +40,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn ledger(&mut self, touch: TouchKey) {
         let state = self.state;
         let Some(recipe) = state.shown(touch) else { return };

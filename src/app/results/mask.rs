@@ -5,13 +5,13 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{MaskRecipe, Revision};
-use super::super::labels::state::{HandMask, MaskPlace};
+use super::super::labels::state::{DrawnMask, MaskPlace};
 use super::super::pane::Pane;
 use super::super::tasks::state::Level;
 use super::Request;
 use super::imprint::ImprintKey;
 use super::tool::ToolKey;
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
 use touch2touch_core::grid::Mask;
@@ -47,7 +47,7 @@ impl MaskVersion {
                 state.results.masks.get(&key).map(|found| found.mask.clone())
             }
             Self::Hand(revision) => {
-                let hand = state.hand_mask_on(imprint)?;
+                let hand = state.drawn_mask_on(imprint)?;
                 (hand.revision == *revision).then(|| hand.mask.clone())
             }
         }
@@ -185,14 +185,14 @@ impl State {
     }
 
     /// The mask that a person drew on an imprint.
-    pub(crate) fn hand_mask_on(&self, imprint: &ImprintKey) -> Option<&HandMask> {
+    pub(crate) fn drawn_mask_on(&self, imprint: &ImprintKey) -> Option<&DrawnMask> {
         let touch = imprint.touch();
         let name = &self.library.entry(touch.pair.pair)?.name;
-        self.document.hand_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
+        self.document.drawn_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
     }
 
     /// The corrected mask of one finger's imprint, if it is there and as large.
-    pub fn hand_mask(&self, source: ImprintSource, finger: PadId) -> Option<&HandMask> {
+    pub fn drawn_mask(&self, source: ImprintSource, finger: PadId) -> Option<&DrawnMask> {
         let place = self.mask_place(source, finger)?;
         self.document.pair(self.pair_name())?.drawn(&place, self.imprint(source, finger).ready()?)
     }
@@ -206,7 +206,7 @@ impl State {
         source: ImprintSource,
         finger: PadId,
     ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
-        if let Some(hand) = self.hand_mask(source, finger) {
+        if let Some(hand) = self.drawn_mask(source, finger) {
             let base = hand.base();
             let label = if base.is_empty() { "By hand".into() } else { format!("By hand, from {base}") };
             return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
@@ -269,7 +269,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn mask(&mut self, source: ImprintSource, finger: PadId) {
         let state = self.state;
         if let Some(key) = state.gate_key(source, finger).filter(|_| state.selection.panes.contains(&Pane::Masks)) {
@@ -284,7 +284,7 @@ impl Wanted<'_> {
         }
         // Stored corrections first: they may make the automatic mask unnecessary.
         if !state.document.stored.contains_key(state.pair_name())
-            || state.hand_mask(source, finger).is_some()
+            || state.drawn_mask(source, finger).is_some()
             || state.imprint(source, finger).ready().is_none()
         {
             return;

@@ -1,7 +1,7 @@
 //! What an export of masks would write where.
 
 use super::super::keys::{DatasetSeq, Revision};
-use super::{Computes, Job, Lane, SharedServices, State, Wanted};
+use super::{Computes, Demands, Job, Lane, SharedServices, State};
 use touch2touch_work::export::{ExportChoice, Plan};
 
 /// The plan of an export, of what is drawn and marked now.
@@ -43,7 +43,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn mask_plan(&mut self) {
         if let Some(key) = self.state.mask_plan_key().filter(|_| self.state.document.stroke.is_none()) {
             self.ask(key);

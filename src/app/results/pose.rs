@@ -6,7 +6,7 @@ use super::super::keys::RegistrationChoice;
 use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
-use super::{Absent, Computed, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computed, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
@@ -157,7 +157,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The pose; where it may take a proof, one without first.
     pub(crate) fn pose(&mut self, source: ImprintSource) {
         let Ok(Some(key)) = self.state.pose_key(source) else { return };

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use super::super::keys::{Bits64, Sampler, Spacing};
 use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
-use super::{Computes, Job, Lane, Results, SharedServices, State, TouchKey, Wanted};
+use super::{Computes, Demands, Job, Lane, Results, SharedServices, State, TouchKey};
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::ensemble::seeds;
 use touch2touch_core::grid::RgbGrid;
@@ -165,7 +165,7 @@ impl Computes for StoredKey {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// What was made of a touch before this start of the program.
     pub(crate) fn stored(&mut self, finger: PadId, touch: TouchKey) {
         let state = self.state;
@@ -234,9 +234,9 @@ pub fn generate(
     }
     let wanted = |key: &PredictionKey| {
         let (picture, size) = &pictures[&key.touch.finger];
-        models::Wanted { difference: picture, seed: key.seed, size: *size }
+        models::GenerateInput { difference: picture, seed: key.seed, size: *size }
     };
-    let wanted: Vec<models::Wanted<'_>> = keys.iter().map(wanted).collect();
+    let wanted: Vec<models::GenerateInput<'_>> = keys.iter().map(wanted).collect();
     if keys.is_empty() {
         return Err(TaskError::new("Generate", missing));
     }

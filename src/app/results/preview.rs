@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use super::super::keys::ShiftMode;
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::prediction::PredictionKey;
 use super::{ImprintSource, State, TouchKey};
 use touch2touch_core::rig::PadId;
@@ -24,7 +24,7 @@ pub(crate) type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
 
 /// What of a prediction under way would be looked at now. The runtime keeps it up to date while jobs run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct PreviewWish {
+pub struct PreviewRequest {
     /// After so many steps, and after the first; 0 = never.
     pub every: u32,
     /// How they become meters.
@@ -33,7 +33,7 @@ pub struct PreviewWish {
     pub touches: BTreeSet<TouchKey>,
 }
 
-impl PreviewWish {
+impl PreviewRequest {
     /// Whether a picture of `touch` is wanted after `step` steps.
     pub fn wants(&self, touch: TouchKey, step: u32) -> bool {
         self.every > 0 && (step == 1 || step.is_multiple_of(self.every)) && self.touches.contains(&touch)
@@ -44,7 +44,7 @@ impl PreviewWish {
 #[derive(Clone)]
 pub struct Onlooker {
     /// What would be looked at now.
-    pub wish: Arc<Mutex<PreviewWish>>,
+    pub wish: Arc<Mutex<PreviewRequest>>,
     /// Receives it.
     pub sink: PreviewSink,
 }
@@ -81,12 +81,12 @@ impl State {
     }
 
     /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
-    pub fn preview_wish(&self) -> PreviewWish {
-        let shown = self.needs(Need::Imprint(ImprintSource::Predicted)) && self.document.stroke.is_none();
+    pub fn preview_wish(&self) -> PreviewRequest {
+        let shown = self.needs(Demand::Imprint(ImprintSource::Predicted)) && self.document.stroke.is_none();
         let touches = match self.pair_key().filter(|_| shown) {
             Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
             None => Default::default(),
         };
-        PreviewWish { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }
+        PreviewRequest { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }
     }
 }

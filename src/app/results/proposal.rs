@@ -4,17 +4,17 @@ use std::sync::Arc;
 
 use super::super::keys::{MaskRecipe, Revision};
 use super::super::labels::state::{MaskPlace, Stored};
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::imprint::ImprintKey;
 use super::mask::{MaskKey, MaskVersion};
 use super::pose::PoseKey;
 use super::tool::ToolKey;
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State, Wanted};
+use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, PairKey, SharedServices, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::grid::Grid;
-use touch2touch_core::hand::HandPose;
 use touch2touch_core::label::CadPose;
+use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::propose::{self, Proposal, ProposalSource, Side};
@@ -23,7 +23,7 @@ const WHAT: &str = "Propose a mask";
 
 /// Where the CAD model lies.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum At {
+pub enum CadPlace {
     /// At the true pose.
     Truth,
     /// At a registered one.
@@ -32,14 +32,14 @@ pub enum At {
     Hand([u64; 6]),
 }
 
-impl At {
-    fn hand(pose: HandPose) -> Self {
-        let HandPose { planar, x_m, pitch_rad, yaw_rad } = pose;
+impl CadPlace {
+    fn hand(pose: ManualPose) -> Self {
+        let ManualPose { planar, x_m, pitch_rad, yaw_rad } = pose;
         Self::Hand([planar.theta_rad, planar.y_m, planar.z_m, x_m, pitch_rad, yaw_rad].map(f64::to_bits))
     }
 
     /// The pose, `grasp_from_object`; `None` if it is not there.
-    fn find(&self, state: &State, pair: PairKey) -> Option<(CadPose, HandPose)> {
+    fn find(&self, state: &State, pair: PairKey) -> Option<(CadPose, ManualPose)> {
         Some(match self {
             Self::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?.into()),
             Self::Registered(key) => {
@@ -49,7 +49,7 @@ impl At {
             Self::Hand(bits) => {
                 let [theta_rad, y_m, z_m, x_m, pitch_rad, yaw_rad] = bits.map(f64::from_bits);
                 let planar = touch2touch_core::frames::PlanarPose { theta_rad, y_m, z_m };
-                let pose = HandPose { planar, x_m, pitch_rad, yaw_rad };
+                let pose = ManualPose { planar, x_m, pitch_rad, yaw_rad };
                 (CadPose::Nudged(pose), pose)
             }
         })
@@ -62,7 +62,7 @@ pub struct DistancesKey {
     /// The imprint.
     pub imprint: ImprintKey,
     /// Where the model lies.
-    pub at: At,
+    pub at: CadPlace,
 }
 
 /// The distances, and where the model was.
@@ -98,11 +98,11 @@ impl Computes for DistancesKey {
 
 /// What a proposal is made of.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum Ingredients {
+pub enum ProposalInputs {
     /// An automatic mask.
     Automatic(MaskRecipe),
     /// What is within a distance of the CAD model.
-    Cad(At, Bits),
+    Cad(CadPlace, Bits),
     /// What was painted, by the revision of the mask.
     Grow(Revision),
     /// The mask of another pair, by its revision where it is known.
@@ -117,7 +117,7 @@ pub struct ProposalKey {
     /// The imprint.
     pub imprint: ImprintKey,
     /// What it is made of.
-    pub of: Ingredients,
+    pub of: ProposalInputs,
 }
 
 impl Computes for ProposalKey {
@@ -130,7 +130,7 @@ impl Computes for ProposalKey {
             Some(Job::new(Lane::Compute, WHAT, move |_| make()))
         };
         match &self.of {
-            Ingredients::Automatic(recipe) => {
+            ProposalInputs::Automatic(recipe) => {
                 let found = state.results.masks.get(&self.automatic(recipe))?.clone();
                 let model = state.model_of(recipe).to_owned();
                 let recipe = recipe.clone();
@@ -139,16 +139,16 @@ impl Computes for ProposalKey {
                     Ok(propose::automatic(ContactMask { mask, basis, unsure }, &recipe, &model))
                 }))
             }
-            Ingredients::Cad(at, within) => {
+            ProposalInputs::Cad(at, within) => {
                 let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };
                 let (found, within) = (state.results.distances.get(&key)?.clone(), within.get());
                 job(Box::new(move || Ok(propose::near_cad(&found.grid, within, found.at))))
             }
-            Ingredients::Grow(_) => {
-                let hand = state.hand_mask_on(&self.imprint).cloned();
+            ProposalInputs::Grow(_) => {
+                let hand = state.drawn_mask_on(&self.imprint).cloned();
                 job(Box::new(move || propose::grown(imprint.get()?, hand.as_ref())))
             }
-            Ingredients::Carry(from, _) => {
+            ProposalInputs::Carry(from, _) => {
                 let source = state.library.open.as_ref()?.source.clone();
                 let name = state.library.entry(from.pair)?.name.clone();
                 let known = state.document.stored.get(&name) == Some(&Stored::Loaded);
@@ -162,7 +162,7 @@ impl Computes for ProposalKey {
                     propose::carried_from_pair(&name, (&from, &labels), to)
                 }))
             }
-            Ingredients::Across(other, version) => {
+            ProposalInputs::Across(other, version) => {
                 let mask = version.find(state, other)?;
                 let (from, pad) = (other.find(state)?, other.touch().finger);
                 let name = state.finger_name(pad).to_lowercase();
@@ -189,7 +189,7 @@ impl ProposalKey {
 impl State {
     /// Whether a proposal is shown over the masks.
     pub fn proposes(&self) -> bool {
-        self.selection.proposing && self.needs(Need::Masks)
+        self.selection.proposing && self.needs(Demand::Masks)
     }
 
     /// Whether the proposal needs the pose of an imprint.
@@ -214,39 +214,39 @@ impl State {
         let imprint = self.imprint_key(source, finger)?;
         let within = Bits::from(self.settings.mask.choice.cad_distance_m);
         let of = match self.settings.mask.proposal {
-            ProposalSource::Automatic => Ingredients::Automatic(self.mask_recipe(finger)?),
+            ProposalSource::Automatic => ProposalInputs::Automatic(self.mask_recipe(finger)?),
             ProposalSource::CadTruth => {
                 self.tool_name()?;
                 let sample = self.sample().ready();
                 if sample.is_some_and(|sample| sample.grasp_from_object.is_none()) {
                     return Err(Absent::NoTruth);
                 }
-                Ingredients::Cad(At::Truth, within)
+                ProposalInputs::Cad(CadPlace::Truth, within)
             }
             ProposalSource::CadRegistered => match self.pose_key(source)? {
-                Some(key) => Ingredients::Cad(At::Registered(Box::new(key)), within),
+                Some(key) => ProposalInputs::Cad(CadPlace::Registered(Box::new(key)), within),
                 None => return Ok(None),
             },
             ProposalSource::CadHand => {
                 self.tool_name()?;
                 let held = self.workbench.hand(source).map(|hand| hand.pose).or_else(|| self.by_hand(source));
-                Ingredients::Cad(At::hand(held.ok_or(Absent::NoHandPose)?), within)
+                ProposalInputs::Cad(CadPlace::hand(held.ok_or(Absent::NoHandPose)?), within)
             }
             ProposalSource::Grow => {
-                let hand = self.hand_mask(source, finger).filter(|hand| hand.marks.has_hand_work());
-                Ingredients::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
+                let hand = self.drawn_mask(source, finger).filter(|hand| hand.marks.has_hand_work());
+                ProposalInputs::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
             }
             ProposalSource::Carry => {
                 let from = self.carries_from().ok_or(Absent::NoOtherMask)?;
                 let name = self.library.entry(from.pair).map(|entry| entry.name.as_str()).unwrap_or_default();
-                let hand = self.document.hand_mask(name, &MaskPlace::measured(finger));
-                Ingredients::Carry(from, hand.map(|hand| hand.revision))
+                let hand = self.document.drawn_mask(name, &MaskPlace::measured(finger));
+                ProposalInputs::Carry(from, hand.map(|hand| hand.revision))
             }
             ProposalSource::OtherFinger => {
                 let other = self.rig().other_pad(finger).ok_or(Absent::NoFinger)?;
                 let key = self.imprint_key(source, other)?;
                 match self.mask_in_force(source, other) {
-                    Ok(mask) => Ingredients::Across(key, mask.version),
+                    Ok(mask) => ProposalInputs::Across(key, mask.version),
                     Err(Lookup::Absent(absent)) => return Err(absent),
                     Err(_) => return Ok(None),
                 }
@@ -270,7 +270,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The proposal, where one is shown, with what it takes.
     pub(crate) fn proposal(&mut self) {
         let state = self.state;
@@ -290,10 +290,10 @@ impl Wanted<'_> {
         }
         let Ok(Some(key)) = state.proposal_key(source, finger) else { return };
         match &key.of {
-            Ingredients::Automatic(recipe) if !state.results.masks.contains(&key.automatic(recipe)) => {
+            ProposalInputs::Automatic(recipe) if !state.results.masks.contains(&key.automatic(recipe)) => {
                 return self.ask(key.automatic(recipe));
             }
-            Ingredients::Cad(at, _) => {
+            ProposalInputs::Cad(at, _) => {
                 let distances = DistancesKey { imprint: key.imprint.clone(), at: at.clone() };
                 if at.find(state, key.imprint.touch().pair).is_none() {
                     return;

@@ -1,8 +1,8 @@
 //! The scores that are kept of the open data set.
 
 use super::super::evaluate::state::ScoreTable;
-use super::super::pane::Need;
-use super::{Computes, DatasetSeq, Job, Lane, SharedServices, State, Wanted};
+use super::super::pane::Demand;
+use super::{Computes, DatasetSeq, Demands, Job, Lane, SharedServices, State};
 use std::sync::Arc;
 use touch2touch_work::evaluate::{self, Setup};
 use touch2touch_work::infer::engine::EngineChoice;
@@ -64,10 +64,10 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The scores that lists and pictures of all pairs show.
     pub(crate) fn scores(&mut self) {
-        if self.state.needs(Need::Scores)
+        if self.state.needs(Demand::Scores)
             && let Some(key) = self.state.scores_key()
         {
             self.ask(key);

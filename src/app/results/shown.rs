@@ -117,7 +117,7 @@ impl State {
             Why::Held
         } else if self.picked(touch).is_some() {
             Why::Picked
-        } else if generating() || self.ahead(finger).is_some() {
+        } else if generating() || self.prefetch(finger).is_some() {
             Why::OnItsWay
         } else {
             Why::NotMade

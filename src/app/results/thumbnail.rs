@@ -1,7 +1,7 @@
 //! The small pictures of the list.
 
-use super::super::pane::Need;
-use super::{Computes, Job, Lane, PairKey, SharedServices, State, Wanted};
+use super::super::pane::Demand;
+use super::{Computes, Demands, Job, Lane, PairKey, SharedServices, State};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_work::imprint;
@@ -36,11 +36,11 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The pictures of the rows on screen.
     pub(crate) fn thumbnails(&mut self) {
         let state = self.state;
-        let Some(open) = state.library.open.as_ref().filter(|_| state.needs(Need::Thumbnails)) else {
+        let Some(open) = state.library.open.as_ref().filter(|_| state.needs(Demand::Thumbnails)) else {
             return;
         };
         let end = state.library.rows.end.min(state.library.order.len());

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Absent, Computes, DatasetSeq, Job, Lane, Lookup, SharedServices, State, Wanted};
+use super::{Absent, Computes, DatasetSeq, Demands, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::tool::{NamedTool, named_tool};
 
@@ -59,7 +59,7 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn tool(&mut self) {
         if let Ok(key) = self.state.tool_key() {
             self.ask(key);

@@ -1,11 +1,11 @@
 //! What a training of the mask model would learn from.
 
 use super::super::keys::{DatasetSeq, Revision};
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::super::tasks::state::TaskKind;
-use super::{Computes, Job, Lane, SharedServices, State, Wanted};
+use super::{Computes, Demands, Job, Lane, SharedServices, State};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::export::HandMasks;
+use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::train::{TrainChoice, TrainPlan, plan};
 
@@ -28,7 +28,7 @@ impl Computes for TrainPlanKey {
         let (changed, choice) = (state.document.labels.clone(), self.choice);
         Some(Job::new(Lane::Files, "Plan of a training", move |_| {
             let dataset = source.on_disk("Plan of a training")?;
-            plan(dataset, &HandMasks { labels: &Labels::of(dataset), changed: &changed }, choice)
+            plan(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }, choice)
         }))
     }
 
@@ -51,10 +51,11 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     pub(crate) fn train_plan(&mut self) {
         let state = self.state;
-        if !state.needs(Need::Training) || state.document.stroke.is_some() || state.running(TaskKind::Train).is_some() {
+        if !state.needs(Demand::Training) || state.document.stroke.is_some() || state.running(TaskKind::Train).is_some()
+        {
             return;
         }
         if let Some(key) = state.train_plan_key() {

@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::super::keys::ShiftMode;
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::super::settings::state::versus::{Versus, VersusMode};
 use super::cloud::CloudKey;
 use super::imprint::{EnsembleKey, Imprint, ImprintKey, MetersKey};
@@ -12,18 +12,18 @@ use super::mask::MaskKey;
 use super::picture::PictureKey;
 use super::pose::PoseKey;
 use super::prediction::{PredictionKey, SeedKey};
-use super::{Absent, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey, Wanted};
+use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::compare::{Comparison, Depicted, between, tile_of};
-use touch2touch_work::deviation::{Apart, apart};
+use touch2touch_work::deviation::{CloudDifference, cloud_difference};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{Subject, Wish};
+use touch2touch_work::subject::{RecipeChange, Subject};
 
 /// A prediction that is compared with something.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -121,17 +121,17 @@ impl Computes for VersusKey {
 
 /// How far the points of one cloud lie from another.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ApartKey {
+pub struct CloudDifferenceKey {
     /// The cloud whose points are measured.
     pub a: CloudKey,
     /// The other.
     pub b: CloudKey,
 }
 
-impl Computes for ApartKey {
-    type Value = Apart;
+impl Computes for CloudDifferenceKey {
+    type Value = CloudDifference;
 
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Apart>> {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
         let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
         let mut imprints: PerPad<[Imprint; 2]> = PerPad::default();
@@ -145,11 +145,11 @@ impl Computes for ApartKey {
                 let [a, b] = both?;
                 Some([a.get().ok()?, b.get().ok()?])
             });
-            Ok(apart(&a, &b, &imprints))
+            Ok(cloud_difference(&a, &b, &imprints))
         }))
     }
 
-    fn bytes(found: &Apart) -> usize {
+    fn bytes(found: &CloudDifference) -> usize {
         found.bytes()
     }
 }
@@ -161,7 +161,7 @@ impl State {
     }
 
     /// The recipe of a wished prediction of a touch, and how it becomes meters.
-    fn wished(&self, touch: TouchKey, wish: &Wish) -> Result<(PredictionKey, ShiftMode), Absent> {
+    fn wished(&self, touch: TouchKey, wish: &RecipeChange) -> Result<(PredictionKey, ShiftMode), Absent> {
         let bundle = match &wish.bundle {
             None => self.bundle(BundleKind::Generator)?,
             Some(name) => {
@@ -200,7 +200,9 @@ impl State {
         match subject {
             Subject::Measured => self.imprint_key(ImprintSource::Measured, finger),
             // The one that the other panes show, made by whatever settings.
-            Subject::Predicted(wish) if *wish == Wish::default() => self.imprint_key(ImprintSource::Predicted, finger),
+            Subject::Predicted(wish) if *wish == RecipeChange::default() => {
+                self.imprint_key(ImprintSource::Predicted, finger)
+            }
             Subject::Predicted(wish) => {
                 let (recipe, shift) = self.wished(touch, wish)?;
                 Ok(ImprintKey::Predicted(recipe, shift))
@@ -271,8 +273,8 @@ impl State {
     }
 
     /// How far the points of one subject lie from those of another, where that is there, with its recipe.
-    pub fn subjects_apart(&self, a: &Subject, b: &Subject) -> Option<(ApartKey, &Apart)> {
-        let key = ApartKey { a: self.subject_cloud(a).ok()?, b: self.subject_cloud(b).ok()? };
+    pub fn subjects_apart(&self, a: &Subject, b: &Subject) -> Option<(CloudDifferenceKey, &CloudDifference)> {
+        let key = CloudDifferenceKey { a: self.subject_cloud(a).ok()?, b: self.subject_cloud(b).ok()? };
         let found = self.results.apart.get(&key)?;
         Some((key, found))
     }
@@ -282,16 +284,16 @@ impl State {
 fn side_of(subject: &Subject) -> Option<ImprintSource> {
     match subject {
         Subject::Measured => Some(ImprintSource::Measured),
-        Subject::Predicted(wish) if *wish == Wish::default() => Some(ImprintSource::Predicted),
+        Subject::Predicted(wish) if *wish == RecipeChange::default() => Some(ImprintSource::Predicted),
         _ => None,
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// What the pane of the comparison shows and is not there.
     pub(in crate::app) fn versus(&mut self) {
         let state = self.state;
-        if !state.needs(Need::Versus) || state.sample().ready().is_none() {
+        if !state.needs(Demand::Versus) || state.sample().ready().is_none() {
             return;
         }
         let Versus { a, b, mode } = state.versus();
@@ -329,7 +331,7 @@ impl Wanted<'_> {
             && state.results.clouds.contains(&a)
             && state.results.clouds.contains(&b)
         {
-            self.ask(ApartKey { a, b });
+            self.ask(CloudDifferenceKey { a, b });
         }
     }
 

@@ -14,7 +14,7 @@ use touch2touch_work::io::follow::PERIOD;
 use touch2touch_work::job::Cancel;
 
 /// A followed folder.
-pub(super) enum Job {
+pub(super) enum FollowTask {
     /// On a thread of its own, until told to stop.
     Thread(Cancel),
     /// Looked at in each round, where the runtime has no threads.
@@ -24,12 +24,12 @@ pub(super) enum Job {
 impl Runtime {
     /// Follows a data set's folder instead of what was followed before; `None` follows nothing.
     pub(super) fn follow(&mut self, of: Option<(DatasetSeq, Arc<dyn DataSource>)>) {
-        if let Some(Job::Thread(cancel)) = self.follower.take() {
+        if let Some(FollowTask::Thread(cancel)) = self.follower.take() {
             cancel.cancel();
         }
         let Some((seq, source)) = of else { return };
         if !self.threaded {
-            self.follower = source.follow().map(|following| Job::Inline(seq, following));
+            self.follower = source.follow().map(|following| FollowTask::Inline(seq, following));
             return;
         }
         let cancel = Cancel::default();
@@ -42,7 +42,7 @@ impl Runtime {
             }
         });
         match thread {
-            Ok(_) => self.follower = Some(Job::Thread(cancel)),
+            Ok(_) => self.follower = Some(FollowTask::Thread(cancel)),
             Err(err) => {
                 let answer = Answer::JobFailed(TaskError::from_error("Follow", &err));
                 drop(self.sender.send(Event { id: JobId::Follow, answer }));
@@ -51,7 +51,7 @@ impl Runtime {
     }
 
     pub(super) fn poll_follower(&mut self) {
-        if let Some(Job::Inline(seq, following)) = &mut self.follower {
+        if let Some(FollowTask::Inline(seq, following)) = &mut self.follower {
             while let Some(followed) = following.poll() {
                 let answer = Answer::Followed(*seq, followed);
                 drop(self.sender.send(Event { id: JobId::Follow, answer }));

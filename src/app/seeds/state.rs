@@ -1,10 +1,10 @@
 //! Several seeds of one touch: which, what is there of them, and what is missing.
 
+use super::super::demand::Demands;
 use super::super::keys::{CloudKey, ImprintKey, MaskKey, MetersKey, PoseKey, PredictionKey, Request};
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::super::results::prediction::SeedKey;
 use super::super::state::{Absent, State};
-use super::super::wanted::Wanted;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::pose::PoseResult;
@@ -114,11 +114,11 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// What the pane of the seeds shows and is not there, most urgent first.
     pub(in crate::app) fn seeds(&mut self) {
         let state = self.state;
-        if !state.needs(Need::Seeds) || state.sample().ready().is_none() {
+        if !state.needs(Demand::Seeds) || state.sample().ready().is_none() {
             return;
         }
         let posed = state.seed_pose_absent().is_none();

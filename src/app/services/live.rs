@@ -26,7 +26,7 @@ use touch2touch_work::bundles::{self, BundleInfo};
 use touch2touch_work::case::{self, Case, Held};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::export::{self, ExportChoice, ExportSetup, HandMasks, Plan};
+use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
 use touch2touch_work::io::case_file;
@@ -36,8 +36,8 @@ use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::io::{atomic, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::{LabelStats, label_stats};
-use touch2touch_work::labels::{Deed, Labels, Recovered, Reviews, Told, Unsaved, recover};
-use touch2touch_work::models::{KeptPrediction, Models, Wanted};
+use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
+use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
 use touch2touch_work::new_bundle::models_folder;
 use touch2touch_work::prediction::Prediction;
 use touch2touch_work::tool::tool_file;
@@ -196,11 +196,11 @@ impl DataSource for LiveSource {
         self.labels.load(name)
     }
 
-    fn past(&self, name: &str, labels: &PairLabels) -> Told {
+    fn past(&self, name: &str, labels: &PairLabels) -> JournalHistory {
         self.labels.past(name, labels)
     }
 
-    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
+    fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError> {
         self.labels.save(name, labels, deed)
     }
 
@@ -222,7 +222,7 @@ impl DataSource for LiveSource {
         self.repeats_of(person)?.load(name)
     }
 
-    fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Deed) -> Result<(), TaskError> {
+    fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Operation) -> Result<(), TaskError> {
         self.repeats_of(person)?.save(name, labels, deed).map(drop)
     }
 
@@ -231,7 +231,7 @@ impl DataSource for LiveSource {
     }
 
     fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
-        let masks = HandMasks { labels: &self.labels, changed };
+        let masks = DrawnMasks { labels: &self.labels, changed };
         export::plan(&self.dataset, &masks, &ExportSetup { pairs: None, choice })
     }
 
@@ -242,7 +242,7 @@ impl DataSource for LiveSource {
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError> {
-        let masks = HandMasks { labels: &self.labels, changed };
+        let masks = DrawnMasks { labels: &self.labels, changed };
         let setup = ExportSetup { pairs: None, choice };
         let (plan, _) = export::export_masks(&self.dataset, &masks, &setup, folder, None, cx)?;
         Ok(format!("Exported to {}: {}", folder.display(), plan.lines().join("; ")))
@@ -271,7 +271,7 @@ impl Services for LiveServices {
         bundle: &BundleInfo,
         engine: EngineChoice,
         config: &GenerateConfig,
-        wanted: &[Wanted<'_>],
+        wanted: &[GenerateInput<'_>],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {
         self.models.predict(bundle, engine, config, wanted, cx)
@@ -410,14 +410,14 @@ mod tests {
     use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource};
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
-    use touch2touch_core::hand::{AcceptedPose, HandPose};
     use touch2touch_core::label::Provenance;
+    use touch2touch_core::manual::{AcceptedPose, ManualPose};
     use touch2touch_core::postprocess::ShiftMode;
     use touch2touch_core::rig::lab;
     use touch2touch_work::export::{LeftOut, Which};
     use touch2touch_work::io::masks::MaskStore;
     use touch2touch_work::labels::ImprintOf;
-    use touch2touch_work::labels::{HandMask, MaskPlace, Revision};
+    use touch2touch_work::labels::{DrawnMask, MaskPlace, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -432,7 +432,7 @@ mod tests {
         PairLabels {
             masks: [(
                 MaskPlace::measured(lab::RIGHT),
-                HandMask { revision: Revision(3), ..HandMask::new(mask, Provenance::Threshold { min_m: 0.005 }) },
+                DrawnMask { revision: Revision(3), ..DrawnMask::new(mask, Provenance::Threshold { min_m: 0.005 }) },
             )]
             .into(),
             review: Review::InProgress,
@@ -440,7 +440,7 @@ mod tests {
                 (ImprintOf::Measured, PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
                 (
                     ImprintOf::predicted("b0", &GenerateConfig::default(), ShiftMode::Raw),
-                    AcceptedPose { pose: HandPose { x_m: 1e-3, ..HandPose::default() }, by_hand: true },
+                    AcceptedPose { pose: ManualPose { x_m: 1e-3, ..ManualPose::default() }, by_hand: true },
                 ),
             ]
             .into(),
@@ -463,11 +463,11 @@ mod tests {
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
         assert!(source.load_labels(&name).unwrap().is_empty());
-        source.save_labels(&name, &labels(), &Deed::default()).unwrap();
+        source.save_labels(&name, &labels(), &Operation::default()).unwrap();
         let again = LiveServices::with_config_folder(None).open(&place).unwrap();
         assert_eq!((again.reviews[&name], &*again.notes[&name]), (Review::InProgress, "shallow at the edge"));
         assert!(same(&again.source.load_labels(&name).unwrap(), &labels()));
-        again.source.save_labels(&name, &PairLabels::default(), &Deed::default()).unwrap();
+        again.source.save_labels(&name, &PairLabels::default(), &Operation::default()).unwrap();
         assert!(open_source(&place).unwrap().load_labels(&name).unwrap().is_empty());
     }
 
@@ -478,13 +478,13 @@ mod tests {
         let place = Place::Path(folder.path().to_owned());
         let source = open_source(&place).unwrap();
         let name = source.index().pairs[0].name.clone();
-        source.save_labels(&name, &labels(), &Deed::default()).unwrap();
+        source.save_labels(&name, &labels(), &Operation::default()).unwrap();
         let folder = source.labels.folder().unwrap().to_owned();
         let file = MaskStore::in_folder(folder).mask_file(&name, lab::RIGHT);
         std::fs::write(&file, b"{ half a fi").unwrap();
         let again = open_source(&place).unwrap();
         assert!(again.load_labels(&name).unwrap_err().hint.is_some());
-        assert!(again.save_labels(&name, &labels(), &Deed::default()).is_err());
+        assert!(again.save_labels(&name, &labels(), &Operation::default()).is_err());
         assert_eq!(std::fs::read(&file).unwrap(), b"{ half a fi");
     }
 

@@ -411,7 +411,7 @@ pub struct MaskSettings {
     /// What proposes masks.
     pub proposal: ProposalSource,
     /// Whether accepting a proposal replaces what was painted by hand as well.
-    pub over_hand: bool,
+    pub over_drawn: bool,
     /// What is in force where no mask was drawn by hand.
     #[serde(flatten)]
     pub choice: MaskChoice,
@@ -431,7 +431,7 @@ impl Default for MaskSettings {
             clean_mm: 1.0,
             gate: Gate::default(),
             proposal: ProposalSource::default(),
-            over_hand: false,
+            over_drawn: false,
             choice: MaskChoice::default(),
             bundle: None,
         }

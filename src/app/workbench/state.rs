@@ -6,10 +6,10 @@ use glam::DVec3;
 use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::super::state::State;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::hand::{AcceptedPose, HandCost, HandPose, PoseDifference};
+use touch2touch_core::manual::{AcceptedPose, ManualCost, ManualPose, PoseDifference};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_work::labels::ImprintOf;
 
@@ -141,19 +141,19 @@ pub struct Picked {
 
 /// A pose being set by hand.
 #[derive(Clone, Debug, PartialEq)]
-pub struct HandTry {
+pub struct ManualTry {
     /// The pair.
     pub pair: PairKey,
     /// The imprint it is set for.
     pub source: ImprintSource,
     /// The pose, `grasp_from_object`.
-    pub pose: HandPose,
+    pub pose: ManualPose,
     /// Where it began.
-    pub began: HandPose,
+    pub began: ManualPose,
     /// What it costs; `None` while cloud or model are not there.
-    pub cost: Option<HandCost>,
+    pub cost: Option<ManualCost>,
     /// What it cost where it began.
-    pub began_cost: Option<HandCost>,
+    pub began_cost: Option<ManualCost>,
     /// The registration from here that is being computed.
     pub icp: Option<RunKey>,
     /// The registration that put it where it is, if one did and nothing moved it since.
@@ -178,7 +178,7 @@ pub struct Workbench {
     /// The side that the pointer was over last: what the panes beside the 3D views are about.
     pub side: ImprintSource,
     /// The pose being set.
-    pub hand: Option<HandTry>,
+    pub hand: Option<ManualTry>,
     /// The point clicked last.
     pub picked: Option<Picked>,
     /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
@@ -211,7 +211,7 @@ impl Workbench {
     }
 
     /// The pose being set for one imprint.
-    pub fn hand(&self, source: ImprintSource) -> Option<&HandTry> {
+    pub fn hand(&self, source: ImprintSource) -> Option<&ManualTry> {
         self.hand.as_ref().filter(|hand| hand.source == source)
     }
 }
@@ -268,18 +268,18 @@ impl State {
     }
 
     /// The pose that a person set and accepted.
-    pub fn by_hand(&self, source: ImprintSource) -> Option<HandPose> {
+    pub fn by_hand(&self, source: ImprintSource) -> Option<ManualPose> {
         self.accepted(source).filter(|a| a.by_hand).map(|a| a.pose)
     }
 
     /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
-    pub fn shown_pose(&self, source: ImprintSource) -> Option<HandPose> {
+    pub fn shown_pose(&self, source: ImprintSource) -> Option<ManualPose> {
         let held = self.workbench.hand(source).map(|hand| hand.pose);
         held.or_else(|| self.by_hand(source)).or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into()))
     }
 
     /// Where setting a pose by hand begins.
-    pub fn hand_begins(&self, source: ImprintSource) -> HandPose {
+    pub fn manual_begins(&self, source: ImprintSource) -> ManualPose {
         let accepted = self.accepted(source).map(|a| a.pose);
         accepted.or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into())).unwrap_or_default()
     }
@@ -287,15 +287,15 @@ impl State {
     /// Whether something on screen shows the layers of an imprint.
     pub(crate) fn shows_layers(&self, source: ImprintSource) -> bool {
         let bench = &self.workbench;
-        let in_scene = self.needs(Need::Scene(source))
+        let in_scene = self.needs(Demand::Scene(source))
             && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
                 || bench.picked.is_some_and(|picked| picked.source == source));
-        in_scene || (self.needs(Need::Layers) && bench.side == source)
+        in_scene || (self.needs(Demand::Layers) && bench.side == source)
     }
 
     /// Whether a 3D view shows the distances between an imprint and the model.
     pub(crate) fn shows_deviation(&self, source: ImprintSource) -> bool {
-        self.workbench.layer == Layer::Distance && self.needs(Need::Scene(source))
+        self.workbench.layer == Layer::Distance && self.needs(Demand::Scene(source))
     }
 
     /// How far the registered poses of measurement and prediction are apart, where both are there.

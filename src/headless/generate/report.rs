@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::super::seeds::SeedFigures;
-use touch2touch_core::ambiguity::{Ambiguity, Touch};
+use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
 use touch2touch_core::evaluation;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::metrics::{self, Unstretched};
@@ -172,7 +172,7 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
         vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.vqvae?.0))).map(Stored),
         seen: PartMean::of(pairs, |p| p.seen),
         invented: PartMean::of(pairs, |p| p.invented),
-        ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == Touch::BareShaft)).count(),
+        ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == TouchKind::BareShaft)).count(),
         seconds: of(|p| Some(p.seconds)),
     }
 }

@@ -74,7 +74,7 @@ pub(in super::super) struct LabelArgs {
     pub(super) propose: Option<ProposalSource>,
     /// Let the proposal replace what was painted by hand as well.
     #[arg(long, requires = "propose")]
-    pub(super) over_hand: bool,
+    pub(super) over_drawn: bool,
     /// The pair whose mask is carried; else the nearest one before of the same tool that somebody worked on.
     #[arg(long, value_name = "PAIR", requires = "propose")]
     pub(super) carry_from: Option<String>,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use touch2touch_core::grid::Mask;
-use touch2touch_core::hand::AcceptedPose;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::label_stats::Counts;
 use touch2touch_work::labels::{ImprintOf, PairLabels};

@@ -22,7 +22,7 @@ pub(in super::super) struct ImportArgs {
     format: Option<Format>,
     /// Replace what was painted by hand as well, also of pairs marked "done", "flagged" or "skip".
     #[arg(long)]
-    over_hand: bool,
+    over_drawn: bool,
     /// Who imports; else whom the system says.
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
@@ -39,7 +39,7 @@ pub(super) fn run(args: &ImportArgs) -> VerbResult {
     let setup = ImportSetup {
         from: args.from.clone(),
         format: args.format,
-        over_hand: args.over_hand,
+        over_drawn: args.over_drawn,
         person: args.person.clone(),
     };
     let planned = plan_import(&dataset, &setup, &output.job())?;

@@ -25,7 +25,7 @@ pub(in super::super) struct ProposeArgs {
     imprint: ImprintSource,
     /// Replace what was painted by hand as well. Pairs marked "done", "flagged" or "skip" stay as they are all the same.
     #[arg(long)]
-    over_hand: bool,
+    over_drawn: bool,
     /// Only pairs that answer to all these words, as in the studio's filter box: parts of name, tool or note, `tool:rod`,
     /// `is:todo`, `note:edge`, `has:note`.
     #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
@@ -76,7 +76,7 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
             carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
         },
         pairs,
-        over_hand: args.over_hand,
+        over_drawn: args.over_drawn,
         person: args.person.clone(),
     };
     let found = propose_all(&dataset, &setup, &models, &output.job())?;

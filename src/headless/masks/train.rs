@@ -10,11 +10,11 @@ use super::super::args::{DatasetArgs, parse_minutes};
 use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
 use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::export::HandMasks;
+use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::models::Models;
 use touch2touch_work::new_bundle::models_folder;
-use touch2touch_work::train::{Told, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
+use touch2touch_work::train::{MaskScore, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
 use touch2touch_work::tuning::{Tuning, unfinished_folder};
 
 /// Trained for so long where nothing is said.
@@ -65,7 +65,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
     let output = Output::new(args.common, "training", 1);
     let labels = Labels::of(&dataset);
-    let masks = HandMasks { labels: &labels, changed: &BTreeMap::new() };
+    let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
     let choice = TrainChoice { held_out_percent: args.held_out, seed: args.seed, test_in_train: args.test_in_train };
     let planned = plan(&dataset, &masks, choice)?;
     for line in planned.lines() {
@@ -126,7 +126,7 @@ fn text(trained: &Trained) -> String {
         lines.push(format!("{:>15} {:>15}  on pairs that were left out, the worst first", "IoU", "Dice"));
     }
     let change = |before: f64, after: f64| format!("{before:.3} -> {after:.3}");
-    let row = |before: Told, after: Told, name: &str| {
+    let row = |before: MaskScore, after: MaskScore, name: &str| {
         format!("{:>15} {:>15}  {name}", change(before.iou, after.iou), change(before.dice, after.dice))
     };
     for one in &trained.held_out {

@@ -9,14 +9,14 @@ use super::influence::Influences;
 use touch2touch_core::align::AlignReport;
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
-use touch2touch_core::hand::{AcceptedPose, HandPose};
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
 
 #[derive(Debug, Clone, Serialize)]
-pub(super) struct Case {
+pub(super) struct PoseRow {
     pub(super) name: String,
     pub(super) engine: String,
     pub(super) imprint: &'static str,
@@ -52,7 +52,7 @@ pub(super) struct Case {
     pub(super) fan: Option<PoseFan>,
 }
 
-/// An accepted pose in the sense of the other numbers of a [`Case`].
+/// An accepted pose in the sense of the other numbers of a [`PoseRow`].
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Accepted {
     /// Whether a person set it, rather than took over what a registration answered.
@@ -62,7 +62,7 @@ pub(super) struct Accepted {
     pub(super) y_m: f64,
     pub(super) z_m: f64,
     /// All six numbers as they are stored.
-    pub(super) grasp_from_object: HandPose,
+    pub(super) grasp_from_object: ManualPose,
 }
 
 impl Accepted {
@@ -97,14 +97,14 @@ pub(super) struct Summary {
 
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
-    pub(super) cases: Vec<Case>,
+    pub(super) cases: Vec<PoseRow>,
     pub(super) summary: Summary,
     /// What is odd about the files and the numbers in them, by kind.
     pub(super) notes: Vec<Finding>,
 }
 
-pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> AngleMetrics {
-    let cases: Vec<&Case> = cases.collect();
+pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a PoseRow>) -> AngleMetrics {
+    let cases: Vec<&PoseRow> = cases.collect();
     // A case without truth has no error; one without a pose is a failure.
     let errors: Vec<f64> =
         cases.iter().filter(|c| c.truth_deg.is_some()).map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians)).collect();
@@ -114,7 +114,7 @@ pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a Case>) -> AngleMetrics
     AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-pub(super) fn summary(cases: &[Case], first_imprint: &str, first_engine: RegistrationChoice) -> Summary {
+pub(super) fn summary(cases: &[PoseRow], first_imprint: &str, first_engine: RegistrationChoice) -> Summary {
     let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
     let mut engines = BTreeMap::new();
     for case in cases {

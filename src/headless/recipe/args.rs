@@ -13,7 +13,7 @@ use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::subject::{Mapping, Wish};
+use touch2touch_work::subject::{Mapping, RecipeChange};
 
 /// Which models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -63,7 +63,7 @@ pub struct ModelArgs {
 impl ModelArgs {
     /// The same with what a subject of a comparison wants otherwise. A bundle is named by its folder, or as it calls
     /// itself.
-    pub(in crate::headless) fn with(&self, wish: &Wish) -> Self {
+    pub(in crate::headless) fn with(&self, wish: &RecipeChange) -> Self {
         let mut args = self.clone();
         if let Some(name) = &wish.bundle {
             let found = self.found.get_or_init(|| bundles::find(&[]));

@@ -26,12 +26,12 @@ pub(in crate::ui) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
 
 fn content(cx: &mut Cx<'_>, ui: &mut egui::Ui, form: &ImportForm) {
     ui.add(egui::Label::new(caption(form.from.display().to_string(), cx.p)).wrap());
-    let mut over_hand = form.over_hand;
+    let mut over_drawn = form.over_drawn;
     let tip = "Else pixels that a person painted stay, and so do the masks of pairs marked \"done\", \"flagged\" or \
                \"skip\". Undo brings back what was, pair by pair";
-    let tick = ui.checkbox(&mut over_hand, "over hand work and judged pairs").on_hover_text(tip);
+    let tick = ui.checkbox(&mut over_drawn, "over hand work and judged pairs").on_hover_text(tip);
     if tick.changed() {
-        cx.push(ExportCommand::ImportOverHand(over_hand));
+        cx.push(ExportCommand::ImportOverHand(over_drawn));
     }
     ui.separator();
     let ready = plan(cx, ui);

@@ -76,7 +76,7 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
     let tip = "A score on tools that were not trained on. Else each pair goes to a part by itself";
     ui.checkbox(&mut choice.by_tool, "all pairs of a tool in the same part").on_hover_text(tip);
     let tip = "All other pixels are ignored: they are written beside the masks as pixels of which these say nothing";
-    ui.checkbox(&mut choice.hand_checked, "only pixels painted by hand").on_hover_text(tip);
+    ui.checkbox(&mut choice.manual_checked, "only pixels painted by hand").on_hover_text(tip);
     ui.horizontal(|ui| {
         ui.label(caption("Seed of the division", cx.p));
         let drag = ui.add(DragValue::new(&mut choice.seed).range(0..=999_999)).accessible_name("Seed of the division");

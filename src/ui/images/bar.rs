@@ -9,7 +9,7 @@ use crate::app::command::{Pane, SettingsCommand};
 use crate::app::settings::ColorRange;
 use crate::ui::cx::Cx;
 use crate::ui::theme::SMALL;
-use crate::ui::widget::colorbar::{Asked, Colorbar};
+use crate::ui::widget::colorbar::{Colorbar, ColorbarChange};
 use crate::ui::widget::texture::Histogram;
 use touch2touch_core::colormap::{ColorMap, Range};
 
@@ -56,13 +56,13 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
             tips: [AUTO.to_owned(), String::new()],
         };
         match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
-            Some(Asked::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
-            Some(Asked::Auto) => {
+            Some(ColorbarChange::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
+            Some(ColorbarChange::Auto) => {
                 if let Some(h) = histogram {
                     cx.shared.views.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
                 }
             }
-            Some(Asked::Lock(_)) | None => {}
+            Some(ColorbarChange::Lock(_)) | None => {}
         }
         return;
     }
@@ -79,11 +79,11 @@ pub(in crate::ui) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogr
         tips: [keys.behind(AUTO, Action::RangeOnce), keys.behind(LOCK, Action::LockRange)],
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
-        Some(Asked::Range(r)) => {
+        Some(ColorbarChange::Range(r)) => {
             cx.push(prefer(move |s| s.range = ColorRange { min_m: r.lo * 1e-3, max_m: r.hi * 1e-3, ..s.range }));
         }
-        Some(Asked::Auto) => cx.push(SettingsCommand::RangeFromShown),
-        Some(Asked::Lock(locked)) => cx.push(prefer(move |s| s.range.locked = locked)),
+        Some(ColorbarChange::Auto) => cx.push(SettingsCommand::RangeFromShown),
+        Some(ColorbarChange::Lock(locked)) => cx.push(prefer(move |s| s.range.locked = locked)),
         None => {}
     }
 }

@@ -39,7 +39,7 @@ pub(super) fn mask(
         let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);
         output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
     }
-    if let Some(ignored) = cx.state.hand_mask(source, finger).and_then(|hand| hand.marks.ignored()) {
+    if let Some(ignored) = cx.state.drawn_mask(source, finger).and_then(|hand| hand.marks.ignored()) {
         let slot = ("ignored", source, finger);
         let veil = || (mask_image(ignored, Color32::WHITE), None);
         let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);

@@ -42,7 +42,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
         if shown {
             cx.action_button(ui, Action::Accept, "Accept");
             let tip = "Accepting replaces what was painted by hand as well; off, hand work stays";
-            ui.checkbox(&mut new.over_hand, "over hand work").on_hover_text(tip);
+            ui.checkbox(&mut new.over_drawn, "over hand work").on_hover_text(tip);
         } else {
             for_all(cx, ui);
         }
@@ -63,7 +63,7 @@ fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip)));
     } else {
         // Said here as well: the box that sets it is on screen only with a proposal.
-        let over = if cx.state.settings.mask.over_hand { ", over hand work" } else { "" };
+        let over = if cx.state.settings.mask.over_drawn { ", over hand work" } else { "" };
         let text = format!("Propose for {} listed{over}", cx.state.library.order.len());
         cx.action_button(ui, Action::ProposeAll, &text);
     }

@@ -14,7 +14,7 @@ use crate::gpu::guides::AXIS_COLORS;
 use crate::gpu::view::Camera;
 use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
-use touch2touch_core::hand::{HandAxis, HandPose};
+use touch2touch_core::manual::{ManualPose, PoseAxis};
 
 /// How near the pointer must be to a handle, points.
 const NEAR: f32 = 9.0;
@@ -33,7 +33,7 @@ enum Handle {
     /// y and z.
     Disc,
     /// A turn about x, y or z.
-    Ring(HandAxis),
+    Ring(PoseAxis),
     /// Along x.
     Arm,
 }
@@ -44,7 +44,7 @@ struct Drag {
     source: ImprintSource,
     handle: Handle,
     /// The pose when it began.
-    from: HandPose,
+    from: ManualPose,
     /// The pointer when it began, physical pixels of the view.
     began: DVec2,
 }
@@ -70,18 +70,18 @@ impl Gizmo {
 }
 
 /// The normal of the plane that a ring lies in.
-fn normal(axis: HandAxis) -> DVec3 {
+fn normal(axis: PoseAxis) -> DVec3 {
     match axis {
-        HandAxis::Pitch => DVec3::Y,
-        HandAxis::Yaw => DVec3::Z,
+        PoseAxis::Pitch => DVec3::Y,
+        PoseAxis::Yaw => DVec3::Z,
         _ => DVec3::X,
     }
 }
 
-fn radius(axis: HandAxis) -> f64 {
+fn radius(axis: PoseAxis) -> f64 {
     match axis {
-        HandAxis::Pitch => RINGS[1],
-        HandAxis::Yaw => RINGS[2],
+        PoseAxis::Pitch => RINGS[1],
+        PoseAxis::Yaw => RINGS[2],
         _ => RINGS[0],
     }
 }
@@ -90,10 +90,10 @@ fn radius(axis: HandAxis) -> f64 {
 struct Placed {
     center: Pos2,
     arm: Option<Pos2>,
-    rings: Vec<(HandAxis, Vec<Pos2>)>,
+    rings: Vec<(PoseAxis, Vec<Pos2>)>,
 }
 
-fn origin(pose: HandPose) -> DVec3 {
+fn origin(pose: ManualPose) -> DVec3 {
     DVec3::new(pose.x_m, pose.planar.y_m, pose.planar.z_m)
 }
 
@@ -104,12 +104,12 @@ fn meters(camera: &Camera, output: &SceneOutput, ppp: f32, at: DVec3, points: f6
     points * f64::from(ppp) * scale.max(1e-3) / camera.px_per_m(output.size)
 }
 
-fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: HandPose, six_dof: bool) -> Option<Placed> {
+fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: ManualPose, six_dof: bool) -> Option<Placed> {
     let at = origin(pose);
     let center = output.on_screen(camera, at)?;
     let meter = |points: f64| meters(camera, output, ppp, at, points);
-    let axes: &[HandAxis] =
-        if six_dof { &[HandAxis::Theta, HandAxis::Pitch, HandAxis::Yaw] } else { &[HandAxis::Theta] };
+    let axes: &[PoseAxis] =
+        if six_dof { &[PoseAxis::Theta, PoseAxis::Pitch, PoseAxis::Yaw] } else { &[PoseAxis::Theta] };
     let rings = axes.iter().map(|&axis| {
         let (n, r) = (normal(axis), meter(radius(axis)));
         let (u, v) = n.any_orthonormal_pair();
@@ -142,7 +142,7 @@ fn to_segment(p: Pos2, a: Pos2, b: Pos2) -> f32 {
 }
 
 /// The pose that a drag of `handle` from `began` to `now` (physical pixels) leads to.
-fn dragged(camera: &Camera, size: [u32; 2], from: HandPose, handle: Handle, began: DVec2, now: DVec2) -> HandPose {
+fn dragged(camera: &Camera, size: [u32; 2], from: ManualPose, handle: Handle, began: DVec2, now: DVec2) -> ManualPose {
     let at = origin(from);
     let n = match handle {
         Handle::Ring(axis) => normal(axis),
@@ -166,7 +166,7 @@ fn dragged(camera: &Camera, size: [u32; 2], from: HandPose, handle: Handle, bega
                 (Some(a), Some(b)) => b - a,
                 _ => on_screen,
             };
-            from.moved(HandAxis::Y, by.y).moved(HandAxis::Z, by.z)
+            from.moved(PoseAxis::Y, by.y).moved(PoseAxis::Z, by.z)
         }
         Handle::Arm => {
             // As far along x as the drag goes along the picture of x.
@@ -174,7 +174,7 @@ fn dragged(camera: &Camera, size: [u32; 2], from: HandPose, handle: Handle, bega
             let shown = DVec2::new(right.x, up.x);
             let moved = DVec2::new(on_screen.dot(right), on_screen.dot(up));
             let by = if shown.length_squared() > 0.01 { moved.dot(shown) / shown.length_squared() } else { 0.0 };
-            from.moved(HandAxis::X, by)
+            from.moved(PoseAxis::X, by)
         }
         Handle::Ring(axis) => {
             let angle = match (meet(began), meet(now)) {
@@ -200,7 +200,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory, source: Imprin
         }
         return;
     }
-    let pose = bench.hand(source).map_or_else(|| cx.state.hand_begins(source), |hand| hand.pose);
+    let pose = bench.hand(source).map_or_else(|| cx.state.manual_begins(source), |hand| hand.pose);
     let six_dof = bench.six_dof;
     let camera = memory.views[source as usize].camera;
     let ppp = ui.pixels_per_point();
@@ -253,8 +253,8 @@ fn paint(cx: &Cx<'_>, ui: &Ui, output: &SceneOutput, placed: &Placed, active: Op
     };
     for (axis, rim) in &placed.rings {
         let which = match axis {
-            HandAxis::Pitch => 1,
-            HandAxis::Yaw => 2,
+            PoseAxis::Pitch => 1,
+            PoseAxis::Yaw => 2,
             _ => 0,
         };
         painter.add(Shape::line(rim.clone(), Stroke::new(5.0, cx.p.canvas.gamma_multiply(0.7))));
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn the_disc_follows_the_pointer_in_the_plane() {
         for camera in [side_view(), Camera::default()] {
-            let from = HandPose::default().moved(HandAxis::Y, 0.004).moved(HandAxis::Theta, 0.2);
+            let from = ManualPose::default().moved(PoseAxis::Y, 0.004).moved(PoseAxis::Theta, 0.2);
             let began = camera.project(origin(from), SIZE).unwrap().0;
             let goal = origin(from) + DVec3::new(0.0, 0.003, -0.005);
             let now = camera.project(goal, SIZE).unwrap().0;
@@ -301,8 +301,8 @@ mod tests {
     #[test]
     fn rings_turn_by_the_angle_that_the_pointer_goes_around() {
         let camera = Camera::default();
-        let from = HandPose::default().moved(HandAxis::Z, 0.002);
-        for axis in [HandAxis::Theta, HandAxis::Pitch, HandAxis::Yaw] {
+        let from = ManualPose::default().moved(PoseAxis::Z, 0.002);
+        for axis in [PoseAxis::Theta, PoseAxis::Pitch, PoseAxis::Yaw] {
             let (u, v) = normal(axis).any_orthonormal_pair();
             // Both orders of the pair are right-handed about the normal or not: ask the cross product.
             let sign = u.cross(v).dot(normal(axis)).signum();
@@ -320,13 +320,13 @@ mod tests {
     #[test]
     fn the_arm_moves_along_x_and_edge_on_drags_stay_finite() {
         let camera = Camera { yaw_rad: 1.2, ..Camera::default() };
-        let from = HandPose::default();
+        let from = ManualPose::default();
         let px = |p: DVec3| camera.project(p, SIZE).unwrap().0;
         let to = dragged(&camera, SIZE, from, Handle::Arm, px(DVec3::ZERO), px(DVec3::X * 0.002));
         assert!((to.x_m - 0.002).abs() < 1e-4 && to.planar == from.planar, "{to:?}");
         let mut front = Camera::default();
         front.look_from(Preset::Front);
-        for handle in [Handle::Disc, Handle::Arm, Handle::Ring(HandAxis::Theta)] {
+        for handle in [Handle::Disc, Handle::Arm, Handle::Ring(PoseAxis::Theta)] {
             let to = dragged(&front, SIZE, from, handle, DVec2::new(300.0, 200.0), DVec2::new(340.0, 250.0));
             assert!(to.is_finite() && origin(to).length() < 0.1, "{handle:?} {to:?}");
         }

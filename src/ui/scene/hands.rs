@@ -7,10 +7,10 @@ use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::SceneLayer;
 use crate::app::state::State;
-use crate::app::workbench::{HandTry, Layer, SceneTool};
+use crate::app::workbench::{Layer, ManualTry, SceneTool};
 use crate::ui::cx::Cx;
 use crate::ui::theme::{SMALL, caption};
-use touch2touch_core::hand::{HandCost, HandPose, PoseDifference};
+use touch2touch_core::manual::{ManualCost, ManualPose, PoseDifference};
 use touch2touch_core::units;
 
 /// The tools, below the buttons that turn the view; those that do not fit are left to menu and keys.
@@ -53,17 +53,17 @@ pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column:
 }
 
 /// The pose that a hand holds on a side, or would hold.
-fn held(state: &State, source: ImprintSource) -> Option<HandPose> {
+fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {
     let bench = &state.workbench;
     if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
         return None;
     }
-    Some(bench.hand(source).map_or_else(|| state.hand_begins(source), |hand| hand.pose))
+    Some(bench.hand(source).map_or_else(|| state.manual_begins(source), |hand| hand.pose))
 }
 
 /// Height of the strip of the pose in hand, points; 0 where there is none.
 pub(super) fn strip_height(state: &State, source: ImprintSource) -> f32 {
-    let lines = |pose: HandPose| if pose.is_planar() { 4.0 } else { 5.0 };
+    let lines = |pose: ManualPose| if pose.is_planar() { 4.0 } else { 5.0 };
     held(state, source).map_or(0.0, |pose| 25.0 + 14.0 * lines(pose))
 }
 
@@ -118,13 +118,13 @@ fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source
 }
 
 /// The three numbers out of the plane.
-fn tilt_text(pose: HandPose) -> String {
+fn tilt_text(pose: ManualPose) -> String {
     let (pitch, yaw) = (pose.pitch_rad.to_degrees(), pose.yaw_rad.to_degrees());
     format!("x {:+.2} mm   pitch {pitch:+.1}°   yaw {yaw:+.1}°", units::mm(pose.x_m))
 }
 
 /// The three numbers in the plane.
-pub(super) fn place_text(pose: HandPose) -> String {
+pub(super) fn place_text(pose: ManualPose) -> String {
     let planar = pose.planar;
     // The angle as everywhere on screen: of the tool's inverse motion, as the lab reports it.
     let angle = planar.inverse().theta_rad;
@@ -132,7 +132,7 @@ pub(super) fn place_text(pose: HandPose) -> String {
 }
 
 /// What the pose costs, against where it began.
-fn cost_text(cx: &Cx<'_>, hand: Option<&HandTry>) -> (String, Color32) {
+fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
     let Some(hand) = hand else {
         return ("Move the tool by keys or by its handles".into(), cx.p.weak);
     };
@@ -144,7 +144,7 @@ fn cost_text(cx: &Cx<'_>, hand: Option<&HandTry>) -> (String, Color32) {
     (text, if better { cx.p.good } else { cx.p.caution })
 }
 
-fn costs(now: HandCost, before: HandCost) -> String {
+fn costs(now: ManualCost, before: ManualCost) -> String {
     format!(
         "outline {:.2} (was {:.2}) mm · {:.0} % inliers · surface {:.2} mm",
         units::mm(now.outline_rms_m),
@@ -155,6 +155,6 @@ fn costs(now: HandCost, before: HandCost) -> String {
 }
 
 /// How far the planar part of a pose is off the truth.
-pub(super) fn off_truth(state: &State, pose: HandPose) -> Option<PoseDifference> {
+pub(super) fn off_truth(state: &State, pose: ManualPose) -> Option<PoseDifference> {
     Some(PoseDifference::between(pose.planar, state.truth()?))
 }

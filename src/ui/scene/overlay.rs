@@ -16,7 +16,7 @@ use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
 use crate::ui::theme::{Palette, grade_color};
 use touch2touch_core::align::Rung;
-use touch2touch_core::hand::PoseDifference;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::verdict::Grade;

@@ -18,9 +18,9 @@ const LINE: f32 = 16.0;
 const NAMES: f32 = 62.0;
 
 /// A column of figures: angle in the lab's sense (degrees), y, z, root of the cost (mm).
-type Column = [Option<f64>; 4];
+type StepFigures = [Option<f64>; 4];
 
-fn column(pose: PlanarPose, cost_m2: Option<f64>) -> Column {
+fn column(pose: PlanarPose, cost_m2: Option<f64>) -> StepFigures {
     let lab = units::wrap_angle(-pose.theta_rad).to_degrees();
     [Some(lab), Some(units::mm(pose.y_m)), Some(units::mm(pose.z_m)), cost_m2.map(root_mm)]
 }
@@ -30,8 +30,8 @@ pub(super) fn root_mm(cost_m2: f64) -> f64 {
     units::mm(cost_m2.max(0.0).sqrt())
 }
 
-fn minus(a: Column, b: Column) -> Column {
-    let mut difference: Column = std::array::from_fn(|i| Some(a[i]? - b[i]?));
+fn minus(a: StepFigures, b: StepFigures) -> StepFigures {
+    let mut difference: StepFigures = std::array::from_fn(|i| Some(a[i]? - b[i]?));
     difference[0] = difference[0].map(|deg| units::wrap_angle(deg.to_radians()).to_degrees());
     difference
 }
@@ -43,7 +43,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     let now = column(step.grasp_from_object, Some(step.cost_m2));
     let truth = cx.state.truth();
     let pins = cx.state.pins();
-    let mut columns: Vec<(&str, Color32, Column)> = vec![("now", cx.p.strong, now)];
+    let mut columns: Vec<(&str, Color32, StepFigures)> = vec![("now", cx.p.strong, now)];
     if let Some(truth) = truth {
         columns.push(("− true", cx.p.truth, minus(now, column(truth, None))));
     }
@@ -129,7 +129,7 @@ fn text(cx: &Cx<'_>, ui: &mut Ui, text: &str, tip: &str) {
 }
 
 /// The names of the columns; those of pins let them go.
-fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, Column)], pins: [Option<Pin>; 2], width: f32) {
+fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, StepFigures)], pins: [Option<Pin>; 2], width: f32) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), LINE), Sense::hover());
     for (i, (name, color, _)) in columns.iter().enumerate() {
         let right = rect.left() + NAMES + width * (i + 1) as f32 - 2.0;

@@ -13,7 +13,7 @@ use crate::ui::theme::{SMALL, caption};
 use crate::ui::widget::cut::cut_in_the_middle;
 use touch2touch_core::rig::SensorKind;
 use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::subject::{Mapping, SEEDS, Subject, Wish};
+use touch2touch_work::subject::{Mapping, RecipeChange, SEEDS, Subject};
 
 /// Width of a letter in a button, points.
 const LETTER: f32 = 5.8;
@@ -50,7 +50,7 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
     row(ui, Subject::shown(), "Prediction on screen", "The prediction that the other panes show");
     let mean = match subject {
         Subject::Mean(..) => subject.clone(),
-        _ => Subject::Mean(Wish::default(), 8),
+        _ => Subject::Mean(RecipeChange::default(), 8),
     };
     row(ui, mean, "Mean of seeds", "The mean of predictions that differ in their seeds");
     row(ui, Subject::Stored, "Stored picture", "What another program predicted: NAME_vqvae.png beside the pair");
@@ -86,18 +86,23 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
 }
 
 /// The predictions that were made of the active finger, each as the wish that names it.
-fn made(cx: &Cx<'_>) -> BTreeSet<Wish> {
+fn made(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
     let state = cx.state;
     let made = state.touch_key(state.selection.finger).and_then(|touch| state.results.made.get(&touch));
     let wish = |key: &crate::app::keys::PredictionKey| {
         let bundle = state.library.bundle(&key.bundle)?;
-        Some(Wish { bundle: Some(bundle.name.clone()), steps: Some(key.steps), seed: Some(key.seed), shift: None })
+        Some(RecipeChange {
+            bundle: Some(bundle.name.clone()),
+            steps: Some(key.steps),
+            seed: Some(key.seed),
+            shift: None,
+        })
     };
     made.into_iter().flatten().rev().take(6).filter_map(wish).collect()
 }
 
 /// Model, seed, steps and way to meters; what was changed.
-fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &Wish) -> Option<Wish> {
+fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &RecipeChange) -> Option<RecipeChange> {
     let mut new = wish.clone();
     ui.spacing_mut().item_spacing.y = 2.0;
     let rig = cx.state.rig();

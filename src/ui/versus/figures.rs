@@ -13,7 +13,7 @@ use touch2touch_work::subject::Subject;
 
 /// A column of the figures.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Column {
+enum Metric6 {
     Psnr,
     Ssim,
     Mean,
@@ -22,7 +22,7 @@ enum Column {
     Angle,
 }
 
-impl Column {
+impl Metric6 {
     const ALL: [Self; 6] = [Self::Psnr, Self::Ssim, Self::Mean, Self::Seen, Self::Invented, Self::Angle];
     /// Where there is little room.
     const FEW: [Self; 4] = [Self::Psnr, Self::Mean, Self::Seen, Self::Angle];
@@ -74,7 +74,7 @@ const NAMES: f32 = 34.0;
 pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let state = cx.state;
     let finger = state.selection.finger;
-    let columns = if ui.available_width() < 400.0 { &Column::FEW[..] } else { &Column::ALL[..] };
+    let columns = if ui.available_width() < 400.0 { &Metric6::FEW[..] } else { &Metric6::ALL[..] };
     let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), 4.0 * ROW), Sense::hover());
     let width = ((area.width() - NAMES) / columns.len() as f32).min(92.0);
     let painter = ui.painter_at(area);

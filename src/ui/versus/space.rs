@@ -6,7 +6,7 @@ use eframe::egui::{Align2, Color32, FontId, Ui, pos2, vec2};
 use glam::DVec3;
 
 use super::{Letter, color};
-use crate::app::keys::{ApartKey, CloudKey, DatasetSeq};
+use crate::app::keys::{CloudDifferenceKey, CloudKey, DatasetSeq};
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
@@ -28,7 +28,7 @@ const POINT_M: f32 = 0.000_5;
 pub(super) struct Space {
     view: SceneView,
     clouds: [Option<Held>; 2],
-    apart: Option<(ApartKey, u64, PerPad<Colored>)>,
+    apart: Option<(CloudDifferenceKey, u64, PerPad<Colored>)>,
     mesh: Option<SceneMesh>,
     fitted: Option<(DatasetSeq, u64)>,
     revision: u64,

@@ -38,7 +38,7 @@ pub(crate) struct Colorbar<'a> {
 
 /// What a person asked of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Asked {
+pub enum ColorbarChange {
     /// This range, millimeters.
     Range(Range),
     /// The range of what is shown, once.
@@ -49,7 +49,7 @@ pub enum Asked {
 
 impl Colorbar<'_> {
     /// Shows the bar over the width of `ui`; `range` is in millimeters.
-    pub(crate) fn show(self, ui: &mut Ui, range: Range) -> Option<Asked> {
+    pub(crate) fn show(self, ui: &mut Ui, range: Range) -> Option<ColorbarChange> {
         let p = Palette::of(ui);
         let mut asked = None;
         ui.allocate_ui(vec2(ui.available_width(), HEIGHT), |ui| {
@@ -68,7 +68,7 @@ impl Colorbar<'_> {
                 };
                 let width = (ui.available_width() - END - 26.0 - buttons - note - 8.0).max(24.0);
                 if let Some(new) = self.gradient(ui, width, range, p) {
-                    asked = Some(Asked::Range(new));
+                    asked = Some(ColorbarChange::Range(new));
                 }
                 let hi = end(ui, &mut edited.hi, &format!("{}, upper end", self.label));
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
@@ -96,7 +96,7 @@ impl Colorbar<'_> {
                         edited = Range::symmetric(size);
                     }
                     if edited.hi - edited.lo >= 0.01 {
-                        asked = Some(Asked::Range(edited));
+                        asked = Some(ColorbarChange::Range(edited));
                     }
                 }
             });
@@ -104,19 +104,19 @@ impl Colorbar<'_> {
         asked
     }
 
-    fn buttons(&self, ui: &mut Ui) -> Option<Asked> {
+    fn buttons(&self, ui: &mut Ui) -> Option<ColorbarChange> {
         let mut asked = None;
         let auto = ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(32.0, 18.0)));
         let auto = auto.accessible_name(format!("{}: set from what is shown", self.label));
         if auto.on_hover_text(&self.tips[0]).clicked() {
-            asked = Some(Asked::Auto);
+            asked = Some(ColorbarChange::Auto);
         }
         if let Some(locked) = self.locked {
             let text = egui::RichText::new("Lock").size(SMALL);
             let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(32.0, 18.0)));
             let lock = lock.accessible_name(format!("{}: lock", self.label));
             if lock.on_hover_text(&self.tips[1]).clicked() {
-                asked = Some(Asked::Lock(!locked));
+                asked = Some(ColorbarChange::Lock(!locked));
             }
         }
         asked

@@ -44,8 +44,8 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::hand::{HandAxis, HandPose};
 use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
+use touch2touch_core::manual::{ManualPose, PoseAxis};
 use touch2touch_core::pose::Rejection;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_work::error::TaskError;
@@ -58,7 +58,7 @@ use touch2touch_work::io::dataset::ToolUnit;
 use touch2touch_work::io::exchange::Format;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::{PreviewPicture, Progress};
-use touch2touch_work::labels::Deed;
+use touch2touch_work::labels::Operation;
 use touch2touch_work::propose::Batch;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
@@ -176,7 +176,7 @@ fn unsaved() -> impl Strategy<Value = UnsavedCommand> {
 }
 
 fn not_saved(seq: DatasetSeq) -> Box<NotSaved> {
-    let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Deed::default());
+    let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Operation::default());
     let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed, repeat: None };
     let err = TaskError::new("Save the labels", "no space left");
     Box::new(NotSaved { source: Double::new(false, true).source, save, err })
@@ -278,11 +278,11 @@ fn form() -> impl Strategy<Value = FigureForm> {
 
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
     let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>(), any_of::<Format>());
-    flags.prop_map(|(which, [test_in_train, by_tool, hand_checked], seed, format)| ExportChoice {
+    flags.prop_map(|(which, [test_in_train, by_tool, manual_checked], seed, format)| ExportChoice {
         which,
         test_in_train,
         by_tool,
-        hand_checked,
+        manual_checked,
         seed,
         format,
     })
@@ -504,8 +504,8 @@ draws! {
         3 SetTool(any_of::<SceneTool>()),
         1 SetSixDof(any::<bool>()),
         1 SetSide(source()),
-        1 Nudge(any_of::<HandAxis>(), number().prop_map(f64::from)),
-        1 SetHandPose(planar().prop_map(HandPose::from)),
+        1 Nudge(any_of::<PoseAxis>(), number().prop_map(f64::from)),
+        1 SetHandPose(planar().prop_map(ManualPose::from)),
         1 StartIcp,
         1 AcceptHand,
         1 RevertHand,

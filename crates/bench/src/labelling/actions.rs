@@ -17,7 +17,7 @@ use strum::IntoEnumIterator as _;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Drawing, Ground, Paint, Provenance, grow, iou, islands};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::labels::HandMask;
+use touch2touch_work::labels::DrawnMask;
 
 /// The IoU with the true contact at which a mask is done.
 pub(super) const TARGET: f64 = 0.95;
@@ -116,7 +116,7 @@ impl Move {
         Self { does, actions: self.actions + next.actions, seconds: self.seconds + next.seconds - DECIDE_S }
     }
 
-    fn on(&self, hand: &mut HandMask, imprint: &DepthMap, rig: &Rig) {
+    fn on(&self, hand: &mut DrawnMask, imprint: &DepthMap, rig: &Rig) {
         for does in &self.does {
             match does {
                 Does::Draw(drawing) => {
@@ -138,7 +138,7 @@ impl Person {
     /// Corrects one mask until it is good enough, nothing helps any more, or patience ends.
     pub(super) fn correct(&mut self, begin: Begin, truth: &Mask, imprint: &DepthMap) {
         let begun_iou = iou(&begin.mask, truth);
-        let mut hand = HandMask::new(begin.mask, Provenance::Nothing);
+        let mut hand = DrawnMask::new(begin.mask, Provenance::Nothing);
         let mut took = Took {
             begun_iou,
             iou: begun_iou,
@@ -173,7 +173,7 @@ impl Person {
 
     /// What mends most for each action, and the IoU after it; where several make the mask good enough, that of the fewest
     /// actions, then of the least time.
-    fn best(&mut self, hand: &HandMask, now: f64, truth: &Mask, imprint: &DepthMap) -> Option<(Move, f64)> {
+    fn best(&mut self, hand: &DrawnMask, now: f64, truth: &Mask, imprint: &DepthMap) -> Option<(Move, f64)> {
         /// A gain that nobody sees is none.
         const LEAST: f64 = 1e-3;
         let mut moves: Vec<Move> = CleanKind::iter().map(clean_up).collect();

@@ -27,7 +27,7 @@ fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambigui
 }
 
 fn share(list: &[(String, Ambiguity)]) -> f64 {
-    list.iter().filter(|(_, a)| a.kind == Touch::BareShaft).count() as f64 / list.len() as f64
+    list.iter().filter(|(_, a)| a.kind == TouchKind::BareShaft).count() as f64 / list.len() as f64
 }
 
 #[test]
@@ -38,9 +38,9 @@ fn bare_shafts_are_found_and_patterns_are_not_taken_for_them() {
     plain.retain(|(name, _)| !name.contains("rod"));
     assert!(share(&shafts) >= 0.9, "{shafts:#?}");
     assert!(share(&plain) <= 0.1, "{plain:#?}");
-    assert!(shafts.iter().chain(&plain).all(|(_, a)| a.kind != Touch::Nothing));
+    assert!(shafts.iter().chain(&plain).all(|(_, a)| a.kind != TouchKind::Nothing));
     // The shaft points along the picture's x, give or take the grasp's 22.5 degrees and the sensor's tilt.
-    for (_, a) in shafts.iter().filter(|(_, a)| a.kind == Touch::BareShaft) {
+    for (_, a) in shafts.iter().filter(|(_, a)| a.kind == TouchKind::BareShaft) {
         let off = a.direction_rad.to_degrees();
         assert!(off.min(180.0 - off) < 35.0, "{a:?}");
     }
@@ -64,17 +64,17 @@ fn pictures_made_by_hand_are_judged_as_a_person_would() {
         ambiguity(&Grid::from_fn(427, 320, |x, y| [f(x as f32, y as f32), 0.0, 0.0])).unwrap()
     };
     let ridge = |y: f32| if (y - 160.0).abs() < 30.0 { 30.0 } else { 0.0 };
-    assert_eq!(at(&|_, y| ridge(y)).kind, Touch::BareShaft);
+    assert_eq!(at(&|_, y| ridge(y)).kind, TouchKind::BareShaft);
     assert!(at(&|_, y| ridge(y)).direction_rad.abs() < 0.06);
     // Slanted, and two in parallel.
     let slanted = at(&|x, y| ridge(y - 0.4 * (x - 213.0)) + ridge(y - 0.4 * (x - 213.0) - 110.0));
-    assert_eq!(slanted.kind, Touch::BareShaft);
+    assert_eq!(slanted.kind, TouchKind::BareShaft);
     assert!((slanted.direction_rad - 0.4f64.atan()).abs() < 0.06, "{slanted:?}");
     // An end, a crossing, a ball.
-    assert_eq!(at(&|x, y| if x < 200.0 { ridge(y) } else { 0.0 }).kind, Touch::Distinct);
-    assert_eq!(at(&|x, y| ridge(y).max(if (x - 213.0).abs() < 30.0 { 30.0 } else { 0.0 })).kind, Touch::Distinct);
-    assert_eq!(at(&|x, y| if (x - 213.0).hypot(y - 160.0) < 60.0 { 30.0 } else { 0.0 }).kind, Touch::Distinct);
-    assert_eq!(at(&|x, y| 0.3 * (x * 12.9 + y * 78.2).sin()).kind, Touch::Nothing);
+    assert_eq!(at(&|x, y| if x < 200.0 { ridge(y) } else { 0.0 }).kind, TouchKind::Distinct);
+    assert_eq!(at(&|x, y| ridge(y).max(if (x - 213.0).abs() < 30.0 { 30.0 } else { 0.0 })).kind, TouchKind::Distinct);
+    assert_eq!(at(&|x, y| if (x - 213.0).hypot(y - 160.0) < 60.0 { 30.0 } else { 0.0 }).kind, TouchKind::Distinct);
+    assert_eq!(at(&|x, y| 0.3 * (x * 12.9 + y * 78.2).sin()).kind, TouchKind::Nothing);
     assert!(at(&|_, _| 7.0).warning().is_some(), "an even change of light is no touch");
 }
 
@@ -86,7 +86,7 @@ fn images_that_are_none_have_no_answer_and_holes_do_no_harm() {
     let mut holed = Grid::from_fn(128, 128, |_, y| if (50..70).contains(&y) { [30.0; 3] } else { [0.0; 3] });
     holed[(4, 4)] = [f32::NAN, f32::INFINITY, 0.0];
     let found = ambiguity(&holed).unwrap();
-    assert_eq!(found.kind, Touch::BareShaft);
+    assert_eq!(found.kind, TouchKind::BareShaft);
     assert!(found.change.is_finite() && found.signal.is_finite());
     assert!(ambiguity(&Grid::filled(2, 2, [1e30; 3])).is_some());
 }

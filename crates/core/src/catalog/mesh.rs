@@ -14,7 +14,7 @@ use crate::mesh::TriMesh;
 const MESH_STEP_M: f64 = 0.0005;
 
 /// A triangulation of a part of the plane, with the outline distance at each vertex.
-struct Sheet {
+struct PlanarMesh {
     points: Vec<DVec2>,
     values: Vec<f64>,
     triangles: Vec<[u32; 3]>,
@@ -32,11 +32,11 @@ impl ToolSpec {
 }
 
 /// The grid over the bounding box, split along alternating diagonals.
-fn grid(tool: &ToolSpec, step: f64) -> Sheet {
+fn grid(tool: &ToolSpec, step: f64) -> PlanarMesh {
     let [lo, hi] = tool.outline_bounds();
     let columns = ((hi.x - lo.x) / step).ceil() as usize + 3;
     let rows = ((hi.y - lo.y) / step).ceil() as usize + 3;
-    let mut sheet = Sheet { points: Vec::new(), values: Vec::new(), triangles: Vec::new() };
+    let mut sheet = PlanarMesh { points: Vec::new(), values: Vec::new(), triangles: Vec::new() };
     for j in 0..rows {
         for i in 0..columns {
             let p = lo + DVec2::new(i as f64 - 1.0, j as f64 - 1.0) * step;
@@ -62,7 +62,7 @@ fn grid(tool: &ToolSpec, step: f64) -> Sheet {
     sheet
 }
 
-impl Sheet {
+impl PlanarMesh {
     /// Cuts every triangle along the line where the outline distance is `level`, so that afterwards each lies on
     /// one side of it. A cut point belongs to an edge, so neighbors stay connected.
     fn split(&mut self, tool: &ToolSpec, level: f64, step: f64) {

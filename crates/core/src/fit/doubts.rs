@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::Case;
+use super::FitPair;
 use crate::grid::DepthMap;
 use crate::turn::Turn;
 
@@ -32,7 +32,7 @@ pub struct Doubt {
 }
 
 /// The cases that are out of line, worst first. `made` are their left-out pictures.
-pub fn doubts(cases: &[Case<'_>], made: &[Option<DepthMap>]) -> Vec<Doubt> {
+pub fn doubts(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Vec<Doubt> {
     let residuals: Vec<Option<f64>> =
         cases.iter().zip(made).map(|(case, made)| rms(made.as_ref()?, case.target)).collect();
     let mut sorted: Vec<f64> = residuals.iter().copied().flatten().collect();

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 
 use crate::grid::Grid;
-use crate::lattice::{likeness, signature};
+use crate::markers::{likeness, signature};
 use crate::postprocess::Correction;
 use crate::rig::{PadId, PerPad};
 use crate::sample::{Sample, Scale};

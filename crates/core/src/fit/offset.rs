@@ -1,6 +1,6 @@
 //! Where a pad's predictions belong in its pictures.
 
-use super::{Case, GRAIN_PX};
+use super::{FitPair, GRAIN_PX};
 use crate::blur::gaussian;
 use crate::grid::{DepthMap, Grid};
 use crate::resample;
@@ -17,15 +17,15 @@ const LEAST_CORRELATION: f64 = 0.2;
 
 /// The offset `[right, down]` of each pad, pixels: what makes its predictions and measurements most alike, near what does
 /// so for all pads together.
-pub fn offsets(cases: &[Case<'_>], pads: usize) -> Vec<[f64; 2]> {
-    let all: Vec<&Case<'_>> = cases.iter().collect();
+pub fn offsets(cases: &[FitPair<'_>], pads: usize) -> Vec<[f64; 2]> {
+    let all: Vec<&FitPair<'_>> = cases.iter().collect();
     let together = offset(&all, [0.0; 2], REACH);
     let of_pad = |pad: usize| cases.iter().filter(|case| case.pad == pad).collect::<Vec<_>>();
     (0..pads).map(|pad| offset(&of_pad(pad), together, APART)).collect()
 }
 
 /// The best offset within `reach` (share of the side) of `start`; the start itself where nothing tells.
-fn offset(cases: &[&Case<'_>], start: [f64; 2], reach: f64) -> [f64; 2] {
+fn offset(cases: &[&FitPair<'_>], start: [f64; 2], reach: f64) -> [f64; 2] {
     let Some(first) = cases.first() else { return start };
     let [width, height] = first.prediction.size();
     let side = width.min(height) as f64;
@@ -66,7 +66,7 @@ fn offset(cases: &[&Case<'_>], start: [f64; 2], reach: f64) -> [f64; 2] {
 }
 
 /// The target without the sensor's grain; where nothing was measured, the mean of the rest.
-fn blurred(case: &Case<'_>) -> DepthMap {
+fn blurred(case: &FitPair<'_>) -> DepthMap {
     let finite = || case.target.as_slice().iter().filter(|v| v.is_finite());
     let mean = finite().map(|&v| f64::from(v)).sum::<f64>() / finite().count().max(1) as f64;
     let whole: Grid<f64> = case.target.map(|&v| if v.is_finite() { f64::from(v) } else { mean });

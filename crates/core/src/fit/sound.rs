@@ -4,7 +4,7 @@ use std::fmt;
 
 use rayon::prelude::*;
 
-use super::{Case, PadFit};
+use super::{FitPair, PadFit};
 use crate::grid::{DepthMap, Grid};
 use crate::metrics::AngleSummary;
 use crate::postprocess::Correction;
@@ -150,11 +150,11 @@ pub fn absurd(fit: &PadFit) -> Option<String> {
 }
 
 /// What the figures of a fit object to: its gains and offsets.
-pub fn figures(cases: &[Case<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objection> {
+pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objection> {
     let mut out = Vec::new();
     for (number, pad) in pads.iter().enumerate() {
         let Some(pad) = pad else { continue };
-        let own: Vec<&Case<'_>> = cases.iter().filter(|case| case.pad == number).collect();
+        let own: Vec<&FitPair<'_>> = cases.iter().filter(|case| case.pad == number).collect();
         let gain = slope(&own, pad.correction);
         if gain.is_some_and(|gain| !GAINS.contains(&gain)) || !GAINS.contains(&pad.correction.line[0]) {
             out.push(Objection::Gain { pad: pad.name.to_owned(), gain: gain.unwrap_or(pad.correction.line[0]) });
@@ -174,7 +174,7 @@ pub fn figures(cases: &[Case<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objecti
 
 /// Meters measured per meter predicted, where the prediction belongs; negative where they go against each other, `None`
 /// where predictions are flat.
-fn slope(cases: &[&Case<'_>], correction: &Correction) -> Option<f64> {
+fn slope(cases: &[&FitPair<'_>], correction: &Correction) -> Option<f64> {
     let [mut n, mut x, mut y, mut xx, mut xy] = [0.0; 5];
     for case in cases {
         let placed = correction.placed(case.prediction);
@@ -200,7 +200,7 @@ pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
 }
 
 /// Whether predictions know their own measurements: `made` are the left-out pictures. Says nothing of few touches.
-pub fn strangers(cases: &[Case<'_>], made: &[Option<DepthMap>]) -> Option<Objection> {
+pub fn strangers(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Option<Objection> {
     let pads = cases.iter().map(|case| case.pad + 1).max().unwrap_or_default();
     let ranks: Vec<f64> = (0..pads).flat_map(|pad| nearness(cases, made, pad)).collect();
     let nearness = ranks.iter().sum::<f64>() / ranks.len() as f64;
@@ -209,7 +209,7 @@ pub fn strangers(cases: &[Case<'_>], made: &[Option<DepthMap>]) -> Option<Object
 
 /// For each touch of a pad the share of the others whose deviation from the pad's mean is less like its own prediction's
 /// than its own measurement's is, and the other way round.
-fn nearness(cases: &[Case<'_>], made: &[Option<DepthMap>], pad: usize) -> Vec<f64> {
+fn nearness(cases: &[FitPair<'_>], made: &[Option<DepthMap>], pad: usize) -> Vec<f64> {
     let own: Vec<(&DepthMap, &DepthMap)> = cases
         .iter()
         .zip(made)
@@ -282,8 +282,11 @@ mod tests {
     fn objections(target: impl Fn(usize) -> DepthMap, window: Option<[[f64; 2]; 2]>) -> Vec<Objection> {
         let predictions: Vec<DepthMap> = (0..12).map(|i| bump(i, 0.004)).collect();
         let targets: Vec<DepthMap> = (0..12).map(target).collect();
-        let cases: Vec<Case<'_>> =
-            predictions.iter().zip(&targets).map(|(prediction, target)| Case { prediction, target, pad: 0 }).collect();
+        let cases: Vec<FitPair<'_>> = predictions
+            .iter()
+            .zip(&targets)
+            .map(|(prediction, target)| FitPair { prediction, target, pad: 0 })
+            .collect();
         let corrections = closed_form(&cases, 1).unwrap();
         let parts: Vec<usize> = (0..12).map(|i| i % 3).collect();
         let made = left_out(&cases, 1, &parts).unwrap();

@@ -37,9 +37,9 @@ fn rig(n: usize) -> (Vec<DepthMap>, Vec<DepthMap>, Vec<usize>) {
     (touches, targets, pads)
 }
 
-fn cases<'a>((predictions, targets, pads): &'a (Vec<DepthMap>, Vec<DepthMap>, Vec<usize>)) -> Vec<Case<'a>> {
+fn cases<'a>((predictions, targets, pads): &'a (Vec<DepthMap>, Vec<DepthMap>, Vec<usize>)) -> Vec<FitPair<'a>> {
     let pairs = predictions.iter().zip(targets).zip(pads);
-    pairs.map(|((prediction, target), &pad)| Case { prediction, target, pad }).collect()
+    pairs.map(|((prediction, target), &pad)| FitPair { prediction, target, pad }).collect()
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn the_line_is_exact_where_nothing_else_is_wrong() {
 fn poor_inputs_are_refused_or_give_a_finite_fit() {
     assert_eq!(closed_form(&[], 1), Err(FitError::NoPairs));
     let (good, small) = (touch(1), Grid::filled(4, 4, 0.0));
-    let case = |prediction, target| Case { prediction, target, pad: 0 };
+    let case = |prediction, target| FitPair { prediction, target, pad: 0 };
     assert!(matches!(closed_form(&[case(&good, &good), case(&good, &small)], 1), Err(FitError::Size { case: 1, .. })));
     let broken = good.map(|_| f32::NAN);
     assert_eq!(closed_form(&[case(&broken, &good)], 1), Err(FitError::NotFinite { case: 0 }));

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::{Case, FitError, closed_form};
+use super::{FitError, FitPair, closed_form};
 use crate::grid::DepthMap;
 
 /// Groups of cases that are left out together: whole tools where at least three are known, else every `count`-th grasp.
@@ -29,16 +29,16 @@ pub fn folds(tools: &[Option<&str>], grasps: &[u32], count: usize) -> Vec<usize>
 ///
 /// # Errors
 /// [`FitError`].
-pub fn left_out(cases: &[Case<'_>], pads: usize, folds: &[usize]) -> Result<Vec<Option<DepthMap>>, FitError> {
+pub fn left_out(cases: &[FitPair<'_>], pads: usize, folds: &[usize]) -> Result<Vec<Option<DepthMap>>, FitError> {
     let count = folds.iter().max().map_or(0, |most| most + 1);
     let fits = (0..count)
         .into_par_iter()
         .map(|fold| {
-            let others: Vec<Case<'_>> =
+            let others: Vec<FitPair<'_>> =
                 cases.iter().zip(folds).filter(|(_, f)| **f != fold).map(|(case, _)| *case).collect();
             if others.is_empty() { Ok(vec![None; pads]) } else { closed_form(&others, pads) }
         })
         .collect::<Result<Vec<_>, FitError>>()?;
-    let made = |(case, &fold): (&Case<'_>, &usize)| Some(fits[fold].get(case.pad)?.as_ref()?.apply(case.prediction));
+    let made = |(case, &fold): (&FitPair<'_>, &usize)| Some(fits[fold].get(case.pad)?.as_ref()?.apply(case.prediction));
     Ok(cases.par_iter().zip(folds).map(made).collect())
 }

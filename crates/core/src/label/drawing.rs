@@ -5,7 +5,7 @@ use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::paint::Paint;
-use super::sight::{Seen, Sight};
+use super::sight::{Sight, VisiblePixels};
 use super::{Rect, paint_where, region};
 use crate::grid::{DepthMap, Mask};
 
@@ -63,7 +63,7 @@ pub struct Ground<'a> {
     pub proposed: Option<&'a Mask>,
     /// Where the pixels lie in the picture of a drawing that has a [`Drawing::sight`]; without it such a drawing touches
     /// nothing.
-    pub seen: Option<&'a Seen>,
+    pub seen: Option<&'a VisiblePixels>,
 }
 
 impl<'a> Ground<'a> {
@@ -238,7 +238,7 @@ mod tests {
         let drawing = Drawing { tool, points: points.to_vec(), paint, sight: None };
         let rect = drawing.touch(&mut touched, Ground::new(&imprint), 0)?;
         marks.paint(mask, (&touched, rect), paint, None, Provenance::hand(""));
-        let hand = marks.hand_checked();
+        let hand = marks.manual_checked();
         let kept = |i: usize| hand.as_slice()[i] || mask.as_slice()[i] == before.as_slice()[i];
         assert!((0..mask.len()).all(kept), "what was not painted stays");
         Some(rect)
@@ -351,7 +351,7 @@ mod tests {
     fn every_tool_draws_through_a_picture_of_points() {
         let sight = from_above(4000.0, Layers::Front);
         let (points, pixels) = sheet(0.0);
-        let seen = Seen::new(&sight, (&points, &pixels), &[]);
+        let seen = VisiblePixels::new(&sight, (&points, &pixels), &[]);
         // A step in the middle: columns from the eleventh on are deeper.
         let imprint = DepthMap::from_fn(21, 21, |x, _| if x < 11 { 0.001 } else { 0.005 });
         let allowed = Mask::from_fn(21, 21, |_, y| y < 15);

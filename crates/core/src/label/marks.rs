@@ -72,7 +72,7 @@ impl Marks {
     }
 
     /// The pixels that a person looked at and painted, whatever their value.
-    pub fn hand_checked(&self) -> Mask {
+    pub fn manual_checked(&self) -> Mask {
         let by_hand: Vec<bool> = self.layers.iter().map(Provenance::is_hand).collect();
         self.of.map(|&i| by_hand[usize::from(i)])
     }
@@ -163,8 +163,8 @@ impl Marks {
     }
 
     /// Takes the pixels of `new` over into `mask`, of provenance `by` where they differ. Ignored pixels stay so, and where
-    /// `keep_hand` is set, what a person painted stays as well. Whether anything changed.
-    pub fn replace(&mut self, mask: &mut Mask, new: &Mask, by: Provenance, keep_hand: bool) -> bool {
+    /// `keep_manual` is set, what a person painted stays as well. Whether anything changed.
+    pub fn replace(&mut self, mask: &mut Mask, new: &Mask, by: Provenance, keep_manual: bool) -> bool {
         if new.size() != mask.size() || mask.size() != self.size() {
             return false;
         }
@@ -173,8 +173,8 @@ impl Marks {
         let ignored = self.ignored.as_ref().map(Mask::as_slice);
         let mut changed = false;
         for (i, (value, of)) in mask.as_mut_slice().iter_mut().zip(self.of.as_mut_slice()).enumerate() {
-            let stays =
-                ignored.is_some_and(|ignored| ignored[i]) || keep_hand && by_hand.get(usize::from(*of)) == Some(&true);
+            let stays = ignored.is_some_and(|ignored| ignored[i])
+                || keep_manual && by_hand.get(usize::from(*of)) == Some(&true);
             if *value != new.as_slice()[i] && !stays {
                 *value = !*value;
                 *of = layer;
@@ -185,7 +185,7 @@ impl Marks {
         changed
     }
 
-    /// Takes another mask over with what it ignores (`None`: nothing), of provenance `by` where they differ; where `keep_hand`
+    /// Takes another mask over with what it ignores (`None`: nothing), of provenance `by` where they differ; where `keep_manual`
     /// is set, what a person painted stays. How many pixels changed, and how many stay although they differ.
     pub fn take_over(
         &mut self,
@@ -193,13 +193,13 @@ impl Marks {
         new: &Mask,
         ignored: Option<&Mask>,
         by: Provenance,
-        keep_hand: bool,
+        keep_manual: bool,
     ) -> [usize; 2] {
         let sizes = [new.size(), self.size(), ignored.map_or(new.size(), Mask::size)];
         if sizes.iter().any(|size| *size != mask.size()) {
             return [0; 2];
         }
-        let by_hand = self.hand_checked();
+        let by_hand = self.manual_checked();
         let layer = self.layer(by);
         let [width, height] = self.size();
         let mut counts = [0; 2];
@@ -210,7 +210,7 @@ impl Marks {
             if mask[at] == contact && self.is_ignored(at.0, at.1) == ignore {
                 continue;
             }
-            let stays = keep_hand && by_hand[at];
+            let stays = keep_manual && by_hand[at];
             counts[usize::from(stays)] += 1;
             if !stays {
                 mask[at] = contact;
@@ -249,7 +249,7 @@ mod tests {
         let anna = || Provenance::hand("anna");
         marks.paint(&mut mask, (&columns(1..3), rect()), Paint::Contact, None, anna());
         assert!(mask == columns(0..3));
-        assert_eq!(marks.hand_checked(), columns(1..3), "a pixel that was right already was looked at too");
+        assert_eq!(marks.manual_checked(), columns(1..3), "a pixel that was right already was looked at too");
         assert_eq!(marks.layers(), [(&Provenance::Threshold { min_m: 0.005 }, 4), (&anna(), 4)]);
         marks.paint(&mut mask, (&columns(0..1), rect()), Paint::Ignore, None, anna());
         assert!(mask == columns(1..3) && marks.ignored() == Some(&columns(0..1)));

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::clean_up::CleanUp;
 use crate::frames::PlanarPose;
-use crate::hand::HandPose;
+use crate::manual::ManualPose;
 use crate::units::{text_deg, text_mm};
 
 /// Which pose of the tool a CAD distance was measured at. Poses are `grasp_from_object`.
@@ -16,7 +16,7 @@ pub enum CadPose {
     /// The one that a registration answered.
     Registered(PlanarPose),
     /// One that a person moved there.
-    Nudged(HandPose),
+    Nudged(ManualPose),
 }
 
 impl CadPose {

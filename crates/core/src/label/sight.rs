@@ -1,4 +1,4 @@
-//! [`Sight`]: a picture of points in space, through which a mask is drawn on; [`Seen`]: where the pixels of the mask lie in
+//! [`Sight`]: a picture of points in space, through which a mask is drawn on; [`VisiblePixels`]: where the pixels of the mask lie in
 //! that picture, and which of them a drawing reaches.
 
 use std::collections::HashMap;
@@ -116,14 +116,14 @@ impl Sight {
 
 /// Where the pixels of one finger's mask lie in a picture: those that a drawing on it reaches.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Seen {
+pub struct VisiblePixels {
     /// Column and row in the mask, and place in the picture.
     points: Vec<([u16; 2], DVec2)>,
     /// Half the distance between neighbors, picture pixels: a thin brush still meets them.
     reach_px: f64,
 }
 
-impl Seen {
+impl VisiblePixels {
     /// The pixels of a mask by the points that were lifted from it (`own`: meters, grasp frame, row by row, and the pixel of
     /// each), as far as they are reached; `others` are points of other fingers, which can hide them.
     pub fn new(sight: &Sight, (own, pixels): (&[DVec3], &[[u16; 2]]), others: &[&[DVec3]]) -> Self {
@@ -227,7 +227,7 @@ mod tests {
 
     const CENTER: DVec2 = DVec2::new(199.5, 149.5);
 
-    fn stamp(seen: &Seen, at: DVec2, radius_px: f64) -> usize {
+    fn stamp(seen: &VisiblePixels, at: DVec2, radius_px: f64) -> usize {
         seen.along([at, at], radius_px).count()
     }
 
@@ -250,7 +250,7 @@ mod tests {
     fn of_two_sheets_the_front_one_is_reached_or_both() {
         let (near, far) = (sheet(0.005), sheet(-0.005));
         let reached = |own: &(Vec<DVec3>, Vec<[u16; 2]>), other: &[DVec3], layers| {
-            let seen = Seen::new(&from_above(4000.0, layers), (&own.0, &own.1), &[other]);
+            let seen = VisiblePixels::new(&from_above(4000.0, layers), (&own.0, &own.1), &[other]);
             stamp(&seen, CENTER, 9.0)
         };
         let all = reached(&far, &near.0, Layers::All);
@@ -260,7 +260,7 @@ mod tests {
         assert_eq!(reached(&far, &[], Layers::Front), all);
         assert_eq!(reached(&near, &far.0, Layers::Front), reached(&near, &[], Layers::All));
         // Zoomed in, what is behind does not shine through between the points.
-        let seen = Seen::new(&from_above(60_000.0, Layers::Front), (&far.0, &far.1), &[&near.0]);
+        let seen = VisiblePixels::new(&from_above(60_000.0, Layers::Front), (&far.0, &far.1), &[&near.0]);
         assert_eq!(stamp(&seen, CENTER, 100.0), 0);
         // A fold of one sheet hides its own back.
         let both = ([near.0.clone(), far.0].concat(), [near.1.clone(), far.1].concat());
@@ -268,8 +268,8 @@ mod tests {
         // What a plane cuts away is not reached, and hides nothing.
         let cut = Sight { cut: vec![Vec4::new(0.0, 0.0, -1.0, 0.0)], ..from_above(4000.0, Layers::Front) };
         let far = sheet(-0.005);
-        assert_eq!(stamp(&Seen::new(&cut, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), all);
-        assert_eq!(stamp(&Seen::new(&cut, (&near.0, &near.1), &[]), CENTER, 9.0), 0);
+        assert_eq!(stamp(&VisiblePixels::new(&cut, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), all);
+        assert_eq!(stamp(&VisiblePixels::new(&cut, (&near.0, &near.1), &[]), CENTER, 9.0), 0);
     }
 
     #[test]
@@ -284,33 +284,33 @@ mod tests {
             Vec4::new(0.0, 0.0, 0.5, 1.0),
         );
         let (near, far) = (sheet(0.005), sheet(-0.005));
-        assert_eq!(stamp(&Seen::new(&sight, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), 0);
-        assert_eq!(stamp(&Seen::new(&sight, (&near.0, &near.1), &[&far.0]), CENTER, 9.0), 69, "as on paper");
+        assert_eq!(stamp(&VisiblePixels::new(&sight, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), 0);
+        assert_eq!(stamp(&VisiblePixels::new(&sight, (&near.0, &near.1), &[&far.0]), CENTER, 9.0), 69, "as on paper");
         assert!((sight.px_per_m(DVec3::Z * 0.1).unwrap() - 4000.0).abs() < 1e-3);
     }
 
     #[test]
     fn nothing_and_nonsense_reach_nothing() {
         let sight = from_above(4000.0, Layers::Front);
-        assert_eq!(stamp(&Seen::new(&sight, (&[], &[]), &[]), CENTER, 1e9), 0);
-        assert_eq!(Seen::default().nearest(CENTER), None);
+        assert_eq!(stamp(&VisiblePixels::new(&sight, (&[], &[]), &[]), CENTER, 1e9), 0);
+        assert_eq!(VisiblePixels::default().nearest(CENTER), None);
         let (mut points, pixels) = sheet(0.0);
         points[220] = DVec3::NAN;
         points[221] = DVec3::Z * 0.5;
-        let seen = Seen::new(&sight, (&points, &pixels), &[]);
+        let seen = VisiblePixels::new(&sight, (&points, &pixels), &[]);
         assert_eq!(stamp(&seen, CENTER, 1e9), 21 * 21 - 2);
         assert_eq!(stamp(&seen, DVec2::NAN, 9.0), 0);
         assert_eq!(stamp(&seen, CENTER, f64::NAN), stamp(&seen, CENTER, 0.0), "no radius is a thin one");
         let broken = Sight { clip_from_grasp: Mat4::NAN, ..sight.clone() };
-        assert_eq!(stamp(&Seen::new(&broken, (&points, &pixels), &[&points]), CENTER, 1e9), 0);
+        assert_eq!(stamp(&VisiblePixels::new(&broken, (&points, &pixels), &[&points]), CENTER, 1e9), 0);
         let empty = Sight { size_px: [0, 0], clip_from_grasp: Mat4::ZERO, ..sight };
-        assert_eq!(stamp(&Seen::new(&empty, (&points, &pixels), &[]), CENTER, 1e9), 0);
+        assert_eq!(stamp(&VisiblePixels::new(&empty, (&points, &pixels), &[]), CENTER, 1e9), 0);
     }
 
     #[test]
     fn lines_enclose_points_and_the_nearest_is_found() {
         let (points, pixels) = sheet(0.0);
-        let seen = Seen::new(&from_above(4000.0, Layers::Front), (&points, &pixels), &[]);
+        let seen = VisiblePixels::new(&from_above(4000.0, Layers::Front), (&points, &pixels), &[]);
         let square = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]].map(|d| CENTER + DVec2::from(d));
         assert_eq!(seen.within(&square, false).len(), 5 * 5, "2 px apart");
         assert_eq!(seen.within(&square[..1], false), Vec::<[u16; 2]>::new());

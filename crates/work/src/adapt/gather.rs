@@ -6,14 +6,14 @@ use crate::error::TaskError;
 use crate::imprint::{chain, window};
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::models::{Models, Wanted};
+use crate::models::{GenerateInput, Models};
 use crate::predict::Generating;
 use crate::usable::unusable;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::findings::Findings;
-use touch2touch_core::fit::{Case, offsets};
+use touch2touch_core::fit::{FitPair, offsets};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch_core::lattice::{signature, two_groups};
+use touch2touch_core::markers::{signature, two_groups};
 use touch2touch_core::postprocess::{DepthChain, ShiftMode};
 use touch2touch_core::resample::bilinear;
 use touch2touch_core::rig::PadId;
@@ -23,7 +23,7 @@ use touch2touch_core::sample::{Sample, Scale};
 const BATCH: usize = 16;
 
 /// A touch of one pad.
-pub(super) struct Touch {
+pub(super) struct FitTouch {
     pub(super) id: PairId,
     pub(super) name: String,
     pub(super) tool: Option<String>,
@@ -51,9 +51,9 @@ pub(super) struct Touch {
     pub(super) signature: Option<Grid<f32>>,
 }
 
-impl Touch {
-    pub(super) fn case(&self) -> Case<'_> {
-        Case { prediction: &self.prediction, target: &self.target, pad: self.pad.index() }
+impl FitTouch {
+    pub(super) fn case(&self) -> FitPair<'_> {
+        FitPair { prediction: &self.prediction, target: &self.target, pad: self.pad.index() }
     }
 
     /// A picture on the decoder's grid as an imprint: raw orientation, as large as the measured one.
@@ -65,7 +65,7 @@ impl Touch {
 }
 
 pub(super) struct Gathered {
-    pub(super) touches: Vec<Touch>,
+    pub(super) touches: Vec<FitTouch>,
     pub(super) left_out: Vec<Remark>,
     /// Whether pads were told apart by their lattices.
     pub(super) grouped: bool,
@@ -91,7 +91,7 @@ pub(super) fn gather(
     let mut notes = Findings::default();
     notes.extend(dataset.problems.iter().cloned());
     let total = setup.pairs.len() as u64;
-    let mut waiting: Vec<Touch> = Vec::new();
+    let mut waiting: Vec<FitTouch> = Vec::new();
     for (done, &id) in setup.pairs.iter().enumerate() {
         cx.check(WHAT)?;
         cx.progress(done as u64, total, format!("predicting pair {} of {total}", done + 1));
@@ -147,14 +147,14 @@ fn read(
     tool: Option<&str>,
     sample: &Sample,
     (pad, input): (PadId, touch2touch_core::rig::SensorId),
-) -> Result<Option<Touch>, String> {
+) -> Result<Option<FitTouch>, String> {
     let Some(touch) = sample.pad(pad) else { return Ok(None) };
     let (Some(picture), Some(bubble)) = (touch.picture(input), touch.depth()) else { return Ok(None) };
     if let Some(why) = unusable(&picture, &bubble.imprint) {
         return Err(why);
     }
     let lattice = (sample.scale == Scale::Assumed).then(|| signature(&picture)).flatten();
-    let touch = Touch {
+    let touch = FitTouch {
         id,
         name: name.to_owned(),
         tool: tool.map(str::to_owned),
@@ -177,14 +177,16 @@ fn read(
 fn predict(
     setup: &AdaptSetup,
     models: &Models,
-    waiting: Vec<Touch>,
-    touches: &mut Vec<Touch>,
+    waiting: Vec<FitTouch>,
+    touches: &mut Vec<FitTouch>,
     left_out: &mut Vec<Remark>,
     cx: &JobCx,
 ) -> Result<(), TaskError> {
     let Generating { bundle, engine, config } = setup.recipe.generating()?;
-    let wanted: Vec<Wanted<'_>> =
-        waiting.iter().map(|touch| Wanted { difference: &touch.picture, seed: config.seed, size: [0, 0] }).collect();
+    let wanted: Vec<GenerateInput<'_>> = waiting
+        .iter()
+        .map(|touch| GenerateInput { difference: &touch.picture, seed: config.seed, size: [0, 0] })
+        .collect();
     let made = models.predict(bundle, engine, config, &wanted, &cx.quiet())?;
     for (touch, made) in waiting.into_iter().zip(made) {
         let chain = chain(&made, ShiftMode::ExactInverse)?.placed(touch.window);
@@ -201,7 +203,7 @@ fn predict(
         let target = on_grid(&touch.measured, touch.tile.as_ref(), turned, size);
         let both = touch.window.is_some() && placed.window.is_some();
         let to_window_px = both.then(|| [0, 1].map(|i| placed.offset[i] * size[i] as f64));
-        touches.push(Touch { prediction, unfitted, to_window_px, target, turned, ..touch });
+        touches.push(FitTouch { prediction, unfitted, to_window_px, target, turned, ..touch });
     }
     Ok(())
 }
@@ -217,7 +219,7 @@ pub(super) fn on_grid(measured: &DepthMap, tile: Option<&DepthMap>, turned: bool
 }
 
 /// Tells the pads of pictures apart, which do not say them. Whether there were two.
-fn name_pads(dataset: &Dataset, touches: &mut [Touch]) -> Result<bool, TaskError> {
+fn name_pads(dataset: &Dataset, touches: &mut [FitTouch]) -> Result<bool, TaskError> {
     let known: Vec<usize> = (0..touches.len()).filter(|&i| touches[i].signature.is_some()).collect();
     if dataset.rig.pads().len() < 2 || known.is_empty() {
         return Ok(false);
@@ -231,7 +233,7 @@ fn name_pads(dataset: &Dataset, touches: &mut [Touch]) -> Result<bool, TaskError
         touches[i].pad = PadId::new(group);
     }
     // The pads' windows lie side by side in the raw picture, and so do the offsets that each needs.
-    let cases: Vec<Case<'_>> = touches.iter().map(Touch::case).collect();
+    let cases: Vec<FitPair<'_>> = touches.iter().map(FitTouch::case).collect();
     let offsets = offsets(&cases, 2);
     let column = |pad: usize| {
         let sign = if touches[0].turned { -1.0 } else { 1.0 };

@@ -1,17 +1,17 @@
 //! Whether a fit may become a bundle: [`objections`].
 
 use super::adapted::Adapted;
-use super::gather::Touch;
+use super::gather::FitTouch;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::fit::sound::{self, FoundPad, Objection};
-use touch2touch_core::fit::{Case, Fitted};
+use touch2touch_core::fit::{FitPair, Fitted};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, Rig};
 
 /// What a fit is judged by.
 pub(super) struct Evidence<'a> {
     pub(super) rig: &'a Rig,
-    pub(super) touches: &'a [Touch],
+    pub(super) touches: &'a [FitTouch],
     pub(super) fitted: &'a Fitted,
     /// What fits to the others make of each touch.
     pub(super) unseen: &'a [Option<DepthMap>],
@@ -22,7 +22,7 @@ pub(super) struct Evidence<'a> {
 /// What speaks against a fit, in words: its own figures, its scores, and what is known to be wrong with the data.
 pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<String> {
     let Evidence { rig, touches, fitted, unseen, doubts } = *evidence;
-    let cases: Vec<Case<'_>> = touches.iter().map(Touch::case).collect();
+    let cases: Vec<FitPair<'_>> = touches.iter().map(FitTouch::case).collect();
     let names: Vec<_> = rig.pads().map(|pad| rig.pad_key(pad)).collect();
     let found = |pad: PadId| {
         let correction = &*fitted.pads.get(pad)?.correction;

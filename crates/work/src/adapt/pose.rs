@@ -1,6 +1,6 @@
 //! The in-hand angle that pictures lead to, where the data have poses.
 
-use super::gather::Touch as Gathered;
+use super::gather::FitTouch as Gathered;
 use super::{AdaptSetup, WHAT};
 use crate::error::TaskError;
 use crate::feel::{Felt, Touch};

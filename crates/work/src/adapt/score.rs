@@ -5,7 +5,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use super::gather::Touch;
+use super::gather::FitTouch;
 use crate::compare::{Comparison, LAB_PEAK_M, compare_parts, tiles};
 use crate::error::TaskError;
 use touch2touch_core::evaluation::mean;
@@ -52,7 +52,7 @@ pub struct Part {
 
 /// The scores of a picture (meters, the decoder's grid) per touch; `None` where none was given.
 pub(super) fn scored(
-    touches: &[Touch],
+    touches: &[FitTouch],
     pictures: &[Option<&Grid<f32>>],
     rig: &Arc<Rig>,
 ) -> Result<Option<Scored>, TaskError> {
@@ -87,7 +87,7 @@ pub(super) fn scored(
     }))
 }
 
-fn compared(touch: &Touch, picture: &Grid<f32>, rig: &Arc<Rig>) -> Result<Comparison, TaskError> {
+fn compared(touch: &FitTouch, picture: &Grid<f32>, rig: &Arc<Rig>) -> Result<Comparison, TaskError> {
     if let Some(tile) = &touch.tile {
         let [width, height] = tile.size();
         // Comparing asks a sample for nothing but its rig and its scale.

@@ -6,7 +6,7 @@ use serde_json::json;
 use sha2::{Digest as _, Sha256};
 use touch2touch_tuning::{Config, Pair, Query, Start, Tuner};
 
-use super::gather::Touch;
+use super::gather::FitTouch;
 use super::{AdaptSetup, Tuned, Tuning, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::Role;
@@ -14,8 +14,8 @@ use crate::infer::kept_key::input_digest;
 use crate::io::digest::hex;
 use crate::job::JobCx;
 use crate::predict::Generating;
-use crate::tuning::{Kept, Look, Runs, steps_within};
-use touch2touch_core::fit::{Case, closed_form};
+use crate::tuning::{KeptRun, Look, Runs, steps_within};
+use touch2touch_core::fit::{FitPair, closed_form};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::postprocess::Correction;
 use touch2touch_core::rig::Rig;
@@ -37,7 +37,7 @@ const LOOKED_AT: usize = 8;
 pub(super) fn tune(
     setup: &AdaptSetup,
     tuning: Tuning,
-    touches: &[Touch],
+    touches: &[FitTouch],
     corrections: &[Option<Correction>],
     parts: &[usize],
     rig: &Rig,
@@ -52,7 +52,7 @@ pub(super) fn tune(
     cx.check(WHAT)?;
     let with_simulated = |real: Vec<Pair>| -> Vec<Pair> { real.into_iter().chain(simulated.iter().cloned()).collect() };
     let count = parts.iter().max().map_or(0, |most| most + 1);
-    let kept = Kept::of(setup.unfinished.as_deref(), &digest(setup, generating, touches));
+    let kept = KeptRun::of(setup.unfinished.as_deref(), &digest(setup, generating, touches));
     let start = source.start(source.placement(corrections));
     let config = Config { seed: generating.config.seed, ..Config::default() };
     let steps = match tuning {
@@ -69,7 +69,7 @@ pub(super) fn tune(
         if others.is_empty() {
             continue;
         }
-        let cases: Vec<Case<'_>> = others.iter().map(|&i| touches[i].case()).collect();
+        let cases: Vec<FitPair<'_>> = others.iter().map(|&i| touches[i].case()).collect();
         let without = closed_form(&cases, rig.pads().len()).map_err(|err| TaskError::from_error(WHAT, &err))?;
         // A pad that the others have no pair of has no place.
         let known = |&i: &usize| parts[i] == part && without[touches[i].pad.index()].is_some();
@@ -102,7 +102,7 @@ fn fail(err: touch2touch_tuning::Error) -> TaskError {
 }
 
 /// Everything that a run depends on.
-fn digest(setup: &AdaptSetup, generating: Generating<'_>, touches: &[Touch]) -> String {
+fn digest(setup: &AdaptSetup, generating: Generating<'_>, touches: &[FitTouch]) -> String {
     let mut all = Sha256::new();
     let asked = json!({
         "program": env!("CARGO_PKG_VERSION"), "bundle": *generating.bundle.id, "config": generating.config,

@@ -119,7 +119,7 @@ impl Entry {
 }
 
 /// What is known of the grasps of an evaluation.
-pub(super) struct Kept {
+pub(super) struct KeptScores {
     sheets: Arc<Sheets>,
     /// The sheet of each method.
     names: Vec<String>,
@@ -129,7 +129,7 @@ pub(super) struct Kept {
     known: Vec<BTreeMap<PairId, Entry>>,
 }
 
-impl Kept {
+impl KeptScores {
     /// Looks up what is known of some grasps; `only_known`: no file is read where nothing is known of any.
     pub(super) fn open(
         dataset: &Dataset,

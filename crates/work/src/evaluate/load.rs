@@ -16,7 +16,7 @@ use touch2touch_core::grid::Grid;
 use touch2touch_core::sample::{Sample, Scale};
 
 /// A loaded pair.
-pub(super) struct Case {
+pub(super) struct LoadedPair {
     pub(super) id: PairId,
     pub(super) name: String,
     pub(super) group: Group,
@@ -31,15 +31,15 @@ pub(super) struct Case {
 }
 
 /// Some pairs of a tool that are scored together.
-pub(super) struct Cases {
-    pub(super) good: Vec<Case>,
+pub(super) struct LoadedPairs {
+    pub(super) good: Vec<LoadedPair>,
     pub(super) bad: Vec<Skipped>,
 }
 
 /// The pairs of a tool, as they arrive.
 pub(super) struct Batch<'a> {
     pub(super) work: &'a ToolWork,
-    pub(super) cases: Box<dyn Iterator<Item = Result<Cases, Vec<Skipped>>> + 'a>,
+    pub(super) cases: Box<dyn Iterator<Item = Result<LoadedPairs, Vec<Skipped>>> + 'a>,
 }
 
 /// What people drew, where that is to be taken.
@@ -83,8 +83,9 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
                 if cx.cancel.is_cancelled() {
                     return;
                 }
-                let loaded: Vec<Result<Case, Skipped>> = ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
-                let mut cases = Cases { good: Vec::new(), bad: Vec::new() };
+                let loaded: Vec<Result<LoadedPair, Skipped>> =
+                    ids.par_iter().map(|&id| load(dataset, labels, id)).collect();
+                let mut cases = LoadedPairs { good: Vec::new(), bad: Vec::new() };
                 for one in loaded {
                     match one {
                         Ok(case) => cases.good.push(case),
@@ -116,7 +117,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
 }
 
 /// Reads one pair.
-pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<Case, Skipped> {
+pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, Skipped> {
     let Some(entry) = dataset.index.get(id) else {
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
@@ -136,5 +137,5 @@ pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<Ca
         (None, None, None)
     };
     let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
-    Ok(Case { id, name: entry.name.clone(), group, clipped, sample, labels, tile, lab })
+    Ok(LoadedPair { id, name: entry.name.clone(), group, clipped, sample, labels, tile, lab })
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::load::Case;
+use super::load::LoadedPair;
 use super::{Setup, WHAT};
 use crate::bundles::{self, BundleInfo, BundleKind};
 use crate::error::TaskError;
@@ -281,7 +281,12 @@ impl Method {
     }
 
     /// What it makes of each touch, or why not; `None` once it was told to stop.
-    pub(super) fn make(&mut self, cases: &[&Case], setup: &Setup, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+    pub(super) fn make(
+        &mut self,
+        cases: &[&LoadedPair],
+        setup: &Setup,
+        cx: &JobCx,
+    ) -> Option<Vec<Result<Made, String>>> {
         Some(match self {
             Self::Measured => cases.iter().map(|case| Ok(measured(case))).collect(),
             Self::Stored => cases.iter().map(|case| stored(case)).collect(),
@@ -290,12 +295,12 @@ impl Method {
     }
 }
 
-fn measured(case: &Case) -> Made {
+fn measured(case: &LoadedPair) -> Made {
     let imprints = imprint::measured(&case.sample);
     Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None, seconds: None }
 }
 
-fn stored(case: &Case) -> Result<Made, String> {
+fn stored(case: &LoadedPair) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
     Ok(Made {
         imprints: PerPad::default(),
@@ -307,7 +312,7 @@ fn stored(case: &Case) -> Result<Made, String> {
 }
 
 impl GeneratorMethod {
-    fn make(&mut self, cases: &[&Case], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
+    fn make(&mut self, cases: &[&LoadedPair], shift: ShiftMode, cx: &JobCx) -> Option<Vec<Result<Made, String>>> {
         let generating = Generating { bundle: &self.bundle, engine: self.engine, config: &self.config };
         let samples: Vec<&Sample> = cases.iter().map(|case| &case.sample).collect();
         let predictions = match generating.pairs(&self.models, &samples, &cx.quiet()) {

@@ -6,8 +6,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use rayon::prelude::*;
 
 use super::doubt::doubt;
-use super::kept::{Entry, Kept};
-use super::load::{Case, Labeled, load};
+use super::kept::{Entry, KeptScores};
+use super::load::{Labeled, LoadedPair, load};
 use super::methods::{Made, Method, Models};
 use super::{Setup, Skipped, ToolWork, apart};
 use crate::compare::as_tile;
@@ -83,7 +83,7 @@ fn name_tools(classifier: Option<&mut ToolClassifier>, images: &mut [Image]) -> 
 
 /// A grasp with what a method made of it.
 struct Masked<'a> {
-    case: &'a Case,
+    case: &'a LoadedPair,
     made: Made,
     /// Up to its masks, where they can be made.
     felt: Option<Felt>,
@@ -97,7 +97,7 @@ struct Masked<'a> {
 pub(super) struct Tool<'a> {
     dataset: &'a Dataset,
     /// What is known of them.
-    book: &'a Kept,
+    book: &'a KeptScores,
     /// Its pattern's name.
     pattern: Option<String>,
     /// Whether its CAD model could not be used: what is scored without it is not kept.
@@ -109,7 +109,7 @@ pub(super) struct Tool<'a> {
 
 impl<'a> Tool<'a> {
     /// Reads the CAD model, if there is anything to score.
-    pub(super) fn new(dataset: &'a Dataset, work: &ToolWork, book: &'a Kept, skipped: &mut Vec<Skipped>) -> Self {
+    pub(super) fn new(dataset: &'a Dataset, work: &ToolWork, book: &'a KeptScores, skipped: &mut Vec<Skipped>) -> Self {
         let tool = &work.tool;
         let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
             let skip = |err: TaskError| {
@@ -126,7 +126,7 @@ impl<'a> Tool<'a> {
     /// Takes some of its grasps through every method that they are not known by. `say` is told which.
     pub(super) fn score(
         &mut self,
-        cases: &[Case],
+        cases: &[LoadedPair],
         setup: &Setup,
         models: &mut Models,
         skipped: &mut Vec<Skipped>,
@@ -140,10 +140,10 @@ impl<'a> Tool<'a> {
             let upper = matches!(method, Method::Measured);
             let recipe = method.posed(setup, mask_bundle.as_ref());
             let with_masks = recipe.mask_recipe().is_ok();
-            let cases: Vec<&Case> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
+            let cases: Vec<&LoadedPair> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
             let Some(made) = method.make(&cases, setup, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
-            let mut skip = |case: &Case, why: String| {
+            let mut skip = |case: &LoadedPair, why: String| {
                 failed.insert(case.id);
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
@@ -222,7 +222,7 @@ impl<'a> Tool<'a> {
         }
     }
 
-    fn touch<'t>(&'t self, case: &'t Case, nothing: &'t (PairLabels, TaskError)) -> Touch<'t> {
+    fn touch<'t>(&'t self, case: &'t LoadedPair, nothing: &'t (PairLabels, TaskError)) -> Touch<'t> {
         Touch {
             dataset: self.dataset,
             pair: case.id,
@@ -298,10 +298,10 @@ pub(super) struct Again {
 }
 
 /// The images of some grasps by a method; those that fail now are left out.
-fn images_again(cases: &[&Case], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
+fn images_again(cases: &[&LoadedPair], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
     let upper = matches!(method, Method::Measured);
     let made = method.make(cases, setup, cx).unwrap_or_default();
-    let one = |(case, made): (&&Case, Result<Made, String>)| {
+    let one = |(case, made): (&&LoadedPair, Result<Made, String>)| {
         let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
         Some(Again { id: case.id, images })
     };
@@ -317,7 +317,7 @@ pub(super) fn again(dataset: &Dataset, setup: &Setup, method: &mut Method, ids: 
         if cx.cancel.is_cancelled() {
             break;
         }
-        let cases: Vec<Case> = ids.par_iter().filter_map(|&id| load(dataset, &unlabeled, id).ok()).collect();
+        let cases: Vec<LoadedPair> = ids.par_iter().filter_map(|&id| load(dataset, &unlabeled, id).ok()).collect();
         all.extend(images_again(&cases.iter().collect::<Vec<_>>(), method, setup, cx));
     }
     all
@@ -375,7 +375,7 @@ fn ended(pending: Pending, class: Option<usize>, range: f64) -> Result<((PairId,
 }
 
 /// The compared images of a grasp: in meters, or stretched to 0..1 where the scale was lost.
-fn images(case: &Case, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
+fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Image> {
     let image = |finger: PadId| {
         if let Some(color) = made.colors.get(finger) {
             // On the scale on which the peak of the depth stands for that of the color: one pooled figure serves both.

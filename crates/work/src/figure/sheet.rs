@@ -35,7 +35,7 @@ const LENGTHS_MM: [f64; 10] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 1
 
 /// A figure laid out.
 #[derive(Debug)]
-pub(super) struct Sheet {
+pub(super) struct FigureLayout {
     pub(super) look: FigureLook,
     /// Width and height, units.
     pub(super) size: [u32; 2],
@@ -121,7 +121,7 @@ fn shortened(text: &str, most: usize) -> String {
     std::iter::once('…').chain(text.chars().skip(letters + 1 - most)).collect()
 }
 
-impl Sheet {
+impl FigureLayout {
     /// Lays out rows of as many cells as the look has panes.
     pub(super) fn new(look: FigureLook, rows: &[Row], note: &str, rig: &Rig) -> Self {
         let (size, high) = (size(&look, rows.len(), rig), height(&look, rig));
@@ -295,7 +295,7 @@ fn dashed<B: DrawingBackend>(paper: &Paper<'_, B>, window: [f64; 4], place: [f64
     Ok(())
 }
 
-impl Drawing for Sheet {
+impl Drawing for FigureLayout {
     fn size(&self) -> [u32; 2] {
         self.size
     }

@@ -3,7 +3,7 @@
 //! [`Bundle::open`] checks everything that can be checked without running a graph: the manifest, the presence and
 //! SHA-256 of every file, and the names, element types and shapes of every graph's inputs and outputs against the
 //! manifest. A bundle with anything wrong is refused with the whole list. Whether an engine takes the graphs, and what
-//! they ask for, is found out by [`super::trial`].
+//! they ask for, is found out by [`super::sandbox`].
 //!
 //! # Manifest, format version 2
 //!

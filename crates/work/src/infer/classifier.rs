@@ -2,7 +2,7 @@
 
 use super::bundle::{Bundle, ClassifierInput, ClassifierSpec, Role};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
-use super::trial::admit;
+use super::sandbox::admit;
 use touch2touch_core::diffusion::{ModelError, Tensor};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::resample::bilinear;

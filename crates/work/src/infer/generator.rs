@@ -11,7 +11,7 @@ use preview::Watching;
 use super::bundle::{Bundle, GeneratorInput, GeneratorSpec, InputScale, Role, TimestepType, Unconditional};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
 use super::kept_key::KeptKey;
-use super::trial::admit;
+use super::sandbox::admit;
 use touch2touch_core::diffusion::{
     Denoiser, DiffusionError, GenerateConfig, Guided, ModelError, Prediction, Progress, Tensor, sample_watched,
 };

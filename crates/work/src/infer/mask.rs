@@ -2,7 +2,7 @@
 
 use super::bundle::{Bundle, Cast, MaskInput, MaskSpec, Role};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input};
-use super::trial::admit;
+use super::sandbox::admit;
 use touch2touch_core::contact::{ContactMask, settled_model};
 use touch2touch_core::diffusion::{ModelError, Tensor};
 use touch2touch_core::grid::{DepthMap, Grid, Mask};

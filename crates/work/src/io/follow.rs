@@ -103,7 +103,7 @@ enum Stage {
 }
 
 #[derive(Clone, Debug)]
-struct Seen {
+struct FollowedPair {
     id: PairId,
     file: PathBuf,
     /// All files of the pair.
@@ -142,7 +142,7 @@ pub struct Follower {
     path: PathBuf,
     dataset: Option<Arc<Dataset>>,
     config: FollowConfig,
-    seen: BTreeMap<String, Seen>,
+    seen: BTreeMap<String, FollowedPair>,
     fresh: VecDeque<String>,
     backlog: VecDeque<String>,
     folders: Vec<(PathBuf, Option<SystemTime>)>,
@@ -325,14 +325,14 @@ impl Follower {
                     let queued = seen.stage == Stage::Waiting;
                     let completed = !queued && seen.stamp == stamp && seen.file == file;
                     let stage = Stage::Waiting;
-                    *seen = Seen { id, file, files, stamp, stage, completed, since: now, retry: now };
+                    *seen = FollowedPair { id, file, files, stamp, stage, completed, since: now, retry: now };
                     if queued {
                         continue;
                     }
                 }
                 None => {
                     let stage = if wanted { Stage::Waiting } else { Stage::Rests };
-                    let seen = Seen { id, file, files, stamp, stage, completed: false, since: now, retry: now };
+                    let seen = FollowedPair { id, file, files, stamp, stage, completed: false, since: now, retry: now };
                     self.seen.insert(entry.name.clone(), seen);
                     if !wanted {
                         continue;

@@ -22,8 +22,8 @@ use super::home::{Away, Home};
 use super::{atomic, files, folders, names};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::{Marks, PackedMask};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
 

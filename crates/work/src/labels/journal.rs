@@ -8,10 +8,10 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
-use super::{HandMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
+use super::{DrawnMask, ImprintOf, MaskPlace, PairLabels, Review, Revision};
 use crate::error::TaskError;
-use touch2touch_core::hand::AcceptedPose;
 use touch2touch_core::label::PackedMask;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::Rig;
 
 /// What kind of act changed the labels.
@@ -29,7 +29,7 @@ pub enum Act {
 
 /// What was done, for the journal.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Deed {
+pub struct Operation {
     /// Its kind.
     pub act: Act,
     /// Its name, e.g. `lasso`.
@@ -40,7 +40,7 @@ pub struct Deed {
     pub person: Option<String>,
 }
 
-impl Deed {
+impl Operation {
     /// Something new without numbers.
     pub fn named(name: impl Into<Cow<'static, str>>) -> Self {
         Self { name: name.into(), ..Self::default() }
@@ -51,7 +51,7 @@ impl Deed {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Change {
     /// Masks.
-    pub masks: BTreeMap<MaskPlace, [Option<HandMask>; 2]>,
+    pub masks: BTreeMap<MaskPlace, [Option<DrawnMask>; 2]>,
     /// The review state.
     pub review: Option<[Review; 2]>,
     /// Accepted poses.
@@ -61,7 +61,7 @@ pub struct Change {
 }
 
 /// The same pixels from the same source; the revision is of one run of the program.
-pub(super) fn same(a: Option<&HandMask>, b: Option<&HandMask>) -> bool {
+pub(super) fn same(a: Option<&DrawnMask>, b: Option<&DrawnMask>) -> bool {
     match (a, b) {
         (None, None) => true,
         (Some(a), Some(b)) => a.is_same(b),
@@ -76,7 +76,7 @@ impl Change {
         for place in before.masks.keys().chain(after.masks.keys()) {
             let pair = [before.masks.get(place), after.masks.get(place)];
             if !same(pair[0], pair[1]) {
-                let plain = |hand: &HandMask| HandMask { revision: Revision::default(), ..hand.clone() };
+                let plain = |hand: &DrawnMask| DrawnMask { revision: Revision::default(), ..hand.clone() };
                 change.masks.insert(place.clone(), pair.map(|hand| hand.map(plain)));
             }
         }
@@ -134,7 +134,7 @@ pub struct Past {
 
 /// What the journal of a pair tells of what was done before.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Told {
+pub struct JournalHistory {
     /// What can be taken back, the oldest first.
     pub done: Vec<Past>,
     /// What was taken back and can be done again, the oldest first.
@@ -172,12 +172,12 @@ pub(super) struct Line {
 }
 
 impl Line {
-    pub(super) fn new(deed: &Deed, change: &Change, rig: &Rig, person: String, unix_s: u64) -> Self {
-        let mask = |(place, [before, after]): (&MaskPlace, &[Option<HandMask>; 2])| MaskLine {
+    pub(super) fn new(deed: &Operation, change: &Change, rig: &Rig, person: String, unix_s: u64) -> Self {
+        let mask = |(place, [before, after]): (&MaskPlace, &[Option<DrawnMask>; 2])| MaskLine {
             finger: rig.pad_key(place.pad).into_owned(),
             of: place.of.clone(),
-            before: before.as_ref().map(HandMask::pack),
-            after: after.as_ref().map(HandMask::pack),
+            before: before.as_ref().map(DrawnMask::pack),
+            after: after.as_ref().map(DrawnMask::pack),
         };
         Self {
             unix_s,
@@ -204,7 +204,7 @@ impl Line {
             let pad = rig.pads().find(|pad| rig.pad_key(*pad) == line.finger)?;
             let mut pair = [None, None];
             for (hand, pixels) in pair.iter_mut().zip([line.before, line.after]) {
-                *hand = pixels.map(|pixels| HandMask::unpack(&pixels, Revision::default())).transpose().ok()?;
+                *hand = pixels.map(|pixels| DrawnMask::unpack(&pixels, Revision::default())).transpose().ok()?;
             }
             masks.insert(MaskPlace { pad, of: line.of }, pair);
         }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::journal::{Line, same};
 use super::stored::{Signed, store_error, stored_review};
-use super::{Change, Deed, Labels, PairLabels, note};
+use super::{Change, Labels, Operation, PairLabels, note};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::io::masks::{MaskStore, StoreError};
@@ -27,7 +27,7 @@ pub struct Unsaved {
     /// All that is said of it.
     pub labels: PairLabels,
     /// What was done last.
-    pub deed: Deed,
+    pub deed: Operation,
     /// Who drew it a second time, where these are those labels.
     pub repeat: Option<String>,
 }
@@ -227,7 +227,7 @@ fn take_in_pair(labels: &Labels, kept: &MaskStore, name: &str) -> Result<(), Tas
         person = by;
         merge(&mut all, past.change);
     }
-    labels.save(name, &all, &Deed { person, ..Deed::named("labels taken in") }).map(drop)
+    labels.save(name, &all, &Operation { person, ..Operation::named("labels taken in") }).map(drop)
 }
 
 /// Makes a change whose labels may have changed meanwhile.

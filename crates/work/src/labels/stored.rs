@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::accepted::{by_imprint, of_imprints};
 use super::{
-    Change, Deed, HandMask, ImprintOf, MaskPlace, PairLabels, Record, Review, Reviews, Revision, Told, journal, note,
-    record,
+    Change, DrawnMask, ImprintOf, JournalHistory, MaskPlace, Operation, PairLabels, Record, Review, Reviews, Revision,
+    journal, note, record,
 };
 use crate::error::{TaskError, TaskErrorKind};
 use crate::io::dataset::Dataset;
@@ -29,8 +29,8 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn hand_of(stored: StoredMask) -> HandMask {
-    HandMask { mask: Arc::new(stored.mask), marks: Arc::new(stored.marks), revision: Revision::default() }
+fn hand_of(stored: StoredMask) -> DrawnMask {
+    DrawnMask { mask: Arc::new(stored.mask), marks: Arc::new(stored.marks), revision: Revision::default() }
 }
 
 pub(super) fn store_error(what: &str, err: &StoreError) -> TaskError {
@@ -154,7 +154,7 @@ impl Labels {
     }
 
     /// The mask that lies on the disk in a place now.
-    fn there(&self, store: &MaskStore, name: &str, place: &MaskPlace) -> Result<Option<HandMask>, StoreError> {
+    fn there(&self, store: &MaskStore, name: &str, place: &MaskPlace) -> Result<Option<DrawnMask>, StoreError> {
         let stored = match &place.of {
             ImprintOf::Measured => store.load(name, place.pad)?,
             ImprintOf::Predicted(of) => {
@@ -166,12 +166,12 @@ impl Labels {
 
     /// What was done to the labels of a pair before they were read, and what was taken back of it; as far as the journal
     /// tells and it leads to `labels`.
-    pub fn past(&self, name: &str, labels: &PairLabels) -> Told {
-        let Ok(store) = &*self.store else { return Told::default() };
+    pub fn past(&self, name: &str, labels: &PairLabels) -> JournalHistory {
+        let Ok(store) = &*self.store else { return JournalHistory::default() };
         // Without a journal there is nothing to take back; that it cannot be read is all that is wrong then.
         let bytes = store.journal(name).unwrap_or_default();
         let (done, undone) = journal::fold(bytes.split(|&b| b == b'\n'), labels, store.rig());
-        Told { done, undone, problem: self.journal_problem(name) }
+        JournalHistory { done, undone, problem: self.journal_problem(name) }
     }
 
     /// What was done to the labels of a pair, the oldest first; nothing where there is no journal.
@@ -207,7 +207,7 @@ impl Labels {
     ///
     /// # Errors
     /// If they cannot be written; [`TaskErrorKind::Lost`] where the data set is not there any more.
-    pub fn save(&self, name: &str, labels: &PairLabels, deed: &Deed) -> Result<Option<PairLabels>, TaskError> {
+    pub fn save(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError> {
         let what = format!("Save the labels of {name}");
         let store = self.store(&what)?;
         let fail = |err: StoreError| store_error(&what, &err);
@@ -258,7 +258,7 @@ pub(super) struct Signed {
 }
 
 impl Signed {
-    pub(super) fn now(deed: &Deed) -> Self {
+    pub(super) fn now(deed: &Operation) -> Self {
         let person = deed.person.clone().or_else(masks::person).unwrap_or_default();
         Self { person, unix_s: masks::now_unix_s() }
     }
@@ -268,7 +268,7 @@ impl Signed {
         &self,
         store: &MaskStore,
         (name, place): (&str, &MaskPlace),
-        mask: Option<&HandMask>,
+        mask: Option<&DrawnMask>,
     ) -> Result<(), StoreError> {
         let stored = mask.map(|hand| StoredMask {
             mask: (*hand.mask).clone(),

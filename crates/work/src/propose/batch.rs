@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::super::error::{Remark, TaskError};
 use super::super::feel::{Touch, feel};
 use super::super::job::JobCx;
-use super::super::labels::{Deed, Labels, MaskPlace};
+use super::super::labels::{Labels, MaskPlace, Operation};
 use super::super::models::Models;
 use super::super::recipe::Stage;
 use super::super::tool::load_tool;
@@ -28,7 +28,7 @@ pub struct BatchSetup {
     /// The pairs. Those marked "done", "flagged" or "skip" are left as they are: somebody has judged them.
     pub pairs: Vec<PairId>,
     /// Whether what was painted by hand is replaced as well.
-    pub over_hand: bool,
+    pub over_drawn: bool,
     /// Who asked; else whom the system says.
     pub person: Option<String>,
 }
@@ -74,7 +74,7 @@ impl Batch {
 }
 
 /// Proposes masks for the pairs of `setup` and stores them: as if each had been accepted by hand, but that review states
-/// stay, so that every one of them is still to be looked at. What a person painted stays unless `over_hand`. Each pair's
+/// stay, so that every one of them is still to be looked at. What a person painted stays unless `over_drawn`. Each pair's
 /// change is a line of its journal, which undo takes back. Stops early when told to.
 ///
 /// # Errors
@@ -101,7 +101,7 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
         });
         let no_tool = TaskError::new(WHAT, "no tool is named, so there is no CAD model");
         let tool = tool.unwrap_or(Err(&no_tool));
-        let job = Job { dataset, all: &labels, setup, models, cx };
+        let job = ProposalBatch { dataset, all: &labels, setup, models, cx };
         let one = caught(|| job.one((pair, &entry.name), tool, &mut batch));
         match one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
             Ok(()) => {}
@@ -121,7 +121,7 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
 
 /// What is the same for all pairs.
 #[derive(Clone, Copy)]
-struct Job<'a> {
+struct ProposalBatch<'a> {
     dataset: &'a Dataset,
     all: &'a Labels,
     setup: &'a BatchSetup,
@@ -129,7 +129,7 @@ struct Job<'a> {
     cx: &'a JobCx,
 }
 
-impl Job<'_> {
+impl ProposalBatch<'_> {
     fn one(
         self,
         (pair, name): (PairId, &str),
@@ -164,7 +164,7 @@ impl Job<'_> {
             };
             let place = MaskPlace { pad, of: of.clone() };
             let drawn = imprints[pad].as_ref().and_then(|imprint| stored.drawn(&place, imprint));
-            let hand = accepted(drawn, &proposal, setup.over_hand);
+            let hand = accepted(drawn, &proposal, setup.over_drawn);
             if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
                 batch.same += 1;
                 continue;
@@ -178,7 +178,7 @@ impl Job<'_> {
             all.save(
                 name,
                 &stored,
-                &Deed { person: setup.person.clone(), how, ..Deed::named("proposal for many pairs") },
+                &Operation { person: setup.person.clone(), how, ..Operation::named("proposal for many pairs") },
             )?;
             batch.masks += new;
             batch.changed.push(name.to_owned());

@@ -12,8 +12,8 @@ use super::{
 };
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::hand::HandPose;
 use touch2touch_core::label::CadPose;
+use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 
 /// What proposes, with its numbers.
@@ -25,7 +25,7 @@ pub struct ProposeSetup {
     /// what registers the pose of [`ProposalSource::CadRegistered`].
     pub recipe: Recipe,
     /// The pose of [`ProposalSource::CadHand`]; `None` takes the one accepted for the pair, if a person set it.
-    pub pose: Option<HandPose>,
+    pub pose: Option<ManualPose>,
     /// The pair of [`ProposalSource::Carry`]; `None` takes the nearest of the same tool that somebody worked on.
     pub carry_from: Option<PairId>,
 }
@@ -55,7 +55,7 @@ pub fn propose(
         };
         Ok(pads.iter().copied().map(one).collect())
     };
-    let near = |at: CadPose, pose: HandPose| {
+    let near = |at: CadPose, pose: ManualPose| {
         let tool = touch.tool.map_err(Clone::clone)?;
         each(&|pad, imprint| {
             let distances = cad_distances((imprint, setup.recipe.imprint), (sample, pad), tool, pose)?;

@@ -8,13 +8,13 @@ use touch2touch_tuning::MaskTouch;
 use super::{Entry, MOST_MASKS, Remark, TrainPlan, TrainSetup, WHAT};
 use crate::bundles::BundleKind;
 use crate::error::TaskError;
-use crate::export::HandMasks;
+use crate::export::DrawnMasks;
 use crate::imprint::imprint_of;
 use crate::infer::bundle::MaskInput;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::labels::{HandMask, ImprintOf, ImprintSource, MaskPlace};
-use crate::models::{Models, Wanted};
+use crate::labels::{DrawnMask, ImprintOf, ImprintSource, MaskPlace};
+use crate::models::{GenerateInput, Models};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::Provenance;
@@ -79,7 +79,7 @@ impl Drawn {
 /// Reads what a plan names.
 pub(super) fn gather(
     dataset: &Dataset,
-    masks: &HandMasks<'_>,
+    masks: &DrawnMasks<'_>,
     plan: &TrainPlan,
     setup: &TrainSetup,
     models: &Models,
@@ -157,7 +157,7 @@ impl Gathered {
 }
 
 /// Why nothing can be learned from a mask of an imprint.
-fn unfit(imprint: &DepthMap, hand: &HandMask) -> Option<String> {
+fn unfit(imprint: &DepthMap, hand: &DrawnMask) -> Option<String> {
     let ([width, height], [w, h]) = (imprint.size(), hand.mask.size());
     let all = |bits: &Mask| bits.as_slice().iter().all(|&bit| bit);
     if [width, height] != [w, h] {
@@ -190,7 +190,7 @@ fn imprint(
     let ends = generator.ends(&sample.rig).and_then(Result::ok);
     let picture = ends.and_then(|ends| touch.picture(ends.input));
     let picture = picture.ok_or_else(|| TaskError::new(WHAT, "the finger has no picture to predict from"))?;
-    let wanted = Wanted { difference: &picture, seed: config.seed, size: [0, 0] };
+    let wanted = GenerateInput { difference: &picture, seed: config.seed, size: [0, 0] };
     let quiet = JobCx::new(cx.cancel.clone(), std::sync::Arc::new(|_| {}));
     let made = models.predict(generator, setup.engine, &config, &[wanted], &quiet)?.pop();
     let made = made.ok_or_else(|| TaskError::new(WHAT, "the generator gave no prediction"))?;

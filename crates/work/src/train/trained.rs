@@ -14,14 +14,14 @@ use touch2touch_core::rig::PadId;
 
 /// How well a mask model's masks fit those that people drew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Told {
+pub struct MaskScore {
     /// Pixels in both over pixels in either.
     pub iou: f64,
     /// Twice the pixels in both over the pixels of each together.
     pub dice: f64,
 }
 
-impl Told {
+impl MaskScore {
     /// The mean of several; `None` of none.
     pub fn mean(all: impl Iterator<Item = Self>) -> Option<Self> {
         let (mut sum, mut count) = (Self::default(), 0.0);
@@ -50,9 +50,9 @@ pub struct HeldOut {
     /// Which imprint was masked.
     pub imprint: ImprintSource,
     /// The model as it was.
-    pub before: Told,
+    pub before: MaskScore,
     /// The trained model.
-    pub after: Told,
+    pub after: MaskScore,
 }
 
 /// A training with what it is worth.
@@ -73,9 +73,9 @@ pub struct Trained {
     /// Pairs and masks that could not be used.
     pub unusable: Vec<Remark>,
     /// The model as it was, on masks of pairs that were not trained on; `None` without any.
-    pub before: Option<Told>,
+    pub before: Option<MaskScore>,
     /// The trained model on the same.
-    pub after: Option<Told>,
+    pub after: Option<MaskScore>,
     /// These masks, the worst (after) first.
     pub held_out: Vec<HeldOut>,
     /// Steps.

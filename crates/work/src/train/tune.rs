@@ -10,7 +10,7 @@ use touch2touch_tuning::{Cast, Descent as _, Error, MaskConfig, MaskStart, MaskT
 use super::gather::{Drawn, Gathered};
 use super::trained::HeldOut;
 use super::write::{Provenance, bundle};
-use super::{NO_TOOL, Told, TrainPlan, TrainSetup, Trained, WHAT};
+use super::{MaskScore, NO_TOOL, TrainPlan, TrainSetup, Trained, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::{self, MaskSpec, Role};
 use crate::infer::mask::contact_of;
@@ -19,7 +19,7 @@ use crate::io::digest::hex;
 use crate::io::files;
 use crate::io::memory::peak_mib;
 use crate::job::JobCx;
-use crate::tuning::{Kept, Look, Runs, Tuning, steps_within};
+use crate::tuning::{KeptRun, Look, Runs, Tuning, steps_within};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::agreement;
 
@@ -47,7 +47,7 @@ pub(super) fn tune(
 ) -> Result<Trained, TaskError> {
     let (spec, start) = open(setup)?;
     let touches: Vec<MaskTouch> = gathered.learned.iter().map(|drawn| drawn.touch(&spec.input)).collect();
-    let kept = Kept::of(setup.unfinished.as_deref(), &digest(setup, &gathered));
+    let kept = KeptRun::of(setup.unfinished.as_deref(), &digest(setup, &gathered));
     let config = MaskConfig { seed: setup.choice.seed, ..MaskConfig::default() };
     let steps = match setup.tuning {
         Tuning::Steps(steps) => steps,
@@ -64,7 +64,7 @@ pub(super) fn tune(
     let looked_at: Vec<&Drawn> = gathered.held.iter().step_by(every).collect();
     let look = |tuner: &MaskTuner| {
         let told = judge.told(&looked_at, |imprints| tuner.probabilities(imprints))?;
-        Ok(Told::mean(told.into_iter()).map_or(0.0, |told| told.dice))
+        Ok(MaskScore::mean(told.into_iter()).map_or(0.0, |told| told.dice))
     };
     let begun = |state: Option<&[u8]>| match state {
         Some(state) => MaskTuner::resume(&start, touches.clone(), config.clone(), state),
@@ -97,8 +97,8 @@ pub(super) fn tune(
         }));
     }
     held_out.sort_by(|a, b| a.after.iou.total_cmp(&b.after.iou));
-    let before = Told::mean(held_out.iter().map(|one| one.before));
-    let after = Told::mean(held_out.iter().map(|one| one.after));
+    let before = MaskScore::mean(held_out.iter().map(|one| one.before));
+    let after = MaskScore::mean(held_out.iter().map(|one| one.after));
     cx.check(WHAT)?;
     let said = Provenance { dataset, gathered: &gathered, steps, before, after };
     let name = bundle(setup, tuner.tuned(), &said)?;
@@ -196,7 +196,7 @@ impl Judge<'_> {
         &self,
         drawn: &[&Drawn],
         say: impl FnOnce(&[&[f32]]) -> touch2touch_tuning::Result<Vec<Vec<f32>>>,
-    ) -> Result<Vec<Told>, TaskError> {
+    ) -> Result<Vec<MaskScore>, TaskError> {
         let (input, least) = (&self.spec.input, self.spec.output.threshold as f32);
         let imprints: Vec<Vec<f32>> = drawn.iter().map(|drawn| drawn.touch(input).imprint_m).collect();
         let views: Vec<&[f32]> = imprints.iter().map(Vec::as_slice).collect();
@@ -216,7 +216,7 @@ impl Judge<'_> {
             }
             let agreed = agreement(&found, &truth, 1.0)
                 .ok_or_else(|| TaskError::new(WHAT, "the mask has another size than its imprint"))?;
-            Ok(Told { iou: agreed.iou, dice: agreed.dice })
+            Ok(MaskScore { iou: agreed.iou, dice: agreed.dice })
         };
         drawn.iter().zip(said).map(told).collect()
     }

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::gather::{Drawn, Gathered};
-use super::{Told, TrainSetup, WHAT};
+use super::{MaskScore, TrainSetup, WHAT};
 use crate::bundles::{BundleInfo, TRAINED};
 use crate::error::TaskError;
 use crate::infer::bundle::Role;
@@ -24,8 +24,8 @@ pub(super) struct Provenance<'a> {
     pub(super) dataset: &'a Dataset,
     pub(super) gathered: &'a Gathered,
     pub(super) steps: u32,
-    pub(super) before: Option<Told>,
-    pub(super) after: Option<Told>,
+    pub(super) before: Option<MaskScore>,
+    pub(super) after: Option<MaskScore>,
 }
 
 /// Writes the bundle; its name. The digest in it tells trainings of the same masks apart, which are chosen by name.

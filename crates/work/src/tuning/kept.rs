@@ -11,12 +11,12 @@ use crate::io::{atomic, files};
 /// Runs that nobody went on with for so long are removed.
 const OLD: Duration = Duration::from_secs(14 * 24 * 3600);
 
-pub(crate) struct Kept {
+pub(crate) struct KeptRun {
     /// `None` where nothing is kept.
     folder: Option<PathBuf>,
 }
 
-impl Kept {
+impl KeptRun {
     /// What was kept in a folder of runs of the one with this digest, if anything.
     pub(crate) fn of(root: Option<&Path>, digest: &str) -> Self {
         let folder = root.map(|root| {
@@ -73,16 +73,16 @@ mod tests {
     fn what_is_old_goes_and_what_is_young_stays() {
         let root = tempfile::tempdir().unwrap();
         for (name, age) in [("old", OLD + Duration::from_secs(60)), ("young", Duration::from_secs(60))] {
-            let kept = Kept { folder: Some(root.path().join(name)) };
+            let kept = KeptRun { folder: Some(root.path().join(name)) };
             kept.write("part-1.tuner", b"state");
             let file = std::fs::File::options().write(true).open(root.path().join(name).join("part-1.tuner")).unwrap();
             file.set_modified(SystemTime::now() - age).unwrap();
         }
         remove_old(root.path());
-        let young = Kept { folder: Some(root.path().join("young")) };
+        let young = KeptRun { folder: Some(root.path().join("young")) };
         assert_eq!(young.read("part-1.tuner").as_deref(), Some(&b"state"[..]));
         assert!(!root.path().join("old").exists());
         young.clear();
-        assert!(young.read("part-1.tuner").is_none() && Kept { folder: None }.read("x").is_none());
+        assert!(young.read("part-1.tuner").is_none() && KeptRun { folder: None }.read("x").is_none());
     }
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use touch2touch_tuning::{Descent, Error, Result as Tuned};
 
-use super::Kept;
+use super::KeptRun;
 use crate::error::TaskError;
 use crate::job::{Curve, JobCx, Progress};
 
@@ -28,7 +28,7 @@ type Curves = [Vec<[f64; 2]>; 2];
 
 /// The runs one after the other, with what is kept and shown of them.
 pub(crate) struct Runs<'a> {
-    pub(crate) kept: &'a Kept,
+    pub(crate) kept: &'a KeptRun,
     pub(crate) cx: &'a JobCx,
     what: &'static str,
     fail: fn(Error) -> TaskError,
@@ -47,7 +47,7 @@ impl<'a> Runs<'a> {
     /// So many runs of so many steps, of the task `what`; `fail` says what is wrong with one.
     pub(crate) fn new(
         (what, fail): (&'static str, fn(Error) -> TaskError),
-        (kept, cx): (&'a Kept, &'a JobCx),
+        (kept, cx): (&'a KeptRun, &'a JobCx),
         steps: u32,
         count: usize,
     ) -> Self {
@@ -147,7 +147,7 @@ pub(crate) fn steps_within<T: Descent>(
     (time, stepping): (Duration, f64),
     runs: usize,
     (what, fail): (&'static str, fn(Error) -> TaskError),
-    (kept, cx): (&Kept, &JobCx),
+    (kept, cx): (&KeptRun, &JobCx),
     tuner: impl FnOnce() -> Tuned<T>,
 ) -> Result<u32, TaskError> {
     const FILE: &str = "steps";

@@ -27,7 +27,7 @@ use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, Refusal
 use crate::io::digest::sha256;
 use crate::io::folders;
 use touch2touch_core::diffusion::{ModelError, Tensor};
-use watch::{End, Limits, Seen};
+use watch::{End, Limits, ProcessEnd};
 
 /// Most time a trial may take.
 pub const TIME: Duration = Duration::from_secs(60);
@@ -153,7 +153,7 @@ fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Re
     Ok(())
 }
 
-fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<Seen> {
+fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<ProcessEnd> {
     let name = match engine {
         EngineKind::Rten => "rten",
         EngineKind::Ort => "ort",
@@ -172,7 +172,7 @@ fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Re
 }
 
 /// What the second process said and how it ended, in words.
-fn judge(bundle: &Bundle, engine: EngineKind, seen: &Seen) -> Result<(), Refusal> {
+fn judge(bundle: &Bundle, engine: EngineKind, seen: &ProcessEnd) -> Result<(), Refusal> {
     let lines = || seen.output.lines();
     let at = lines().filter_map(|l| l.strip_prefix(AT)).next_back().unwrap_or("starting");
     let limit = format!("{:.1} GB", memory_limit(bundle) as f64 / 1e9);

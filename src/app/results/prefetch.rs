@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::super::pane::Need;
+use super::super::pane::Demand;
 use super::prediction::PredictionKey;
-use super::{Computes, Job, SharedServices, State, Wanted};
+use super::{Computes, Demands, Job, SharedServices, State};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::prediction::Prediction;
 
@@ -16,9 +16,9 @@ const LOOK: Duration = Duration::from_millis(10);
 
 /// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct AheadKey(pub PredictionKey);
+pub struct PrefetchKey(pub PredictionKey);
 
-impl Computes for AheadKey {
+impl Computes for PrefetchKey {
     type Value = Prediction;
 
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
@@ -59,16 +59,16 @@ impl State {
     }
 
     /// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
-    pub(crate) fn ahead(&self, finger: PadId) -> Option<AheadKey> {
-        let needs = [Need::Imprint(super::ImprintSource::Predicted), Need::Comparison, Need::Ledger];
+    pub(crate) fn prefetch(&self, finger: PadId) -> Option<PrefetchKey> {
+        let needs = [Demand::Imprint(super::ImprintSource::Predicted), Demand::Comparison, Demand::Ledger];
         let (_, cloud) = self.shows_cloud(super::ImprintSource::Predicted);
         let shown = cloud || needs.into_iter().any(|need| self.needs(need));
-        let asked_for = self.tasks.any_generating().is_some() || (self.seeds_asked() && self.needs(Need::Seeds));
+        let asked_for = self.tasks.any_generating().is_some() || (self.seeds_asked() && self.needs(Demand::Seeds));
         if !self.settings.generate.by_itself || !shown || asked_for || !self.fingers_to_generate().contains(&finger) {
             return None;
         }
         let touch = self.touch_key(finger).filter(|touch| self.results.looked_up.contains(touch))?;
-        let key = AheadKey(self.recipe(touch)?);
+        let key = PrefetchKey(self.recipe(touch)?);
         // What a person picked under these settings is meant.
         let there = self.results.predictions.contains(&key.0) || self.picked(touch).is_some();
         if there || !self.can_start(finger) {
@@ -79,11 +79,11 @@ impl State {
     }
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// The predictions of the pair on screen that cost little.
     pub(crate) fn predictions_ahead(&mut self) {
         let fingers = self.state.fingers_to_generate();
-        for key in fingers.into_iter().filter_map(|finger| self.state.ahead(finger)) {
+        for key in fingers.into_iter().filter_map(|finger| self.state.prefetch(finger)) {
             self.ask_unless(false, key);
         }
     }

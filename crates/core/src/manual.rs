@@ -18,7 +18,7 @@ pub const STEP_RAD: f64 = 0.5 / 180.0 * std::f64::consts::PI;
 ///
 /// The planar part is what registration answers; the other three are zero unless a person set them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct HandPose {
+pub struct ManualPose {
     /// Angle about x, shift along y and z.
     #[serde(flatten)]
     pub planar: PlanarPose,
@@ -40,7 +40,7 @@ fn is_zero(v: &f64) -> bool {
 
 /// One of the six ways to move a tool by hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
-pub enum HandAxis {
+pub enum PoseAxis {
     /// Lateral shift.
     Y,
     /// Shift along the tool.
@@ -55,7 +55,7 @@ pub enum HandAxis {
     Yaw,
 }
 
-impl HandAxis {
+impl PoseAxis {
     /// What one step adds, meters or radians.
     pub fn step(self) -> f64 {
         if self.is_turn() { STEP_RAD } else { STEP_M }
@@ -72,13 +72,13 @@ impl HandAxis {
     }
 }
 
-impl From<PlanarPose> for HandPose {
+impl From<PlanarPose> for ManualPose {
     fn from(planar: PlanarPose) -> Self {
         Self { planar, ..Self::default() }
     }
 }
 
-impl HandPose {
+impl ManualPose {
     /// The motion in space: from the object frame to the grasp frame.
     pub fn to_affine(self) -> DAffine3 {
         let turn = DQuat::from_rotation_x(self.planar.theta_rad)
@@ -99,14 +99,14 @@ impl HandPose {
 
     /// The pose moved along one axis of the grasp frame, in meters or radians. Turns are about the object's origin.
     #[must_use]
-    pub fn moved(mut self, axis: HandAxis, by: f64) -> Self {
+    pub fn moved(mut self, axis: PoseAxis, by: f64) -> Self {
         match axis {
-            HandAxis::Y => self.planar.y_m += by,
-            HandAxis::Z => self.planar.z_m += by,
-            HandAxis::Theta => self.planar.theta_rad += by,
-            HandAxis::X => self.x_m += by,
-            HandAxis::Pitch => self.pitch_rad += by,
-            HandAxis::Yaw => self.yaw_rad += by,
+            PoseAxis::Y => self.planar.y_m += by,
+            PoseAxis::Z => self.planar.z_m += by,
+            PoseAxis::Theta => self.planar.theta_rad += by,
+            PoseAxis::X => self.x_m += by,
+            PoseAxis::Pitch => self.pitch_rad += by,
+            PoseAxis::Yaw => self.yaw_rad += by,
         }
         self
     }
@@ -117,7 +117,7 @@ impl HandPose {
 pub struct AcceptedPose {
     /// `grasp_from_object`.
     #[serde(flatten)]
-    pub pose: HandPose,
+    pub pose: ManualPose,
     /// Whether a person set it, rather than took over what a registration answered.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_hand: bool,
@@ -155,7 +155,7 @@ impl PoseDifference {
 
 /// What a pose costs, whoever made it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct HandCost {
+pub struct ManualCost {
     /// Root mean square distance of the points to the tool's outline in the plane, those inside counted as zero,
     /// meters. NaN without a point.
     pub outline_rms_m: f64,
@@ -178,9 +178,9 @@ pub fn cost(
     points: &[DVec3],
     field: &DistanceField,
     surface: &MeshDistance,
-    pose: HandPose,
+    pose: ManualPose,
     kernel_m: f64,
-) -> HandCost {
+) -> ManualCost {
     let object_from_grasp = pose.to_affine().inverse();
     let (mut squares, mut robust, mut inliers, mut to_surface, mut count) = (0.0, 0.0, 0usize, 0.0, 0usize);
     for point in spread(points.len(), COST_POINTS).into_iter().map(|i| points[i]).filter(|p| p.is_finite()) {
@@ -197,7 +197,7 @@ pub fn cost(
         count += 1;
     }
     let n = count as f64;
-    HandCost {
+    ManualCost {
         outline_rms_m: (squares / n).sqrt(),
         cost_m2: robust / n,
         inlier_share: inliers as f64 / n,
@@ -215,33 +215,33 @@ mod tests {
     #[test]
     fn a_planar_hand_pose_is_the_planar_pose() {
         let planar = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: -0.002 };
-        let hand = HandPose::from(planar);
+        let hand = ManualPose::from(planar);
         assert!(hand.is_planar() && hand.to_affine().abs_diff_eq(planar.to_affine(), 1e-15));
         // Old labels hold the planar pose alone: they are read, and a planar hand pose is written as before.
         let old = serde_json::to_string(&planar).unwrap();
-        assert_eq!(serde_json::from_str::<HandPose>(&old).unwrap(), hand);
+        assert_eq!(serde_json::from_str::<ManualPose>(&old).unwrap(), hand);
         assert_eq!(serde_json::to_string(&hand).unwrap(), old);
-        let tilted = hand.moved(HandAxis::Pitch, 0.1).moved(HandAxis::X, 1e-3);
+        let tilted = hand.moved(PoseAxis::Pitch, 0.1).moved(PoseAxis::X, 1e-3);
         let json = serde_json::to_string(&tilted).unwrap();
-        assert_eq!(serde_json::from_str::<HandPose>(&json).unwrap(), tilted);
+        assert_eq!(serde_json::from_str::<ManualPose>(&json).unwrap(), tilted);
     }
 
     #[test]
     fn each_axis_moves_the_tool_as_its_name_says() {
-        let start = HandPose::default();
+        let start = ManualPose::default();
         let tip = DVec3::new(0.0, 0.0, 0.02);
-        for axis in HandAxis::iter() {
+        for axis in PoseAxis::iter() {
             let moved = start.moved(axis, axis.step());
             assert_eq!(moved.is_planar(), !axis.leaves_plane(), "{axis:?}");
             let by = moved.to_affine().transform_point3(tip) - tip;
             let want = match axis {
-                HandAxis::X => DVec3::X * STEP_M,
-                HandAxis::Y => DVec3::Y * STEP_M,
-                HandAxis::Z => DVec3::Z * STEP_M,
+                PoseAxis::X => DVec3::X * STEP_M,
+                PoseAxis::Y => DVec3::Y * STEP_M,
+                PoseAxis::Z => DVec3::Z * STEP_M,
                 // y turns towards z about x, z towards x about y; about its own axis the tip stays.
-                HandAxis::Theta => DVec3::Y * (-0.02 * STEP_RAD.sin()),
-                HandAxis::Pitch => DVec3::X * (0.02 * STEP_RAD.sin()),
-                HandAxis::Yaw => DVec3::ZERO,
+                PoseAxis::Theta => DVec3::Y * (-0.02 * STEP_RAD.sin()),
+                PoseAxis::Pitch => DVec3::X * (0.02 * STEP_RAD.sin()),
+                PoseAxis::Yaw => DVec3::ZERO,
             };
             assert!((by - want).length() < 1e-6, "{axis:?}: {by}");
         }
@@ -255,12 +255,12 @@ mod tests {
         let mut points: Vec<DVec3> =
             cross_contacts(3000, truth, 1e-4, 3).iter().map(|p| DVec3::new(0.003, p.x, p.y)).collect();
         points.push(DVec3::NAN);
-        let at = |pose: HandPose| cost(&points, &field, &surface, pose, 1e-3);
+        let at = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
         let best = at(truth.into());
         assert!(best.inlier_share > 0.99 && best.outline_rms_m < 2e-4 && best.surface_rms_m < 2e-4, "{best:?}");
-        for axis in HandAxis::iter() {
+        for axis in PoseAxis::iter() {
             let by = if axis.is_turn() { 0.15 } else { 0.003 };
-            let moved = at(HandPose::from(truth).moved(axis, by));
+            let moved = at(ManualPose::from(truth).moved(axis, by));
             assert!(moved.surface_rms_m > best.surface_rms_m, "{axis:?}: {moved:?}");
             if !axis.leaves_plane() {
                 assert!(moved.cost_m2 > 2.0 * best.cost_m2, "{axis:?}: {moved:?}");

@@ -3,7 +3,7 @@
 //! Each result says in its own file when it is asked for; here stands what is more urgent than what.
 
 use super::keys::ImprintSource;
-use super::pane::Need;
+use super::pane::Demand;
 use super::results::labels::LabelsKey;
 use super::results::{Cached, Request};
 use super::state::State;
@@ -15,8 +15,8 @@ impl State {
     /// What the visible panes need, is not there, and can be computed from what is there; most urgent first.
     ///
     /// Pure: the same state wants the same. A result that is computed makes the next one possible.
-    pub fn wanted(&self) -> Vec<Request> {
-        let mut list = Wanted { state: self, list: Vec::new() };
+    pub fn demands(&self) -> Vec<Request> {
+        let mut list = Demands { state: self, list: Vec::new() };
         list.selection();
         list.versus();
         list.seeds();
@@ -34,22 +34,22 @@ impl State {
     /// whether it is needed at all.
     pub(super) fn shows_cloud(&self, source: ImprintSource) -> (bool, bool) {
         let other = source.other();
-        let layers = self.needs(Need::Layers) && self.workbench.side == source;
-        let both = self.workbench.both_clouds && self.needs(Need::Scene(other));
-        let scene = layers || both || self.needs(Need::Scene(source)) || self.needs(Need::Poses);
-        let inspected = self.inspect.source == source && (self.needs(Need::Steps) || self.needs(Need::Basin));
+        let layers = self.needs(Demand::Layers) && self.workbench.side == source;
+        let both = self.workbench.both_clouds && self.needs(Demand::Scene(other));
+        let scene = layers || both || self.needs(Demand::Scene(source)) || self.needs(Demand::Poses);
+        let inspected = self.inspect.source == source && (self.needs(Demand::Steps) || self.needs(Demand::Basin));
         let scene = scene || self.proposes_at_pose(source) || self.shows_influence(source);
         (scene, scene || inspected)
     }
 }
 
 /// Collects what is missing.
-pub(super) struct Wanted<'a> {
+pub(super) struct Demands<'a> {
     pub(super) state: &'a State,
     list: Vec<Request>,
 }
 
-impl Wanted<'_> {
+impl Demands<'_> {
     /// Asks for a result, unless it is there or could not be computed.
     pub(super) fn ask<K: Cached>(&mut self, key: K) {
         self.ask_unless(K::cache(&self.state.results).contains(&key), key);
@@ -83,8 +83,8 @@ impl Wanted<'_> {
         let shown = state.fingers();
         for finger in state.rig().pads() {
             let on_screen = shown.contains(&finger);
-            let image = state.needs(Need::Imprint(predicted)) && on_screen;
-            let compared = state.needs(Need::Comparison) && on_screen;
+            let image = state.needs(Demand::Imprint(predicted)) && on_screen;
+            let compared = state.needs(Demand::Comparison) && on_screen;
             if image || compared || cloud_predicted {
                 self.stored(finger, pair.finger(finger));
                 self.imprint(finger, pair.finger(finger));
@@ -95,14 +95,14 @@ impl Wanted<'_> {
             if compared {
                 self.comparison(finger, pair.finger(finger));
             }
-            if on_screen && state.needs(Need::Ambiguity) {
+            if on_screen && state.needs(Demand::Ambiguity) {
                 self.ambiguity(finger, pair.finger(finger));
             }
-            let drawn = on_screen && (state.settings.mask_visible || state.needs(Need::Masks));
-            if cloud_measured || (drawn && state.needs(Need::Imprint(measured))) {
+            let drawn = on_screen && (state.settings.mask_visible || state.needs(Demand::Masks));
+            if cloud_measured || (drawn && state.needs(Demand::Imprint(measured))) {
                 self.mask(measured, finger);
             }
-            if cloud_predicted || (drawn && state.needs(Need::Imprint(predicted))) {
+            if cloud_predicted || (drawn && state.needs(Demand::Imprint(predicted))) {
                 self.mask(predicted, finger);
             }
         }
@@ -124,7 +124,7 @@ impl Wanted<'_> {
         }
         self.proposal();
         self.predictions_ahead();
-        if state.needs(Need::Ledger) {
+        if state.needs(Demand::Ledger) {
             self.ledger(pair.finger(state.selection.finger));
         }
     }
@@ -135,7 +135,7 @@ impl Wanted<'_> {
         if state.tool().ready().is_none() || state.cloud(source).ready().is_none() {
             return;
         }
-        if state.needs(Need::FingerPoses) {
+        if state.needs(Demand::FingerPoses) {
             self.pose_table(source);
         }
         if let Some(run) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {

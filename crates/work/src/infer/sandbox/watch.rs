@@ -32,7 +32,7 @@ pub(super) enum End {
 
 /// What was seen of it.
 #[derive(Debug)]
-pub(super) struct Seen {
+pub(super) struct ProcessEnd {
     pub(super) end: End,
     /// Standard output, its beginning.
     pub(super) output: String,
@@ -41,7 +41,7 @@ pub(super) struct Seen {
 }
 
 /// Runs a program to its end, or to the end of its limits.
-pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Result<Seen> {
+pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Result<ProcessEnd> {
     let mut child = command(program, limits.memory)
         .args(args)
         // An address space of its own for each thread's heap would count, though nothing is in it.
@@ -61,7 +61,7 @@ pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Resu
             child.wait().ok();
         }
         let text = |reader: std::thread::ScopedJoinHandle<'_, String>| reader.join().unwrap_or_default();
-        Ok(Seen { output: text(output), errors: text(errors), end: end? })
+        Ok(ProcessEnd { output: text(output), errors: text(errors), end: end? })
     })
 }
 
@@ -124,7 +124,7 @@ fn beginning(pipe: Option<impl Read>) -> String {
 mod tests {
     use super::*;
 
-    fn shell(script: &str, limits: Limits) -> Seen {
+    fn shell(script: &str, limits: Limits) -> ProcessEnd {
         watch(Path::new("/bin/sh"), &["-c".as_ref(), script.as_ref()], limits).unwrap()
     }
 
