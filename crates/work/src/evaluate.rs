@@ -36,10 +36,10 @@ use touch2touch_core::sample::Scale;
 
 pub use export::{Report, export, rows};
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Evaluate";
 
-/// What to evaluate, and how.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
     /// Generator bundles: a row each.
@@ -48,13 +48,13 @@ pub struct Setup {
     pub mask_bundle: Option<Origin>,
     /// The tool classifier; without it neither accuracy nor Fréchet distance.
     pub classifier: Option<Origin>,
-    /// Where the contact masks come from that nobody drew, for every method alike.
+    /// Source of the contact masks that nobody drew, for every method alike.
     pub mask: MaskChoice,
-    /// Whether a mask drawn by hand is taken where there is one, for every method alike.
+    /// True where a mask drawn by hand is taken where there is one, for every method alike.
     pub hand: bool,
     /// The registration.
     pub engine: RegistrationChoice,
-    /// How decoder outputs become meters.
+    /// Mapping of decoder outputs to meters.
     pub shift: ShiftMode,
     /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
     pub steps: Option<u32>,
@@ -117,17 +117,17 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
     /// The column groups.
     pub groups: Vec<Group>,
-    /// What PSNR and SSIM mean.
+    /// Meaning of PSNR and SSIM.
     pub conventions: &'static str,
-    /// What the columns mean, and what is missing and why.
+    /// Meaning of the columns, and reasons for what is missing.
     pub notes: Vec<String>,
-    /// What is odd about the files, by kind.
+    /// Oddities of the files, by kind.
     pub findings: Vec<Finding>,
-    /// What was left out.
+    /// Grasps and tools that were left out, and why.
     pub skipped: Vec<Skipped>,
-    /// Whether everything asked for was scored: false if stopped early.
+    /// True where everything asked for was scored; false if stopped early.
     pub complete: bool,
-    /// How.
+    /// Settings of the evaluation.
     pub setup: Setup,
     /// The engine of the models and its threads.
     pub runtime: String,

@@ -8,9 +8,9 @@
 //! is kept in the cache folder, by the bundle's hash, the engine's build and the program's version), and those that ship
 //! with the program are not tried at all.
 //!
-//! What is bounded: loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
+//! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
 //! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
-//! the memory, but it is the second process that ends). What is not: what a graph asks for on other values than
+//! the memory, but it is the second process that ends). Not bounded is what a graph asks for on other values than
 //! zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
 //! second process and tries nothing.
 

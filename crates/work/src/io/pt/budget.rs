@@ -1,9 +1,9 @@
 //! Cost of a `.pt` file in memory, found before anything of it is unpickled.
 //!
-//! A pickle is a program for a stack machine: a byte of it makes a value of a hundred bytes, a few bytes copy everything
-//! made so far, and compression makes the program itself a thousand times smaller. This module walks through the program without
-//! making its values and adds up what they would take. A program that is malformed is left to the reader, which stops at
-//! the same place.
+//! A pickle is a program for a stack machine: a byte of it makes a value of a hundred bytes, a few bytes copy
+//! everything made so far, and compression makes the program itself a thousand times smaller. This module walks through
+//! the program without making its values and adds up what they would take. A program that is malformed is left to the
+//! reader, which stops at the same place.
 
 use std::collections::HashMap;
 use std::fs::File;
