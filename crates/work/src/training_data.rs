@@ -41,7 +41,7 @@ pub enum TouchSource<'a> {
         grasps: usize,
         /// Mix of tools that they are drawn from.
         mix: Mix,
-        /// Faults that the touches are simulated with.
+        /// Condition that the touches are simulated under.
         condition: Condition,
         /// Decides all of it.
         seed: u64,
