@@ -63,7 +63,7 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What speaks against the fit, and a way to keep it all the same.
+/// Objections to the fit, and a way to keep it all the same.
 fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
     let refused = found.unwritten.is_some();
     if !refused && found.objections.is_empty() {
@@ -83,7 +83,7 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
     ui.add_space(8.0);
 }
 
-/// How the tuning goes, or went.
+/// Curves of the tuning, while it runs and afterwards.
 fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
     let curves = cx.state.tuning_curves();
     if curves.is_empty() {
@@ -127,7 +127,7 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(caption(text, cx.p));
 }
 
-/// Which pairs, and the buttons.
+/// Choice of the pairs, and the buttons.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -233,7 +233,7 @@ fn scores(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
     }
 }
 
-/// What was found for each pad.
+/// Correction of each pad.
 fn pads(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
     ui.add_space(8.0);
     ui.label(section("What was found", cx.p));

@@ -199,7 +199,7 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What runs, with its progress, and a way to stop it.
+/// First of the running jobs, with its progress, and a way to stop it.
 fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tasks = &cx.state.tasks;
     let more = tasks.running.len().saturating_sub(1);
@@ -289,7 +289,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     });
 }
 
-/// What a folder dragged over the window would do.
+/// Overlay that says what a folder dragged over the window would do.
 pub(super) fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
     if ctx.input(|i| i.raw.hovered_files.is_empty()) {
         return;

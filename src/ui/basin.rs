@@ -80,7 +80,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// What is varied, and what is colored.
+/// Choice of the coordinates that are varied and of the colors.
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     ui.horizontal(|ui| {
@@ -126,7 +126,7 @@ impl Map<'_> {
         vec2(self.rect.width() / columns as f32, self.rect.height() / rows as f32)
     }
 
-    /// Where values of the two axes (radians, meters) lie: the first and last start are centers of cells.
+    /// Place of values of the two axes (radians, meters): the first and last start are centers of cells.
     fn place(&self, values: [f64; 2]) -> Pos2 {
         let inner = self.rect.shrink2(self.cell_size() * 0.5);
         let share: [f32; 2] = std::array::from_fn(|i| {
@@ -394,7 +394,7 @@ fn cross(painter: &Painter, at: Pos2, size: f32, color: Color32) {
     }
 }
 
-/// What is under the pointer, else what the map says as a whole.
+/// Figures of the start under the pointer, else of the map as a whole.
 fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
     let line = |ui: &mut Ui, text: String, color: Color32| {
         ui.add(egui::Label::new(RichText::new(text).size(SMALL).color(color)).truncate());
@@ -430,7 +430,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
     legend(cx, ui);
 }
 
-/// What the marks mean.
+/// Legend of the marks.
 fn legend(cx: &Cx<'_>, ui: &mut Ui) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 14.0), Sense::hover());
     let painter = ui.painter_at(rect);

@@ -15,7 +15,7 @@ use crate::app::keys::ImprintSource;
 use crate::app::tasks::TaskKind;
 use touch2touch_work::sweep::{Dial, MOST_VALUES, Series, Sweep};
 
-/// Which imprints are shown.
+/// Source of the imprints that are shown.
 #[derive(Default)]
 pub(super) struct Memory {
     source: Option<ImprintSource>,
@@ -61,7 +61,7 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// Which dial, from where to where, over which pairs.
+/// Choice of the dial, its range and the pairs.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -134,7 +134,7 @@ fn range(cx: &mut Cx<'_>, ui: &mut Ui, dial: Dial) {
     }
 }
 
-/// What is shown, which imprints of it, and what to know about it.
+/// Summary of the sweep, choice of the imprints shown, and remarks.
 fn about<'a>(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, found: &'a Sweep) -> Option<&'a Series> {
     let of = |source: ImprintSource| found.series.iter().find(|series| series.source == source);
     let series = memory.source.and_then(of).or_else(|| of(ImprintSource::Predicted)).or(found.series.first())?;

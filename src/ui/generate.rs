@@ -212,7 +212,7 @@ fn preset_name(preset: Preset) -> &'static str {
     }
 }
 
-/// What a preset does with this bundle, for its tooltip.
+/// Tooltip of a preset: what it does with this bundle.
 fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
     let what = match preset {
         Preset::Fast => "For looking through a data set: about the mean of all plausible imprints",

@@ -34,7 +34,7 @@ use touch2touch_core::units;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::error::{TaskError, UnitOffer};
 
-/// What is being painted on the images.
+/// Stroke on the images, and outlines of masks.
 #[derive(Default)]
 pub(super) struct Memory {
     /// The stroke that the pointer is drawing: its pane and finger.
@@ -63,7 +63,7 @@ pub(super) fn map_of(state: &State) -> ColorMap {
     }
 }
 
-/// What every millimeter of this sample must be labeled with; empty where lengths are measured.
+/// Remark at every millimeter of this sample; empty where lengths are measured.
 pub(super) fn scale_note(state: &State) -> &'static str {
     match state.sample().ready().map(|s| s.scale) {
         Some(Scale::Assumed) => "assumed scale",
@@ -178,7 +178,7 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
     }
 }
 
-/// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
+/// Placeholder for a picture: the one before, dimmed, while the next is on its way; else a sentence.
 fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
@@ -239,7 +239,7 @@ pub(super) fn unit_buttons(cx: &mut Cx<'_>, ui: &mut Ui, offer: &UnitOffer, plac
     }
 }
 
-/// What is missing, and the action that brings it.
+/// Sentence that says what is missing, and the action that brings it.
 pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction

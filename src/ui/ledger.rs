@@ -86,7 +86,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// Which finger it is about, and the mapping.
+/// Choice of the finger and of the mapping.
 fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
     ui.horizontal_wrapped(|ui| {
         for of in cx.state.rig().pads() {
@@ -301,7 +301,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
     readings(cx, ui, &found.readings);
 }
 
-/// The same picture read in every way; a click takes that way.
+/// Readings of the decoder's picture in every way; a click takes that way.
 fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
     ui.add_space(4.0);
     ui.label(section("Readings", cx.p))

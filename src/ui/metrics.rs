@@ -217,7 +217,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The same figures apart for what the GelSlim saw and for what the model made up.
+/// Figures apart for what the GelSlim saw and for what the model made up.
 fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
     let Some(split) = c.split else { return };
     let number = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| units::fixed(v, digits));

@@ -12,7 +12,7 @@ use touch2touch_core::dataset::PairId;
 
 /// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
 const MOST: usize = 60;
-/// What another word for an action counts: less than its name in one piece, more than scattered letters.
+/// Score of another word for an action: less than its name in one piece, more than scattered letters.
 const OTHER_WORD: i32 = 45;
 /// Height of an entry, points.
 const ROW: f32 = 28.0;
@@ -25,7 +25,7 @@ enum Entry {
     Tool(String),
 }
 
-/// What is being typed.
+/// Query being typed, with its entries.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     query: String,

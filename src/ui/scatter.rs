@@ -21,7 +21,7 @@ use touch2touch_core::evaluation::{Metric, mean};
 
 /// Room for the numbers of the axes, points.
 const MARGIN: [f32; 2] = [44.0, 30.0];
-/// How near the pointer has to come to a point, points.
+/// Distance of the pointer from a point at which it means it, points.
 const NEAR: f32 = 8.0;
 /// A shorter drag is a click, points.
 const DRAG: f32 = 4.0;
@@ -37,7 +37,7 @@ struct Axis {
     metric: Metric,
 }
 
-/// What the colors of the points mean.
+/// Meaning of the points' colors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter)]
 enum Coloring {
     /// The tool.
@@ -56,14 +56,14 @@ impl Coloring {
     }
 }
 
-/// What is drawn.
+/// Choices of the scatter, and its pictures.
 #[derive(Default)]
 pub(super) struct Memory {
     axes: [Option<Axis>; 2],
     coloring: Coloring,
-    /// Whether the first axis is shown as a histogram of each tool.
+    /// True where the first axis is shown as a histogram of each tool.
     by_tool: bool,
-    /// Where a rectangle was begun.
+    /// Corner at which a rectangle was begun.
     begun: Option<egui::Pos2>,
 }
 
@@ -121,7 +121,7 @@ fn axes(scores: &ScoreTable, memory: &Memory) -> Option<[Axis; 2]> {
     Some([x, y])
 }
 
-/// Which scores, and how they are shown.
+/// Choice of the scores, and of how they are shown.
 fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, mut axes: [Axis; 2]) -> [Axis; 2] {
     let shown = if memory.by_tool { 1 } else { 2 };
     for (at, (axis, name)) in axes.iter_mut().zip(["x", "y"]).enumerate().take(shown) {

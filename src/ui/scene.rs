@@ -46,7 +46,7 @@ pub(super) use overlay::{angle_text, error_color, pose_details, pose_time};
 /// Width of the column of buttons, points.
 const BUTTONS: f32 = 28.0;
 
-/// How near the pointer must be to a point to mean it, physical pixels.
+/// Distance of the pointer from a point at which it means it, physical pixels.
 const PICK_PX: f64 = 9.0;
 
 /// The views of both sides, and what the renderer holds of the results; lists are by [`ImprintSource`].
@@ -137,7 +137,7 @@ impl Memory {
         self.drawing.take().is_some()
     }
 
-    /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
+    /// Place of a point of the grasp frame (meters) when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
     }
@@ -379,7 +379,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
     say(cx, source, finger, index, clouds);
 }
 
-/// What the status bar says of a point.
+/// Puts the figures of a point into the status bar.
 fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
     let cloud = clouds.finger(finger);
     let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
@@ -399,7 +399,7 @@ fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clou
     ));
 }
 
-/// How far a point lies from the registered model where distances are shown, meters; `None` of one outside the contact.
+/// Distance of a point from the registered model where distances are shown, meters; `None` of one outside the contact.
 fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
     let found = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
     let contact = &clouds.finger(finger)?.contact;

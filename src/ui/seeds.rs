@@ -201,7 +201,7 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
     }
 }
 
-/// Which color is how many millimeters.
+/// Bar of the colors, with the millimeters that they mean.
 fn bar(cx: &Cx<'_>, painter: &Painter, at: Pos2, width: f32, colors: ColorMap, range: Range) {
     let rect = Rect::from_min_size(at, vec2(width, 6.0));
     gradient(painter, rect, 24, |t| {

@@ -86,7 +86,7 @@ fn columns(sources: &[SourceScores], width: f32) -> Vec<ScoreColumn<'_>> {
     sources.iter().flat_map(of).collect()
 }
 
-/// Where the names and the numbers stand.
+/// Cells of the names and of the numbers.
 fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
     let cell = |left: f32, width: f32| Rect::from_min_size(pos2(left, rect.top()), vec2(width, rect.height()));
     let [pair, tool] = NAMES;

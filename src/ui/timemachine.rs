@@ -118,7 +118,7 @@ pub(super) fn pose_text(grasp_from_object: PlanarPose) -> String {
     format!("{}, y {}, z {} mm", units::text_deg(lab), mm(y_m), mm(z_m))
 }
 
-/// What is looked at: imprint, registration, start.
+/// Choice of imprint, registration and start.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
@@ -190,7 +190,7 @@ fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What is drawn on a button of the transport.
+/// Icon on a button of the transport.
 #[derive(Clone, Copy)]
 enum Icon {
     First,

@@ -26,9 +26,9 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::subject::Subject;
 
-/// What the comparison remembers.
+/// Memory of the comparison.
 pub(super) struct Memory {
-    /// Where the line of the wipe stands, as a share of the picture's width.
+    /// Position of the wipe's line, as a share of the picture's width.
     wipe: f32,
     /// The 3D view.
     space: space::Space,
@@ -70,7 +70,7 @@ fn color(p: &Palette, versus: &Versus, letter: Letter) -> Color32 {
     }
 }
 
-/// Whether the key is held that shows B in the place of A.
+/// True while the key is held that shows B in the place of A.
 fn flickers(ui: &Ui) -> bool {
     let held = ui.input(|i| i.key_down(egui::Key::F) && i.modifiers.is_none());
     held && !ui.ctx().egui_wants_keyboard_input()
@@ -123,7 +123,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     bar::color_bar(cx, &mut child, pane, histogram.as_ref());
 }
 
-/// What is compared, and how; whether the button is held that shows B in the place of A.
+/// Choice of what is compared, and how; true while the button is held that shows B in the place of A.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     let mut held = false;
     ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
@@ -163,7 +163,7 @@ fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> Canvas
     output
 }
 
-/// What stands where there is no picture.
+/// Placeholder for a picture.
 fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
     match lookup {
         Lookup::Failed(err) => failed(cx, ui, err),
@@ -303,7 +303,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     histogram
 }
 
-/// What lies over every picture: GelSlim's window, cross-hair, the values under the pointer.
+/// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
 fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));

@@ -23,20 +23,20 @@ const HEIGHT: f32 = 58.0;
 const GAP: f32 = 8.0;
 /// Largest radius of a dot, points.
 const DOT: f32 = 3.0;
-/// How near the pointer has to come to a dot, points.
+/// Distance of the pointer from a dot at which it means it, points.
 const NEAR: f32 = 6.0;
 /// Height of the line plot, points.
 const LINE_HEIGHT: f32 = 88.0;
 /// From this width on a small plot says how many contact points there are, points.
 const WIDE: f32 = 200.0;
 
-/// Where a pair stands, degrees: at its error, or without a truth at its change.
+/// Position of a pair, degrees: its error, or without a truth its change.
 fn place_deg(series: &Series, outcome: &Outcome) -> Option<f64> {
     let radians = if series.has_truth() { outcome.error_rad } else { outcome.change_rad };
     radians.map(|r| r.to_degrees().abs())
 }
 
-/// What all small plots of a series share.
+/// Axes that all small plots of a series share.
 struct Axes {
     /// Degrees at the right end.
     most_deg: f64,
@@ -278,7 +278,7 @@ fn said(case: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// What is drawn over the values.
+/// Curve that is drawn over the values.
 struct Track {
     name: &'static str,
     unit: &'static str,

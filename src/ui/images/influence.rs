@@ -1,4 +1,4 @@
-//! Which pixels the registered angle hangs on, over an imprint.
+//! Influence of the pixels on the registered angle, over an imprint.
 
 use eframe::egui::{Align2, Color32, ColorImage, FontId, Rect, Ui, pos2, vec2};
 
@@ -16,7 +16,7 @@ use touch2touch_work::influence::Influence;
 /// The colors end here, degrees to the square millimeter: the same in every pair, so that they can be compared.
 const END_DEG_PER_MM2: f32 = 0.02;
 
-/// How much of the imprint the colors let through: enough to know the place.
+/// Opacity of the colors, of 255: enough of the imprint comes through to know the place.
 const OPACITY: u8 = 225;
 
 /// Blue where the angle would fall, red where it would grow, white where nothing hangs on a pixel.
@@ -72,7 +72,7 @@ fn said(cx: &Cx<'_>, output: &CanvasOutput, text: &str) {
     output.painter.galley(place.min, galley, cx.p.caution);
 }
 
-/// Which color is which change of the angle.
+/// Bar of the colors, with the change of the angle that each means.
 fn bar(output: &CanvasOutput) {
     const WIDTH: f32 = 150.0;
     let area = output.painter.clip_rect().shrink(8.0);
@@ -99,7 +99,7 @@ fn bar(output: &CanvasOutput) {
     }
 }
 
-/// What hangs on a pixel, for the status bar; empty where nothing is shown.
+/// Influence of a pixel, for the status bar; empty where nothing is shown.
 pub(super) fn readout(state: &State, source: ImprintSource, finger: PadId, [x, y]: [usize; 2]) -> String {
     let found = state.shown_influence(source).filter(|_| state.shows_influence(source));
     let value = found.and_then(|(key, found)| {

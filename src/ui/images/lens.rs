@@ -11,9 +11,9 @@ use crate::ui::widget::image_canvas::{CanvasMap, CanvasOutput};
 use crate::ui::widget::texture::outline;
 use touch2touch_core::rig::PadId;
 
-/// How much larger than in the picture.
+/// Magnification over the picture.
 const TIMES: f32 = 8.0;
-/// Its side, points.
+/// Side of the lens, points.
 const SIDE: f32 = 152.0;
 /// At least so many pixels are seen across it: where the picture itself is that large, there is no lens.
 const LEAST_PX: f32 = 7.0;

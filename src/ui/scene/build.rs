@@ -1,4 +1,4 @@
-//! What a 3D pane shows, as data for the renderer.
+//! Content of a 3D pane, as data for the renderer.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ pub(super) struct SceneCloud {
     pub revision: u64,
     /// Per finger: the membrane and the contact.
     pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
-    /// What the GelSlims see of it: smallest and largest y and z, grasp frame.
+    /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
     pub window: Option<[DVec3; 2]>,
 }
 

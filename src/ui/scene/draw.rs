@@ -17,7 +17,7 @@ use touch2touch_core::label::DrawTool;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
 
-/// Whether the pointer draws on masks in the 3D views.
+/// True where the pointer draws on masks in the 3D views.
 pub(super) fn is_ready(state: &State) -> bool {
     let drawn = state.workbench.tool == SceneTool::Paint && state.settings.mask.tool != MaskTool::Pan;
     drawn && state.document.is_editable(state.pair_name())

@@ -16,7 +16,7 @@ use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
 use touch2touch_core::manual::{ManualPose, PoseAxis};
 
-/// How near the pointer must be to a handle, points.
+/// Distance of the pointer from a handle at which it means it, points.
 const NEAR: f32 = 9.0;
 /// Radius of the disc in the middle, points.
 const DISC: f32 = 9.0;
@@ -27,7 +27,7 @@ const ARM: f64 = 44.0;
 /// Cosine of the angle between the view and a plane below which a drag in it is not worked out.
 const EDGE_ON: f64 = 0.12;
 
-/// What is dragged.
+/// Handle that can be dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Handle {
     /// y and z.
@@ -58,12 +58,12 @@ pub(super) struct Gizmo {
 }
 
 impl Gizmo {
-    /// Whether no handle is dragged.
+    /// True where no handle is dragged.
     pub(super) fn is_free(&self) -> bool {
         self.drag.is_none()
     }
 
-    /// Whether the primary button is the handles' and does not turn the view.
+    /// True where the primary button is the handles' and does not turn the view.
     pub(super) fn holds(&self, source: ImprintSource) -> bool {
         self.drag.is_some_and(|d| d.source == source) || self.hot.is_some_and(|(of, _)| of == source)
     }

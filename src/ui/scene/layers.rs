@@ -143,7 +143,7 @@ pub(in crate::ui) fn outline(world_from_mesh: DAffine3, color: Color32, look: La
     MeshStyle { world_from_mesh, color: rgb(color), look: Look::Outline, edges: Some(edges), ..MeshStyle::default() }
 }
 
-/// How well the registered pose of a side is determined.
+/// Observability of the registered pose of a side.
 fn observability<'a>(cx: &'a Cx<'_>, source: ImprintSource) -> Option<&'a Observability> {
     cx.state.pose(source).shown()?.report.observability.as_ref()
 }

@@ -27,7 +27,7 @@ const WIDTH: f32 = 152.0;
 
 /// A line of the list.
 struct Row {
-    /// What it switches; `None` explains a color only.
+    /// Layer that it switches; `None` explains a color only.
     layer: Option<SceneLayer>,
     color: Color32,
     text: String,
@@ -61,7 +61,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
     }
 }
 
-/// What is drawn, or could be.
+/// Rows for everything that is drawn, or could be.
 fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
     let state = cx.state;
     let mut rows = Vec::new();
@@ -218,7 +218,7 @@ fn colors(painter: &Painter, bar: Rect, map: ColorMap) {
     });
 }
 
-/// Which color is which residual, with the width of the kernel.
+/// Bar of the residuals' colors, with the width of the kernel.
 fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) {
     let Some(layers) = cx.state.layers(source).ready() else { return };
     let bar = bar(rect);
@@ -233,7 +233,8 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
     }
 }
 
-/// Which color is which signed distance, `below` being what negative ones are called; the reach is one for all views, and can be changed.
+/// Bar of the signed distances' colors, `below` being what negative ones are called; the reach is one for all views,
+/// and can be changed.
 pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
     let bar = bar(rect);
     let painter = ui.painter_at(rect);

@@ -15,7 +15,7 @@ use crate::ui::widget::line::Line;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
 
-/// What a click does.
+/// Does what a click means with the tool in hand.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
     if !output.response.clicked() || matches!(tool, SceneTool::Pose | SceneTool::Paint) {

@@ -1,4 +1,4 @@
-//! What is drawn over a 3D picture: scale bar, names of the axes, buttons; and how poses are put in words.
+//! Overlay of a 3D picture: scale bar, names of the axes, buttons; and how poses are put in words.
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
 use glam::DVec3;
@@ -111,7 +111,7 @@ pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
     grade_color(p, Grade::of_angle_error(error_rad))
 }
 
-/// How long a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
+/// Time that a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
 pub(in crate::ui) fn pose_time(pose: &PoseResult) -> String {
     if pose.ms < 9.95 { format!("in {:.1} ms", pose.ms) } else { format!("in {:.0} ms", pose.ms) }
 }

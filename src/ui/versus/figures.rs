@@ -24,7 +24,7 @@ enum Metric6 {
 
 impl Metric6 {
     const ALL: [Self; 6] = [Self::Psnr, Self::Ssim, Self::Mean, Self::Seen, Self::Invented, Self::Angle];
-    /// Where there is little room.
+    /// Figures where there is little room.
     const FEW: [Self; 4] = [Self::Psnr, Self::Mean, Self::Seen, Self::Angle];
 
     fn name(self) -> &'static str {

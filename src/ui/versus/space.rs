@@ -214,7 +214,7 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
     }
 }
 
-/// What is what, and the bar of the distances.
+/// Legend of the two subjects, and the bar of the distances.
 fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: eframe::egui::Rect) {
     let apart = versus.mode == VersusMode::Apart && !flipped;
     let font = FontId::proportional(SMALL);

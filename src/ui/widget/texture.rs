@@ -14,7 +14,7 @@ use touch2touch_core::picture::{self, Rgb8};
 /// Bars in a histogram.
 pub(crate) const BINS: usize = 64;
 
-/// How many values fall into each of [`BINS`] equal parts of a span.
+/// Number of values in each of [`BINS`] equal parts of a span.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Counts, from the lower end to the upper.
@@ -78,7 +78,7 @@ pub struct Textures {
 /// A mask on the graphics card.
 struct MaskPicture {
     texture: TextureHandle,
-    /// What is on the card.
+    /// Mask that is on the card.
     mask: Arc<Mask>,
     key: u64,
     used: u64,
