@@ -409,8 +409,8 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         }
         let mut right = rect.right() - 18.0;
         if let Some((text, color)) = figure_text(cx, id) {
-            let at = pos2(right, rect.bottom() - 5.0);
-            right = painter.text(at, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
+            let end = pos2(right, rect.bottom() - 5.0);
+            right = painter.text(end, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
         }
         let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
         let text = ui.painter_at(clip);

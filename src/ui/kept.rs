@@ -195,7 +195,7 @@ impl Plugin for KeptFrame {
             let grid = size.map(|s| s.div_ceil(TILE));
             let triangles = triangles(&primitives, &self.sheet, ppp, size);
             let tiles = tiles(&primitives, &triangles, &self.versions, grid);
-            let blocks = blocks(grid, |at| self.tiles.get(at).is_none_or(|old| old.hash != tiles[at].hash));
+            let blocks = blocks(grid, |tile| self.tiles.get(tile).is_none_or(|old| old.hash != tiles[tile].hash));
             let mut jobs = FrameMesh { ppp, size, ..FrameMesh::default() };
             for block in &blocks {
                 let [x0, y0] = block.min.map(|v| v * TILE);
@@ -204,7 +204,7 @@ impl Plugin for KeptFrame {
                 let part = Rect::from_min_max(pos2(x0 as f32, y0 as f32), pos2(x1 as f32, y1 as f32));
                 let rows = block.min[1]..block.max[1];
                 let places = rows.flat_map(|y| (block.min[0]..block.max[0]).map(move |x| (y * grid[0] + x) as usize));
-                let first = places.map(|at| tiles[at].first).min().flatten();
+                let first = places.map(|tile| tiles[tile].first).min().flatten();
                 if first.is_none() {
                     jobs.ground(part);
                 }

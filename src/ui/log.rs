@@ -90,13 +90,13 @@ pub(super) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
     let hidden = unseen.len().saturating_sub(MOST);
     let frame = egui::Frame::new().fill(cx.p.panel).inner_margin(egui::Margin::symmetric(12, 3));
     Panel::bottom("notices").frame(frame).resizable(false).show(ui, |ui| {
-        for (at, entry) in unseen.iter().rev().take(MOST).enumerate() {
+        for (index, entry) in unseen.iter().rev().take(MOST).enumerate() {
             ui.horizontal(|ui| {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    if at == 0 && ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
+                    if index == 0 && ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
                         cx.push(TasksCommand::LogSeen(last));
                     }
-                    if at == 0 && hidden > 0 {
+                    if index == 0 && hidden > 0 {
                         ui.label(caption(format!("and {hidden} more in the log"), cx.p));
                     }
                     if let Some(place) = &entry.place {

@@ -166,10 +166,10 @@ fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
     ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
     let grasps = ("grasps", "Grasps that were scored");
     let texts = std::iter::once(grasps).chain(shown.iter().map(|c| (c.heading, c.tip)));
-    for (at, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
+    for (column, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
         let right = pos2(cell.right() - 6.0, cell.center().y);
         ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), cx.p.weak);
-        ui.interact(cell, ui.scope_id().with((group.label(), at)), Sense::hover()).on_hover_text(tip);
+        ui.interact(cell, ui.scope_id().with((group.label(), column)), Sense::hover()).on_hover_text(tip);
     }
 }
 

@@ -93,7 +93,7 @@ fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
     let start = rect.left() + pair + tool;
     let width = (rect.right() - 20.0 - start) / numbers.max(1) as f32;
     let names = [cell(rect.left(), pair), cell(rect.left() + pair, tool)];
-    (names, (0..numbers).map(|at| cell(start + at as f32 * width, width)).collect())
+    (names, (0..numbers).map(|index| cell(start + index as f32 * width, width)).collect())
 }
 
 fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {

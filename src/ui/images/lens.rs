@@ -30,7 +30,7 @@ fn place(area: Rect, pos: Pos2, scale: f32) -> Option<(Rect, f32)> {
     let x = if pos.x + gap + SIDE <= area.right() { pos.x + gap } else { pos.x - gap - SIDE };
     let y = if pos.y - gap - SIDE >= area.top() { pos.y - gap - SIDE } else { pos.y + gap };
     let [x, y] = [(x, area.left(), area.right()), (y, area.top(), area.bottom())]
-        .map(|(at, low, high)| at.clamp(low, (high - SIDE).max(low)));
+        .map(|(place, low, high)| place.clamp(low, (high - SIDE).max(low)));
     Some((Rect::from_min_size(pos2(x, y), vec2(SIDE, SIDE)), magnified))
 }
 

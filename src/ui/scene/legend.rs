@@ -129,11 +129,11 @@ fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
     ui.horizontal(|ui| {
         ui.set_height(ROW);
         let sense = if look.is_some() { Sense::click() } else { Sense::hover() };
-        let (at, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
+        let (dot, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
         if shown {
-            ui.painter().circle_filled(at.center(), 4.5, row.color);
+            ui.painter().circle_filled(dot.center(), 4.5, row.color);
         } else {
-            ui.painter().circle_stroke(at.center(), 4.0, Stroke::new(1.5, row.color));
+            ui.painter().circle_stroke(dot.center(), 4.0, Stroke::new(1.5, row.color));
         }
         let color = if shown { cx.p.text } else { cx.p.weak };
         let Some((layer, look)) = row.layer.zip(look) else {
@@ -206,8 +206,8 @@ fn bar(rect: Rect) -> Rect {
 fn ends(painter: &Painter, bar: Rect, texts: [String; 3], color: Color32) {
     let anchors = [(0.0, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)];
     for ((share, anchor), text) in anchors.into_iter().zip(texts) {
-        let at = pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0);
-        painter.text(at, anchor, text, FontId::proportional(10.0), color);
+        let below = pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0);
+        painter.text(below, anchor, text, FontId::proportional(10.0), color);
     }
 }
 

@@ -185,8 +185,8 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
     let span = histogram.span.hi - histogram.span.lo;
     for (i, n) in histogram.counts.iter().enumerate() {
         // Histograms are of meters, the bar is in millimeters.
-        let at = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
-        let (a, b) = (at(i as f32), at(i as f32 + 1.0));
+        let value_mm = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
+        let (a, b) = (value_mm(i as f32), value_mm(i as f32 + 1.0));
         if *n == 0 || b < range.lo || a > range.hi {
             continue;
         }

@@ -139,11 +139,11 @@ impl ImageCanvas<'_> {
                 && let Some(pos) = ui.input(|i| i.pointer.hover_pos())
             {
                 let before = CanvasMap::new(rect, self.size, *view, false);
-                let at = (pos - before.image_rect.min) / before.image_rect.size().max(Vec2::splat(1.0));
+                let share = (pos - before.image_rect.min) / before.image_rect.size().max(Vec2::splat(1.0));
                 view.zoom *= factor;
                 view.clamp();
                 let after = CanvasMap::new(rect, self.size, *view, false);
-                let drift = after.image_rect.min + at * after.image_rect.size() - pos;
+                let drift = after.image_rect.min + share * after.image_rect.size() - pos;
                 let drift = drift / after.image_rect.size().max(Vec2::splat(1.0));
                 view.center = [view.center[0] + drift.x, view.center[1] + drift.y];
             }

@@ -1,4 +1,4 @@
-//! Bar of a running task, its progress, and a way to stop it.
+//! Progress bar of a running task.
 
 use eframe::egui::{self, Color32, FontId, Rect, Response, Role, Sense, Ui, WidgetInfo, vec2};
 
