@@ -1,4 +1,5 @@
-//! Distances of the contact points from the registered model: [`deviation`]; and of one cloud from another: [`apart`].
+//! Distances of the contact points from the registered model: [`deviation`]; and of one cloud from another:
+//! [`cloud_difference`].
 
 use super::cloud::Clouds;
 use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
