@@ -5,8 +5,9 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::diffusion::GenerateConfig;
-use super::postprocess::ShiftMode;
+use super::model_id::current;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::postprocess::ShiftMode;
 
 /// The words' version.
 const VERSION: &str = "v1";
@@ -73,9 +74,13 @@ impl From<String> for PredictedId {
             let (bundle, choices) = text.split_once(' ')?;
             let (config, shift) = serde_json::from_str::<(GenerateConfig, ShiftMode)>(choices).ok()?;
             let config = GenerateConfig { eta: typed(config.eta), guidance: typed(config.guidance), ..config };
-            Some(Self::new(bundle, &config, shift))
+            Some(Self::new(&current(bundle), &config, shift))
         };
-        before_v1().unwrap_or_else(|| Self::verbatim(text))
+        let by_identity = || {
+            let (bundle, choices) = text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION))?;
+            Some(Self(format!("{} {choices}", current(bundle)).into()))
+        };
+        before_v1().or_else(by_identity).unwrap_or_else(|| Self::verbatim(text))
     }
 }
 
@@ -113,7 +118,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::diffusion::{Sampler, Spacing};
+    use touch2touch_core::diffusion::{Sampler, Spacing};
 
     fn config() -> impl Strategy<Value = GenerateConfig> {
         let sampler = prop_oneof![Just(Sampler::Ddim), Just(Sampler::Ddpm)];
