@@ -14,9 +14,9 @@ pub enum CloudError {
     /// Two images that must cover the same pixels do not.
     #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
     Size {
-        /// Which image differs.
+        /// Name of the image that differs.
         what: &'static str,
-        /// Its width and height.
+        /// Width and height of that image.
         size: [usize; 2],
         /// The imprint's width and height.
         imprint: [usize; 2],
@@ -30,7 +30,7 @@ pub enum CloudError {
     /// Focal lengths or principal point cannot be a camera's, or the transform is not finite.
     #[error("the camera's {what} cannot be right: read them again from the source")]
     Camera {
-        /// Which part of the camera.
+        /// Part of the camera.
         what: &'static str,
     },
 }
@@ -105,7 +105,7 @@ pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
     (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
 }
 
-/// Whether the camera can lift `imprint` at all.
+/// Checks that the camera can lift `imprint` at all.
 pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
     same_size("reference depth", camera.depth_reference.size(), imprint)?;
     let size = imprint.size();

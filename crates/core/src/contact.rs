@@ -112,7 +112,7 @@ pub(crate) const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
 const CONTACT_SHARE: f32 = 0.6;
 
-/// What a contact mask is made of in the end.
+/// Basis that a contact mask is made from in the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MaskBasis {
     /// The source that was asked.
@@ -131,7 +131,7 @@ pub enum MaskBasis {
 pub struct ContactMask {
     /// The pixels in contact.
     pub mask: Mask,
-    /// What it is made of.
+    /// Basis that it is made from.
     pub basis: MaskBasis,
     /// Share of the picture's pixels that the mask model says neither yes nor no of, 0..1; `None` for any other source.
     pub unsure: Option<f64>,
@@ -191,7 +191,7 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     }
 }
 
-/// How a value outside 0..255 becomes a byte.
+/// Cast of a value outside 0..255 to a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ByteCast {
     /// As numpy does it for the lab: modulo 256, so that a very deep pixel turns dark again.

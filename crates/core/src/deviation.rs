@@ -1,4 +1,4 @@
-//! How far a cloud lies from a model: signed distances of its points, and the same painted on the model's surface.
+//! Deviation of a cloud from a model: signed distances of its points, also painted on the model's surface.
 
 use glam::{DAffine3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};

@@ -43,9 +43,9 @@ pub enum FieldError {
 pub struct FieldSample {
     /// Signed distance, meters, negative inside the silhouette.
     pub distance: f64,
-    /// Its derivative by y and z; length about 1 outside.
+    /// Derivative of the distance by y and z; length about 1 outside.
     pub gradient: DVec2,
-    /// Whether the point lies on the stored grid. Off it, the distance to the grid is added.
+    /// True where the point lies on the stored grid. Off it, the distance to the grid is added.
     pub on_grid: bool,
 }
 
@@ -220,7 +220,7 @@ impl Raster {
         values
     }
 
-    /// Which cell centers lie in or on a projected triangle.
+    /// Cells whose center lies in or on a projected triangle, row by row.
     fn fill(&self, triangles: &[[DVec2; 3]]) -> Vec<bool> {
         /// Centers this close to an edge (in cells) count as inside, so that shared edges leave no gaps.
         const TOUCH: f64 = 1e-9;

@@ -15,11 +15,11 @@ const EXAMPLES: usize = 5;
 pub struct Finding {
     /// The file or folder.
     pub file: PathBuf,
-    /// What is wrong with it.
+    /// Fault of the file, in words.
     pub what: String,
-    /// What to do about it.
+    /// Remedy, in words.
     pub hint: String,
-    /// How often it was found.
+    /// Number of times it was found.
     pub count: usize,
     /// The first files it was found in, `file` among them; each once.
     pub examples: Vec<PathBuf>,
@@ -29,12 +29,12 @@ pub struct Finding {
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
     list: Vec<Finding>,
-    /// Where each kind is in `list`.
+    /// Position of each kind in `list`.
     kinds: HashMap<String, usize>,
 }
 
 impl Findings {
-    /// Adds a problem; whether it is the first of its kind.
+    /// Adds a problem; true where it is the first of its kind.
     pub fn add(&mut self, problem: Problem) -> bool {
         let at = *self.kinds.entry(kind(&problem)).or_insert(self.list.len());
         let Some(finding) = self.list.get_mut(at) else {
@@ -68,7 +68,7 @@ impl Extend<Problem> for Findings {
     }
 }
 
-/// What two problems have in common that differ only in file, finger or numbers.
+/// Text that two problems have in common that differ only in file, finger or numbers.
 fn kind(problem: &Problem) -> String {
     let part = |name: Option<&std::ffi::OsStr>| name.map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut text = format!("{} {}", problem.what, problem.hint);

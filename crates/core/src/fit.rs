@@ -25,7 +25,8 @@ pub use validate::{folds, left_out};
 
 /// Deviation of the targets' blur before places are compared, pixels: the sensor's grain has no place.
 const GRAIN_PX: f64 = 1.0;
-/// What is finer in the mean residual is the sensor's own pattern and is believed at once; the rest only as pairs add up.
+/// Deviation of the blur that parts the mean residual, pixels: what is finer is the sensor's own pattern and is
+/// believed at once; the rest only as pairs add up.
 const PATTERN_PX: f64 = 3.0;
 /// Deviation of the blur of the gain map, pixels.
 const GAIN_PX: f64 = 4.0;
@@ -35,9 +36,9 @@ const GAIN_PRIOR: f64 = 0.1;
 /// A prediction with what was measured.
 #[derive(Clone, Copy, Debug)]
 pub struct FitPair<'a> {
-    /// What the generator drew, meters, at the decoder's size and in its orientation.
+    /// Depth picture that the generator drew, meters, at the decoder's size and in its orientation.
     pub prediction: &'a DepthMap,
-    /// What was measured, likewise; where it is not finite nothing is learnt.
+    /// Measured picture, likewise; where it is not finite nothing is learnt.
     pub target: &'a DepthMap,
     /// The pad, counted from 0.
     pub pad: usize,
@@ -52,17 +53,17 @@ pub enum FitError {
     /// Pictures of several sizes.
     #[error("pair {case} has a picture of {found:?} pixels instead of {expected:?}")]
     Size {
-        /// Which case, counted from 0.
+        /// Case, counted from 0.
         case: usize,
-        /// Its size.
+        /// Size of its picture, `[width, height]`, pixels.
         found: [usize; 2],
-        /// That of the first.
+        /// Size of the first picture.
         expected: [usize; 2],
     },
     /// A prediction that is not finite.
     #[error("the prediction of pair {case} has values that are not finite")]
     NotFinite {
-        /// Which case, counted from 0.
+        /// Case, counted from 0.
         case: usize,
     },
 }
@@ -166,7 +167,7 @@ fn line<'a>(pairs: impl Iterator<Item = (&'a DepthMap, &'a DepthMap)>) -> [f64; 
     [gain, (y - gain * x) / n]
 }
 
-/// What the pictures of one pad share: mean, mean residual, and gain of the deviation.
+/// Parts of a correction that the pictures of one pad share: mean, mean residual, and gain of the deviation.
 fn shared(one: &mut Correction, own: &[usize], on_line: &[Pixels], targets: &[Pixels]) {
     let [width, height] = one.mean.size();
     let n = own.len() as f64;

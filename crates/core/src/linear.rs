@@ -1,4 +1,4 @@
-//! What the science asks of nalgebra, with its refusals: nothing is decomposed that is not finite.
+//! Linear algebra that the science asks of nalgebra, with its refusals: nothing is decomposed that is not finite.
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, DimDiff, DimSub, Matrix6, OMatrix, OVector, U1, Vector6};

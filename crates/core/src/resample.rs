@@ -13,7 +13,7 @@ use super::grid::{Grid, RgbGrid};
 /// The sharpness of [`Resampling::Bicubic`]; PyTorch and OpenCV use -0.75.
 const BICUBIC_A: f64 = -0.75;
 
-/// How an image is resized.
+/// Method by which an image is resized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -97,7 +97,7 @@ pub fn nearest_mask(mask: &Grid<bool>, width: usize, height: usize) -> Grid<bool
     Grid::from_fn(width, height, |x, y| mask[(pick(x, source_width, width), pick(y, source_height, height))])
 }
 
-/// What [`resize`] needs of a pixel: a weighted sum in f64.
+/// Pixel that [`resize`] can make a weighted sum of, in f64.
 trait Pixel: Copy {
     type Sum: Copy;
     const ZERO: Self::Sum;

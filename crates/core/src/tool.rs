@@ -56,8 +56,8 @@ impl ToolModel {
         &self.surface
     }
 
-    /// What a registration needs of the tool in a form of its own: made at the first request for the type `T`, kept
-    /// with the tool, and shared by all threads. The tool does not know what it keeps.
+    /// Form of the tool that a registration needs of its own: made at the first request for the type `T`, kept with the
+    /// tool, and shared by all threads. The tool does not know what it keeps.
     ///
     /// `make` must depend on the tool alone; whoever asks for one type always passes the same function.
     pub fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Self) -> T) -> Arc<T> {

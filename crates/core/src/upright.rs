@@ -1,10 +1,10 @@
-//! Which way up a GelSlim image is, seen in the colors of its lights.
+//! Orientation of a GelSlim image: which way up it is, seen in the colors of its lights.
 //!
 //! Pictures made for training are often turned by a quarter or mirrored, both images of a pair alike. The sensor's
 //! three lights stay where they are in the sensor, so the colors tell. A light brightens the slopes that face it:
 //! without its gray part, the difference image is a linear function of the gel's slope, and the known directions of
 //! the lights give the slope back. The slope of a surface has no curl. Read in a wrong quarter turn or mirrored, the
-//! same colors give a field that is nearly all curl. TurnReading an image upside down turns the surface inside out; a
+//! same colors give a field that is nearly all curl. Reading an image upside down turns the surface inside out; a
 //! touched gel is dented, with sharp convex rims, so the slope's divergence is skewed to one side.
 
 use super::blur::gaussian;
@@ -29,10 +29,10 @@ const TOUCHED: f64 = 0.55;
 /// By how much the right reading must be more consistent than the best wrong one.
 const CLEARER: f64 = 0.05;
 
-/// How a picture lies, and how sure that is.
+/// Turn in which a picture lies, and how sure that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurnReading {
-    /// How it lies.
+    /// Turn.
     pub turn: Turn,
     /// Share of the slope that is free of curl in this reading, 0..1. Right readings of published images have .69 to .95.
     pub consistency: f64,
@@ -41,19 +41,20 @@ pub struct TurnReading {
 }
 
 impl TurnReading {
-    /// Whether it is little more than a guess: no published pair is read so.
+    /// True where it is little more than a guess: no published pair is read so.
     pub fn is_guess(self) -> bool {
         self.consistency < GUESSED || self.margin < GUESSED_MARGIN
     }
 
-    /// Whether both thresholds are passed at which no reading of a simulated touch is wrong.
+    /// True where both thresholds are passed at which no reading of a simulated touch is wrong.
     pub fn is_sure(self) -> bool {
         self.consistency >= CONSISTENT && self.margin >= CLEARER
     }
 }
 
-/// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights: the best
-/// reading, sure or not. On 36 published pairs it is right for all, where the sure ones alone leave some unread.
+/// Best reading of the turn in which a square difference image (signed, any scale) lies, by the directions of the
+/// nominal sensor's lights, sure or not. On 36 published pairs it is right for all, where the sure ones alone leave
+/// some unread.
 ///
 /// `None` where there is nothing to read: nothing touched, not square, values that are not numbers, no color.
 pub fn best(difference: &RgbGrid) -> Option<TurnReading> {

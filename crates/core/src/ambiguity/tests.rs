@@ -6,7 +6,7 @@ use crate::grid::Grid;
 use crate::rig::lab;
 use crate::sim::{self, SimConfig};
 
-/// What is found in both fingers' images of some grasps, half of them with randomised sensors.
+/// Ambiguity of both fingers' images of some grasps, half of them with randomised sensors.
 fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambiguity)> {
     seeds
         .into_par_iter()

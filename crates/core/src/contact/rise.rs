@@ -1,4 +1,4 @@
-//! How far imprints rise: out of their rest, out of the plane that fits them best, and out of what lies around a mask.
+//! Rise of imprints: out of their rest, out of the plane that fits them best, and out of what lies around a mask.
 
 use crate::grid::{DepthMap, Mask};
 
@@ -7,7 +7,7 @@ const SQUARES_ACROSS: usize = 25;
 /// Share of the squares that lie lower than the imprint's rest, and of those that lie higher than its top.
 const REST_SHARE: f64 = 0.25;
 const TOP_SHARE: f64 = 0.02;
-/// How far around a mask its surroundings reach, as a share of the imprint's width: 14 px of 175.
+/// Reach of the surroundings of a mask, as a share of the imprint's width: 14 px of 175.
 const AROUND_SHARE: f64 = 0.08;
 
 /// A small square of an imprint: its center, pixels, and the median of what was measured in it, meters.
@@ -69,7 +69,7 @@ impl Slope {
         (self.x * x + self.y * y) as f32
     }
 
-    /// That of the plane through some squares, by least squares; none where they do not determine one.
+    /// Slope of the plane through some squares, by least squares; none where they do not determine one.
     fn of(squares: &[Square]) -> Self {
         let n = squares.len().max(1) as f64;
         let mean = |of: fn(&Square) -> f64| squares.iter().map(of).sum::<f64>() / n;
@@ -89,7 +89,7 @@ impl Slope {
     }
 }
 
-/// How far an imprint rises out of its rest once the plane that fits it best is taken out, meters: a bubble that is held
+/// Rise of an imprint out of its rest once the plane that fits it best is taken out, meters: a bubble that is held
 /// askew gives a ramp and touches nothing. 0 if nothing was measured.
 pub fn rise(imprint: &DepthMap) -> f32 {
     let squares = squares(imprint);

@@ -10,7 +10,7 @@ pub struct Schedule {
     alpha_bar: Vec<f64>,
 }
 
-/// Which training steps a sampler visits.
+/// Spacing of the training steps that a sampler visits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
@@ -37,7 +37,7 @@ pub struct Step {
     pub alpha_bar_next: f64,
 }
 
-/// What keeps numbers from being a schedule, or a schedule from being used.
+/// Fault that keeps numbers from being a schedule, or a schedule from being used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// No steps, or so many that they cannot be a schedule.
@@ -54,9 +54,9 @@ pub enum ScheduleError {
     /// A value outside [0, 1], or NaN.
     #[error("the signal share at training step {step} is {value}, outside 0 to 1")]
     Value {
-        /// Where.
+        /// Training step.
         step: usize,
-        /// What.
+        /// Signal share ᾱ there.
         value: f64,
     },
     /// The signal share grows with the noise.

@@ -16,9 +16,9 @@ use crate::units::counted;
 
 /// Mean likeness of imprints that lie on their tools. Simulated ones have 0.6 to 0.85, wrongly read ones 0.5 and less.
 const LIES_ON: f64 = 0.5;
-/// By how much more a reading must have it: what a sound data set gains by another reading is 0.01.
+/// Gain in mean likeness that a reading must have: what a sound data set gains by another reading is 0.01.
 const CLEARLY: f64 = 0.08;
-/// The same of a CAD model, of which there may be a single pair.
+/// Gain that a reading of a CAD model must have: of one tool there may be a single pair.
 const CLEARLY_OF_TOOL: f64 = 0.15;
 /// Pairs whose likeness is at least this are not tried with other CAD models.
 const GOOD: f64 = 0.65;
@@ -43,7 +43,7 @@ fn readings() -> Vec<ReadAs> {
     all
 }
 
-/// How a CAD model is to be turned or mirrored: which of its axes, with which sign, becomes x, y and z.
+/// Reordering of the axes of a CAD model: which of them, with which sign, becomes x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Axes {
     from: [usize; 3],
@@ -130,7 +130,7 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// What is wrong with the imprints of some pairs, or with their CAD models.
+/// Doubt about the imprints of some pairs, or about their CAD models.
 pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
     let pairs = Pairs::of(samples, named, meshes);
     if pairs.samples.is_empty() {

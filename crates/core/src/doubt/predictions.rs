@@ -19,7 +19,7 @@ const CLEARLY: f64 = 0.12;
 /// From this likeness on nothing is tried.
 const GOOD: f64 = 0.6;
 
-/// What is wrong with the images, seen by their predictions. `sound`: nothing was found in the images themselves.
+/// Doubt about the images, seen by their predictions. `sound`: nothing was found in the images themselves.
 pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Option<Doubt> {
     let both: Vec<&Sample> = samples.iter().filter(|sample| fingers(sample).len() == 2).collect();
     if both.is_empty() {

@@ -19,9 +19,9 @@ const FEWEST: usize = 6;
 /// A pair whose measurement is far from what all others lead to expect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Doubt {
-    /// Which case, counted from 0.
+    /// Case, counted from 0.
     pub case: usize,
-    /// Its root mean square residual when it is left out, meters.
+    /// Root mean square residual of the pair when it is left out, meters.
     pub residual_m: f64,
     /// The median of all.
     pub median_m: f64,

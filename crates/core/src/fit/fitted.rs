@@ -18,7 +18,7 @@ pub struct FitSource {
     pub data: String,
     /// The name of the rig.
     pub rig: String,
-    /// Whether meters were measured or assumed.
+    /// Scale: whether meters were measured or assumed.
     pub scale: Scale,
     /// The pairs.
     pub pairs: Vec<String>,
@@ -28,13 +28,13 @@ pub struct FitSource {
     pub pictures: Vec<String>,
     /// The name of the bundle that was fitted.
     pub from: String,
-    /// Its SHA-256.
+    /// SHA-256 of that bundle.
     pub from_sha256: String,
 }
 
 impl FitSource {
-    /// Whether both are of the same data, as far as can be told: of a picture in common, else of the same name, rig and a
-    /// pair in common.
+    /// True where both are of the same data, as far as can be told: of a picture in common, else of the same name, rig
+    /// and a pair in common.
     pub fn same_data(&self, other: &Self) -> bool {
         let common = |a: &[String], b: &[String]| a.iter().any(|one| b.contains(one));
         if self.pictures.is_empty() || other.pictures.is_empty() {
@@ -43,7 +43,7 @@ impl FitSource {
         common(&self.pictures, &other.pictures)
     }
 
-    /// What makes these data others than those it was fitted to, in words.
+    /// Difference of these data from those it was fitted to, in words; `None` where it sees none.
     pub fn misgiving(&self, sample: &Sample) -> Option<String> {
         let rig = (self.rig != sample.rig.name).then(|| format!("taken with the rig {}", self.rig));
         let scale = || format!("whose meters were {}", self.scale.key());
@@ -56,12 +56,12 @@ impl FitSource {
     }
 }
 
-/// What a fit knows of one pad.
+/// Fit of one pad.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PadFit {
-    /// What its predictions need.
+    /// Correction that its predictions need.
     pub correction: Arc<Correction>,
-    /// What the lattice of its GelSlim looks like, where pictures were fitted.
+    /// Lattice of its GelSlim, where pictures were fitted.
     pub lattice: Option<Grid<f32>>,
 }
 

@@ -1,4 +1,4 @@
-//! Where a pad's predictions belong in its pictures.
+//! Offset of a pad's predictions from where they belong in its pictures.
 
 use super::{FitPair, GRAIN_PX};
 use crate::blur::gaussian;

@@ -1,4 +1,4 @@
-//! What predictions of some shapes are known to miss: ridge regression on the pictures' principal components.
+//! Residual that predictions of some shapes are known to leave: ridge regression on the pictures' principal components.
 
 use nalgebra::DMatrix;
 

@@ -1,4 +1,4 @@
-//! What speaks against a fit: figures that no sensor leads to, and predictions that do not know their own measurement.
+//! Objections to a fit: figures that no sensor leads to, and predictions that do not know their own measurement.
 
 use std::fmt;
 
@@ -32,9 +32,9 @@ const SIDE: usize = 32;
 pub struct FoundPad<'a> {
     /// The name for people.
     pub name: &'a str,
-    /// Its correction.
+    /// Correction of the pad.
     pub correction: &'a Correction,
-    /// Where the rig says that the drawn window lies, as an offset like the correction's own, and how far from there a
+    /// Window that the rig says is drawn: its place as an offset like the correction's own, and how far from there a
     /// window still overlaps it: half of its width and height. Pixels; `None` where the rig does not say.
     pub window: Option<[[f64; 2]; 2]>,
 }
@@ -149,7 +149,7 @@ pub fn absurd(fit: &PadFit) -> Option<String> {
     all.find_map(|(name, most, picture)| Some(format!("{:e} in \"{name}\"", over(most, picture)?)))
 }
 
-/// What the figures of a fit object to: its gains and offsets.
+/// Objections to the figures of a fit: its gains and offsets.
 pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objection> {
     let mut out = Vec::new();
     for (number, pad) in pads.iter().enumerate() {
@@ -187,7 +187,7 @@ fn slope(cases: &[&FitPair<'_>], correction: &Correction) -> Option<f64> {
     (spread > 1e-12 * xx).then(|| along / spread)
 }
 
-/// Whether the angle speaks against the fit.
+/// Objection to the fit by the angle's errors.
 pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
     let mean_rad = [before, after].map(|angle| angle.mean_deg.map(f64::to_radians));
     let worse = match mean_rad {
@@ -199,7 +199,8 @@ pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
     (worse || lost).then_some(Objection::Angle { mean_rad, failed })
 }
 
-/// Whether predictions know their own measurements: `made` are the left-out pictures. Says nothing of few touches.
+/// Objection that predictions do not know their own measurements: `made` are the left-out pictures. `None` for few
+/// touches.
 pub fn strangers(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Option<Objection> {
     let pads = cases.iter().map(|case| case.pad + 1).max().unwrap_or_default();
     let ranks: Vec<f64> = (0..pads).flat_map(|pad| nearness(cases, made, pad)).collect();

@@ -13,7 +13,7 @@ fn touch(seed: usize) -> DepthMap {
     })
 }
 
-/// What a rig makes of a touch: moved, on another scale, under a fixed pattern, half as strong at the left.
+/// Picture that a rig makes of a touch: moved, on another scale, under a fixed pattern, half as strong at the left.
 fn measured(touch: &DepthMap, offset_px: [f64; 2]) -> DepthMap {
     let there = moved(touch, offset_px);
     Grid::from_fn(SIDE, SIDE, |x, y| {

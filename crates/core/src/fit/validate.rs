@@ -1,4 +1,4 @@
-//! What a fit is worth on pairs that it was not made from.
+//! Validation: the worth of a fit on pairs that it was not made from.
 
 use std::collections::BTreeMap;
 

@@ -1,10 +1,10 @@
-//! How far two masks of the same imprint agree.
+//! Agreement of two masks of the same imprint.
 
 use serde::Serialize;
 
 use crate::grid::Mask;
 
-/// How far two masks agree.
+/// Agreement of two masks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Agreement {
     /// Pixels in both over pixels in either; 1 where both are empty.
@@ -17,7 +17,7 @@ pub struct Agreement {
     pub alone_px: [usize; 2],
 }
 
-/// How far `a` and `b` agree; `None` if they are not of one size.
+/// Agreement of `a` and `b`; `None` if they are not of one size.
 pub fn agreement(a: &Mask, b: &Mask, px_per_mm: f64) -> Option<Agreement> {
     if a.size() != b.size() {
         return None;

@@ -1,4 +1,5 @@
-//! How sure a mask model is of an imprint, and how far a mask drawn by hand is from what it says.
+//! Doubt about the mask of an imprint: how sure a mask model is of it, and how far one drawn by hand is from what it
+//! says.
 
 use serde::{Deserialize, Serialize};
 

@@ -5,8 +5,8 @@ use super::paint::Paint;
 use super::provenance::Provenance;
 use crate::grid::{Grid, Mask};
 
-/// What stands behind the pixels of a corrected mask: where the value of each comes from, and which are *ignored*, so that
-/// they count neither as contact nor as free of it.
+/// Marks of the pixels of a corrected mask: where the value of each comes from, and which are *ignored*, so that they
+/// count neither as contact nor as free of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marks {
     /// Each provenance once; the first is what the correction began from.
@@ -21,7 +21,7 @@ pub struct Marks {
 const MOST_LAYERS: usize = 256;
 
 impl Marks {
-    /// Those of a mask whose pixels are all of one provenance; none is ignored.
+    /// Marks of a mask whose pixels are all of one provenance; none is ignored.
     pub fn all([width, height]: [usize; 2], provenance: Provenance) -> Self {
         Self { layers: vec![provenance], of: Grid::filled(width, height, 0), ignored: None }
     }
@@ -38,12 +38,12 @@ impl Marks {
         self.of.size()
     }
 
-    /// What the correction began from.
+    /// Provenance that the correction began from.
     pub fn base(&self) -> &Provenance {
         &self.layers[0]
     }
 
-    /// Where the value of a pixel comes from; `None` outside.
+    /// Provenance of a pixel's value; `None` outside.
     pub fn at(&self, x: usize, y: usize) -> Option<&Provenance> {
         self.layers.get(usize::from(*self.of.get(x, y)?))
     }
@@ -66,7 +66,7 @@ impl Marks {
         self.ignored.as_ref()
     }
 
-    /// Whether a pixel is ignored.
+    /// True where a pixel is ignored.
     pub fn is_ignored(&self, x: usize, y: usize) -> bool {
         self.ignored.as_ref().is_some_and(|ignored| ignored.get(x, y) == Some(&true))
     }
@@ -77,7 +77,7 @@ impl Marks {
         self.of.map(|&i| by_hand[usize::from(i)])
     }
 
-    /// Whether a person painted any of it.
+    /// True where a person painted any of it.
     pub fn has_hand_work(&self) -> bool {
         self.layers().iter().any(|(layer, px)| *px > 0 && layer.is_hand())
     }

@@ -33,7 +33,7 @@ pub(super) fn enclosed([width, height]: [usize; 2], points: &[DVec2]) -> Mask {
     mask
 }
 
-/// Whether a closed line encloses a point, as [`enclosed`] has it.
+/// True where a closed line encloses a point, as [`enclosed`] has it.
 pub(super) fn encloses(points: &[DVec2], p: DVec2) -> bool {
     if points.len() < 3 {
         return false;

@@ -9,11 +9,11 @@ use strum::EnumIter;
 
 use super::region;
 
-/// Which of several points that lie behind each other a drawing reaches.
+/// Layers of points that lie behind each other: which of them a drawing reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum Layers {
-    /// Those that nothing hides.
+    /// Points that nothing hides.
     #[default]
     Front,
     /// All of them.
@@ -21,7 +21,7 @@ pub enum Layers {
 }
 
 impl Layers {
-    /// What is reached, in words.
+    /// Points that are reached, in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Front => "front-most points",
@@ -39,13 +39,13 @@ impl Layers {
     }
 }
 
-/// How far behind the nearest point a point may lie and still belong to the same layer, meters.
+/// Largest distance of a point behind the nearest one, meters, at which it still belongs to the same layer.
 const LAYER_M: f64 = 0.0025;
 /// Width of the cells in which the nearest point is looked for, in distances between neighboring points: in each cell of a
 /// layer there is one.
 const CELL: f64 = 2.0;
 
-/// How a picture of points in space was taken: what a drawing on it is a drawing on.
+/// View that a picture of points in space was taken from: what a drawing on it is a drawing on.
 ///
 /// In single precision, so that it is the same after it was written and read as text.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ pub struct Sight {
     pub clip_from_grasp: Mat4,
     /// Columns and rows of the picture.
     pub size_px: [u32; 2],
-    /// What is reached.
+    /// Layers that are reached.
     #[serde(default)]
     pub layers: Layers,
     /// Planes that cut it open: what has `xyz · p + w < 0` (meters) is neither reached nor hides anything.
@@ -98,8 +98,8 @@ impl Projection {
 }
 
 impl Sight {
-    /// Where a point (meters, grasp frame) appears, `(0, 0)` being the center of the first pixel; `None` behind the eye and
-    /// for a point that is not finite.
+    /// Place of a point (meters, grasp frame) in the picture, pixels, `(0, 0)` being the center of the first pixel;
+    /// `None` behind the eye and for a point that is not finite.
     pub fn project(&self, p_in_grasp: DVec3) -> Option<DVec2> {
         Some(Projection::of(self).place(p_in_grasp)?.0)
     }
@@ -114,7 +114,7 @@ impl Sight {
     }
 }
 
-/// Where the pixels of one finger's mask lie in a picture: those that a drawing on it reaches.
+/// Pixels of one finger's mask that a drawing on a picture reaches, with their places in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisiblePixels {
     /// Column and row in the mask, and place in the picture.

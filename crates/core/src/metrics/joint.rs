@@ -16,7 +16,7 @@ const RELATIVE_NO_SPREAD: f64 = 1e-6;
 /// Half the range of a histogram of equal values, meters.
 const HALF_RANGE_M: f64 = 5e-4;
 
-/// How many pixels have which truth and which prediction.
+/// Joint histogram: number of pixels by truth and prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// `counts[(truth bin, prediction bin)]`, from [`Joint::lo`] to [`Joint::hi`] on both axes.

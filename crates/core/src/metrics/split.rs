@@ -24,7 +24,7 @@ pub struct PixelMetrics {
     pub bias: Option<f64>,
 }
 
-/// The same figures over the whole image, and over its two parts.
+/// Figures over the whole image, and over its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Split {
     /// All pixels.

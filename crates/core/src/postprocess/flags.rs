@@ -1,4 +1,4 @@
-//! What is implausible about a depth chain, each with what was seen, why that is odd, and what to do.
+//! Flags: implausible things about a depth chain, each with what was seen, why that is odd, and what to do.
 
 use serde::Serialize;
 
@@ -15,13 +15,13 @@ const TURNED_AT_LEAST: f64 = 0.3;
 const UNLIKE: f64 = 0.3;
 /// Root mean square disagreement of the channels that is worth a word, meters.
 const CHANNELS_APART_M: f64 = 5e-4;
-/// How far a fitted slope may be from 1, and an offset from 0 (meters).
+/// Largest sound distance of a fitted slope from 1, and of an offset from 0 (meters).
 const SLOPE_OFF: f64 = 0.15;
 const OFFSET_OFF_M: f64 = 1e-3;
-/// How far a shift's gain may be from the exact inverse's 2.
+/// Largest sound distance of a shift's gain from the exact inverse's 2.
 const GAIN_OFF: f64 = 0.03;
 
-/// How much a person should care.
+/// Severity: how much a person should care.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -33,7 +33,7 @@ pub enum Severity {
     Info,
 }
 
-/// What is implausible.
+/// Kind of implausible thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum FlagKind {
@@ -66,17 +66,17 @@ pub enum FlagKind {
 /// One thing that is implausible.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Flag {
-    /// How much a person should care.
+    /// Severity: how much a person should care.
     pub severity: Severity,
-    /// What kind of thing.
+    /// Kind of thing.
     pub kind: FlagKind,
     /// The stage at which it shows.
     pub stage: String,
-    /// What was seen, with its numbers.
+    /// Observation, with its numbers.
     pub what: String,
     /// Why that is odd.
     pub why: String,
-    /// What to do.
+    /// Remedy.
     pub action: String,
 }
 

@@ -25,7 +25,7 @@ impl Rig {
     /// A rig declared in JSON.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Fault of the declaration, in words.
     pub fn parse(json: &[u8]) -> Result<Self, String> {
         let rig: Self = serde_json::from_slice(json).map_err(|err| err.to_string())?;
         rig.check()?;
@@ -98,7 +98,7 @@ impl Sensor {
 }
 
 impl Crop {
-    /// Whether a stored picture of this size can be a part of the full one.
+    /// Checks that a stored picture of this size can be a part of the full one.
     fn check(self, stored: [usize; 2]) -> Result<(), String> {
         if self.full == [0, 0] {
             return match self.offset.iter().all(|at| *at <= LARGEST_FULL) {

@@ -53,7 +53,7 @@ impl<T> PerPad<T> {
         self.0.iter().enumerate().filter_map(|(at, value)| Some((PadId::new(at), value.as_ref()?)))
     }
 
-    /// Whether no pad has a value.
+    /// True where no pad has a value.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(Option::is_none)
     }

@@ -18,14 +18,14 @@ use crate::sample::{ColorImages, ColorTouch};
 
 /// Spacing of the grid that the gel is solved on, meters.
 const STEP_M: f64 = 0.000_15;
-/// How far the gel goes on beyond the picture, meters.
+/// Margin of the gel beyond the picture, meters.
 const MARGIN_M: f64 = 0.002_4;
 /// Pixels of the picture per grid step.
 const PX_PER_STEP: f64 = STEP_M * lab::GELSLIM.px_per_m;
 /// Grid steps from the first node to the first pixel.
 const MARGIN_STEPS: f64 = MARGIN_M / STEP_M;
 
-/// How deep the tool pushes into the gel, in picture axes (x right, y down), meters.
+/// Gel, by the depth that the tool pushes into it, in picture axes (x right, y down), meters.
 struct Gel {
     pushed: Field,
 }

@@ -185,8 +185,8 @@ impl<'a> Membrane<'a> {
     }
 }
 
-/// What the slopes of the sheet add to the load `extra`: a pressure p (over tension) bends a sheet of slope s by
-/// p (1 + s²)^1.5, the flat-sheet equation by p. The dome's own pressure and slopes are in its shape already.
+/// Load that the slopes of the sheet add to the load `extra`: a pressure p (over tension) bends a sheet of slope s by p
+/// (1 + s²)^1.5, the flat-sheet equation by p. The dome's own pressure and slopes are in its shape already.
 fn bending(pushed: &Field, dome: &Dome, extra: f32, origin: DVec2) -> Field {
     let (columns, rows) = (pushed.columns, pushed.rows);
     let rest = 2.0 * dome.rise * dome.semi.powf(-2.0).element_sum();
