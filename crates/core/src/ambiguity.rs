@@ -117,15 +117,15 @@ fn level(values: &mut [f64]) {
 /// Binomial smoothing over five pixels along each axis: markers and noise fade, ridges stay.
 fn blur(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     const TAPS: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
-    let at = |k: usize, step: isize, n: usize| (k as isize + step).clamp(0, n as isize - 1) as usize;
+    let index = |k: usize, step: isize, n: usize| (k as isize + step).clamp(0, n as isize - 1) as usize;
     let tap = |f: &dyn Fn(isize) -> f64| (-2..=2).zip(TAPS).map(|(step, w)| w * f(step)).sum::<f64>();
     let pass = |of: &[f64], across: bool| -> Vec<f64> {
         (0..of.len())
             .map(|i| {
                 let (x, y) = (i % width, i / width);
                 tap(&|step| match across {
-                    true => of[y * width + at(x, step, width)],
-                    false => of[at(y, step, height) * width + x],
+                    true => of[y * width + index(x, step, width)],
+                    false => of[index(y, step, height) * width + x],
                 })
             })
             .collect()

@@ -131,9 +131,9 @@ const JUMP_M: f64 = 0.002_5;
 /// The surface through points of neighboring pixels (`pixels` in row order, one per point), cut where it jumps. Its
 /// vertices are the points, in their order.
 pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
-    let at = |x: u16, y: u16| {
-        let found = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
-        points.get(found).filter(|p| p.is_finite()).map(|p| (found as u32, *p))
+    let vertex = |x: u16, y: u16| {
+        let index = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
+        points.get(index).filter(|p| p.is_finite()).map(|p| (index as u32, *p))
     };
     let mut triangles = Vec::new();
     let mut add = |corners: [Option<(u32, DVec3)>; 3]| {
@@ -145,7 +145,7 @@ pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
     };
     for &[x, y] in pixels {
         let (Some(right), Some(below)) = (x.checked_add(1), y.checked_add(1)) else { continue };
-        let (a, b, c, d) = (at(x, y), at(right, y), at(x, below), at(right, below));
+        let (a, b, c, d) = (vertex(x, y), vertex(right, y), vertex(x, below), vertex(right, below));
         add([a, c, b]);
         add([b, c, d]);
     }

@@ -28,7 +28,7 @@ impl Spread {
         if images.iter().any(|image| image.size() != size) {
             return None;
         }
-        let at = |x: usize, y: usize| -> (f64, f64) {
+        let mean_and_std = |x: usize, y: usize| -> (f64, f64) {
             // Welford's update: one pass that does not lose a small spread in a large mean.
             let (mut n, mut mean, mut squares) = (0.0, 0.0, 0.0);
             for value in images.iter().map(|image| f64::from(image[(x, y)])).filter(|v| v.is_finite()) {
@@ -40,7 +40,7 @@ impl Spread {
             let std = if n > 1.0 { (squares / (n - 1.0)).max(0.0).sqrt() } else { f64::NAN };
             (if n > 0.0 { mean } else { f64::NAN }, std)
         };
-        let both = Grid::from_fn(size[0], size[1], at);
+        let both = Grid::from_fn(size[0], size[1], mean_and_std);
         Some(Self { mean: both.map(|v| v.0 as f32), std: both.map(|v| v.1 as f32), count: images.len() })
     }
 

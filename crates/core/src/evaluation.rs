@@ -282,8 +282,8 @@ fn estimate(
         })
         .collect();
     drawn.sort_by(f64::total_cmp);
-    let at = |share: f64| drawn[((drawn.len() - 1) as f64 * share).round() as usize];
-    Some(Estimate { value, interval: (drawn.len() >= 20).then(|| [at(0.025), at(0.975)]) })
+    let quantile = |share: f64| drawn[((drawn.len() - 1) as f64 * share).round() as usize];
+    Some(Estimate { value, interval: (drawn.len() >= 20).then(|| [quantile(0.025), quantile(0.975)]) })
 }
 
 /// The squared error over the pixels that are finite in both images; `None` if the sizes differ or none is.

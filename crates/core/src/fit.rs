@@ -91,14 +91,16 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         response: None,
         parts: CorrectionParts::ALL,
     };
-    let mut found: Vec<Option<Correction>> =
+    let mut corrections: Vec<Option<Correction>> =
         (0..pads).map(|pad| cases.iter().any(|case| case.pad == pad).then(|| start(pad))).collect();
     let placed: Vec<DepthMap> = cases
         .iter()
-        .map(|case| found[case.pad].as_ref().map_or_else(|| case.prediction.clone(), |c| c.placed(case.prediction)))
+        .map(|case| {
+            corrections[case.pad].as_ref().map_or_else(|| case.prediction.clone(), |c| c.placed(case.prediction))
+        })
         .collect();
     let line = line(placed.iter().zip(cases.iter().map(|case| case.target)));
-    for one in found.iter_mut().flatten() {
+    for one in corrections.iter_mut().flatten() {
         one.line = line;
     }
     let on_line: Vec<Pixels> = placed
@@ -106,7 +108,7 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         .map(|image| image.as_slice().iter().map(|&v| f64::from(v) * line[0] + line[1]).collect())
         .collect();
     let targets: Vec<Pixels> = cases.iter().zip(&on_line).map(|(case, own)| filled(case.target, own)).collect();
-    for (pad, one) in found.iter_mut().enumerate() {
+    for (pad, one) in corrections.iter_mut().enumerate() {
         let Some(one) = one else { continue };
         let own: Vec<usize> = (0..cases.len()).filter(|&i| cases[i].pad == pad).collect();
         shared(one, &own, &on_line, &targets);
@@ -116,25 +118,25 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         .zip(&placed)
         .zip(&targets)
         .map(|((case, placed), target)| {
-            let Some(one) = &found[case.pad] else { return Grid::filled(size[0], size[1], 0.0) };
-            let made = one.weighed(placed, &one.leveled(placed));
+            let Some(one) = &corrections[case.pad] else { return Grid::filled(size[0], size[1], 0.0) };
+            let weighed = one.weighed(placed, &one.leveled(placed));
             let width = size[0];
-            Grid::from_fn(size[0], size[1], |x, y| target[y * width + x] - f64::from(made[(x, y)]))
+            Grid::from_fn(size[0], size[1], |x, y| target[y * width + x] - f64::from(weighed[(x, y)]))
         })
         .collect();
     let response: Option<Arc<Response>> = response::response(&on_line, &missing).map(Arc::new);
-    for one in found.iter_mut().flatten() {
+    for one in corrections.iter_mut().flatten() {
         one.response.clone_from(&response);
     }
-    Ok(found)
+    Ok(corrections)
 }
 
 fn check(cases: &[FitPair<'_>]) -> Result<[usize; 2], FitError> {
     let expected = cases.first().ok_or(FitError::NoPairs)?.prediction.size();
     for (case, one) in cases.iter().enumerate() {
-        for found in [one.prediction.size(), one.target.size()] {
-            if found != expected || found.contains(&0) {
-                return Err(FitError::Size { case, found, expected });
+        for size in [one.prediction.size(), one.target.size()] {
+            if size != expected || size.contains(&0) {
+                return Err(FitError::Size { case, found: size, expected });
             }
         }
         if one.prediction.as_slice().iter().any(|v| !v.is_finite()) {

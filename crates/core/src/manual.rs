@@ -255,12 +255,12 @@ mod tests {
         let mut points: Vec<DVec3> =
             cross_contacts(3000, truth, 1e-4, 3).iter().map(|p| DVec3::new(0.003, p.x, p.y)).collect();
         points.push(DVec3::NAN);
-        let at = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
-        let best = at(truth.into());
+        let cost_of = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
+        let best = cost_of(truth.into());
         assert!(best.inlier_share > 0.99 && best.outline_rms_m < 2e-4 && best.surface_rms_m < 2e-4, "{best:?}");
         for axis in PoseAxis::iter() {
             let by = if axis.is_turn() { 0.15 } else { 0.003 };
-            let moved = at(ManualPose::from(truth).moved(axis, by));
+            let moved = cost_of(ManualPose::from(truth).moved(axis, by));
             assert!(moved.surface_rms_m > best.surface_rms_m, "{axis:?}: {moved:?}");
             if !axis.leaves_plane() {
                 assert!(moved.cost_m2 > 2.0 * best.cost_m2, "{axis:?}: {moved:?}");

@@ -81,8 +81,8 @@ pub fn two_groups(signatures: &[Grid<f32>]) -> Vec<usize> {
         for (group, kept) in templates.iter_mut().enumerate() {
             let own: Vec<&Grid<f32>> =
                 signatures.iter().zip(&next).filter(|(_, g)| **g == group).map(|(s, _)| s).collect();
-            if let Some(found) = template(&own) {
-                *kept = found;
+            if let Some(template) = template(&own) {
+                *kept = template;
             }
         }
         if next == groups {

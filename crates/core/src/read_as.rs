@@ -190,7 +190,7 @@ pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
     );
     let mut all = known.to_vec();
     match known.iter().rposition(|one| own_opposite && *one == more) {
-        Some(at) => drop(all.remove(at)),
+        Some(index) => drop(all.remove(index)),
         None => all.push(more),
     }
     all

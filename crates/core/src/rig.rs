@@ -184,12 +184,12 @@ impl Rig {
 
     /// The position of the sensor with this key.
     pub fn sensor_of_key(&self, key: &str) -> Option<SensorId> {
-        self.sensors.iter().position(|sensor| sensor.key == key).map(|at| SensorId(at as u8))
+        self.sensors.iter().position(|sensor| sensor.key == key).map(|index| SensorId(index as u8))
     }
 
     /// The first sensor of a kind.
     pub fn first(&self, kind: SensorKind) -> Option<SensorId> {
-        self.sensors.iter().position(|sensor| sensor.kind == kind).map(|at| SensorId(at as u8))
+        self.sensors.iter().position(|sensor| sensor.kind == kind).map(|index| SensorId(index as u8))
     }
 
     /// The first color sensor.
@@ -230,7 +230,7 @@ impl Rig {
     /// The mean of [`Rig::window_share`] over the pads that have one: for a touch that does not say of which it is.
     pub fn mean_window_share(&self) -> Option<[f64; 2]> {
         let all: Vec<[f64; 2]> = self.pads().filter_map(|pad| self.window_share(pad)).collect();
-        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|at| at[i]).sum::<f64>() / all.len() as f64))
+        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|share| share[i]).sum::<f64>() / all.len() as f64))
     }
 
     /// True where the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.
@@ -244,7 +244,7 @@ impl Rig {
     pub fn seen_mask(&self, pad: PadId, size: [usize; 2]) -> Option<Mask> {
         let sensor = self.depth()?;
         let [cx, cy, width, height] = self.color_window(pad)?.rectangle();
-        let full = |at: usize, from: usize, to: usize| (at as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
+        let full = |index: usize, from: usize, to: usize| (index as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
         Some(Grid::from_fn(size[0], size[1], |x, y| {
             let (x, y) = (full(x, size[0], sensor.width), full(y, size[1], sensor.height));
             (x - cx).abs() <= width / 2.0 && (y - cy).abs() <= height / 2.0

@@ -136,8 +136,8 @@ impl PadTouch {
     /// Adds a reading, in place of an earlier one of the same sensor.
     pub fn set(&mut self, sensor: SensorId, reading: impl Into<Reading>) {
         self.readings.retain(|(of, _)| *of != sensor);
-        let at = self.readings.partition_point(|(of, _)| *of < sensor);
-        self.readings.insert(at, (sensor, reading.into()));
+        let index = self.readings.partition_point(|(of, _)| *of < sensor);
+        self.readings.insert(index, (sensor, reading.into()));
     }
 
     /// Reading of this sensor.

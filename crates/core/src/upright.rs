@@ -146,8 +146,8 @@ mod tests {
             let difference = &touch.pad(lab::RIGHT).unwrap().color().unwrap().difference;
             let square = resample::bilinear_rgb(difference, SIDE, SIDE);
             for turn in Turn::all() {
-                match best(&turn.apply(&square)).filter(|found| found.is_sure()).map(|found| found.turn) {
-                    Some(found) if found == turn => right += 1,
+                match best(&turn.apply(&square)).filter(|reading| reading.is_sure()).map(|reading| reading.turn) {
+                    Some(read) if read == turn => right += 1,
                     Some(_) => wrong += 1,
                     None => silent += 1,
                 }
@@ -164,6 +164,6 @@ mod tests {
         assert_eq!(best(&Grid::filled(427, 320, [3.0; 3])), None);
         assert_eq!(best(&Grid::filled(0, 0, [3.0; 3])), None);
         let gray = Grid::from_fn(128, 128, |x, y| [((x * 31 + y * 17) % 97) as f32; 3]);
-        assert!(best(&gray).is_none_or(|found| !found.is_sure()));
+        assert!(best(&gray).is_none_or(|reading| !reading.is_sure()));
     }
 }

@@ -226,8 +226,8 @@ mod tests {
         for (step, expected, tolerance) in
             [(0, 0.9985, 1e-9), (1, 0.996_995_6, 5e-8), (996, 0.000_700_70, 5e-9), (999, 0.000_668_67, 5e-9)]
         {
-            let found = schedule.alpha_bar()[step];
-            assert!((found - expected).abs() < tolerance, "step {step}: {found}");
+            let alpha_bar = schedule.alpha_bar()[step];
+            assert!((alpha_bar - expected).abs() < tolerance, "step {step}: {alpha_bar}");
         }
     }
 

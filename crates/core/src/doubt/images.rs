@@ -215,8 +215,8 @@ fn wrapped_around(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
         }
     }
     let share = steps as f64 / count.max(1) as f64;
-    let found = negative.is_some() || (share > STEPS && smooth < SMOOTHER * rough);
-    found.then(|| {
+    let wrapped = negative.is_some() || (share > STEPS && smooth < SMOOTHER * rough);
+    wrapped.then(|| {
         let figures = format!(
             "{:.1} % of the differences are larger than 128 levels, and without the steps of 256 the images are {:.0} % smoother",
             100.0 * share,

@@ -280,16 +280,16 @@ fn of_models(
 
 /// For each tool in doubt the other one whose model its pairs lie on, with the gain.
 fn other_models<'a>(pairs: &Pairs<'a>, doubted: &[(&'a str, f64)]) -> Vec<(&'a str, &'a str, f64)> {
-    let mut found = Vec::new();
+    let mut better = Vec::new();
     for &(tool, as_is) in doubted {
         let others = pairs.fields.iter().filter(|(other, _)| **other != tool);
         let scores = others.map(|(other, field)| (*other, pairs.of_tool(tool, field)));
         let best = scores.max_by(|(_, a), (_, b)| a.total_cmp(b));
         if let Some((other, score)) = best.filter(|(_, score)| *score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL) {
-            found.push((tool, other, score - as_is));
+            better.push((tool, other, score - as_is));
         }
     }
-    found
+    better
 }
 
 /// The axes with which most of the tools in doubt are explained, and those with their gains.

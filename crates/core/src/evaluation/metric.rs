@@ -296,8 +296,8 @@ impl Condition {
     /// The condition that a word states; `None` for a word that states none.
     pub fn parse(word: &str) -> Option<Self> {
         use strum::IntoEnumIterator as _;
-        let at = word.find(['<', '>'])?;
-        let (left, rest) = word.split_at(at);
+        let sign = word.find(['<', '>'])?;
+        let (left, rest) = word.split_at(sign);
         let side = if rest.starts_with('<') { Ordering::Less } else { Ordering::Greater };
         let (or_equal, number) = match rest[1..].strip_prefix('=') {
             Some(number) => (Ordering::Equal, number),

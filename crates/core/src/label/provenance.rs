@@ -28,8 +28,8 @@ impl CadPose {
         };
         match self {
             Self::Truth => "the true pose".into(),
-            Self::Registered(at) => format!("the registered pose ({})", pose(at)),
-            Self::Nudged(at) => format!("a pose moved by hand ({})", pose(at.planar)),
+            Self::Registered(planar) => format!("the registered pose ({})", pose(planar)),
+            Self::Nudged(manual) => format!("a pose moved by hand ({})", pose(manual.planar)),
         }
     }
 }

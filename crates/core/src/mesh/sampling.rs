@@ -32,8 +32,8 @@ impl TriMesh {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count)
             .map(|_| {
-                let at = rng.random::<f64>() * total;
-                let triangle = upto.partition_point(|&t| t <= at).min(upto.len() - 1);
+                let area = rng.random::<f64>() * total;
+                let triangle = upto.partition_point(|&t| t <= area).min(upto.len() - 1);
                 let [a, b, c] = self.corners(triangle);
                 // The square root makes the density uniform over the triangle instead of denser at one corner.
                 let (r, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());

@@ -245,7 +245,7 @@ impl List {
         let [gain, offset_m] = stats.affine(chain.range.max_m);
         // What undoes the doubled mapping has the gain 2 and the offset -max.
         if chain.mapping == Mapping::Doubled && (gain / 2.0 - 1.0).abs() > GAIN_OFF {
-            let at = |depth_m: f64| gain * (depth_m + chain.range.max_m) / 2.0 + offset_m - depth_m;
+            let error_m = |depth_m: f64| gain * (depth_m + chain.range.max_m) / 2.0 + offset_m - depth_m;
             let steeper = if gain > 2.0 { "steep" } else { "flat" };
             self.add(
                 Severity::Info,
@@ -258,9 +258,9 @@ impl List {
                     ),
                     format!(
                         "A depth the model gives as 0 becomes {}, 10 mm becomes {} (off by {}).",
-                        text_mm(at(0.0)),
-                        text_mm(0.01 + at(0.01)),
-                        text_mm(at(0.01))
+                        text_mm(error_m(0.0)),
+                        text_mm(0.01 + error_m(0.01)),
+                        text_mm(error_m(0.01))
                     ),
                     "Choose the exact inverse for depths as the model means them.".into(),
                 ],

@@ -114,8 +114,8 @@ impl Histogram {
         };
         let mut counts = vec![0; bars];
         for v in image.as_slice().iter().filter(|v| v.is_finite()) {
-            let at = (f64::from(*v) - lo) / (hi - lo) * bars as f64;
-            counts[(at as usize).min(bars - 1)] += 1;
+            let bar = (f64::from(*v) - lo) / (hi - lo) * bars as f64;
+            counts[(bar as usize).min(bars - 1)] += 1;
         }
         Self { lo, hi, counts }
     }

@@ -168,7 +168,7 @@ mod tests {
         };
         // The same noise in both, so that only the patterns differ.
         let between = |form: fn(ToolSpec) -> ToolSpec| {
-            let of = |at: usize| simulate(&form(tools()[at].clone()), Grasp::default(), 1, &config);
+            let of = |tool: usize| simulate(&form(tools()[tool].clone()), Grasp::default(), 1, &config);
             let (a, b) = (of(0), of(3));
             assert_ne!(imprint(&a), imprint(&b), "the bubbles see the patterns");
             difference(gelslim(&a), gelslim(&b))
