@@ -11,7 +11,7 @@ use super::vertex::{CREASE_RAD, place};
 use super::{Gpu, GpuError, view, wgpu};
 use touch2touch_core::mesh::TriMesh;
 
-/// How the edges of a mesh are drawn.
+/// Style of the edges of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeStyle {
     /// sRGB, 0..1.
@@ -20,7 +20,7 @@ pub struct EdgeStyle {
     pub opacity: f32,
     /// Physical pixels.
     pub width_px: f32,
-    /// Whether creases are drawn, or the silhouette and borders alone.
+    /// True where creases are drawn, else the silhouette and borders alone.
     pub creases: bool,
 }
 

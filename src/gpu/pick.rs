@@ -1,4 +1,4 @@
-//! Which point is under the pointer, found on the CPU: exact, and the same on every machine.
+//! Picking: the point under the pointer, found on the CPU: exact, and the same on every machine.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -7,11 +7,11 @@ use super::view::{Camera, Projector};
 /// A picked point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Its index in the cloud.
+    /// Index in the cloud.
     pub index: usize,
-    /// Its distance from the pointer on the screen, pixels.
+    /// Distance from the pointer on the screen, pixels.
     pub distance_px: f64,
-    /// Its distance in front of the eye, meters; smaller is nearer.
+    /// Distance in front of the eye, meters; smaller is nearer.
     pub depth_m: f64,
 }
 

@@ -25,7 +25,7 @@ use touch2touch_core::units::angle_error;
 
 /// Pairs that are prepared, then timed, at a time: their cameras must fit into memory.
 const CHUNK: usize = 504;
-/// How far each pair is moved from the grasp it was made from.
+/// Largest turn and shift of each pair from the grasp it was made from.
 const JITTER_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 const JITTER_M: f64 = 1e-3;
 
@@ -88,9 +88,9 @@ struct Report {
     points_to_pose: Stage,
     /// Imprints, cameras and masks of both fingers to pose.
     depth_to_pose: Stage,
-    /// What the times leave out.
+    /// Work that the times leave out.
     excluded: &'static str,
-    /// How the pairs were made.
+    /// Origin of the pairs.
     made: String,
 }
 

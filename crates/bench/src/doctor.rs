@@ -47,7 +47,7 @@ pub(super) struct DoctorArgs {
     /// Poses are not known.
     #[arg(long)]
     no_poses: bool,
-    /// Which engine runs the generator.
+    /// Engine that runs the generator.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
     #[command(flatten)]
@@ -56,14 +56,14 @@ pub(super) struct DoctorArgs {
 
 #[derive(Serialize)]
 struct Row {
-    /// How it was stored.
+    /// Way in which it was stored.
     kind: String,
     sets: usize,
     /// Sets where that was said, and nothing else.
     named: usize,
     /// Sets where something was said.
     noticed: usize,
-    /// What was said otherwise.
+    /// Other causes that were named.
     otherwise: Vec<String>,
 }
 

@@ -12,12 +12,12 @@ use touch2touch_work::canvas::{Drawing, Drawn, Paper};
 pub(super) struct FrontPoint {
     pub(super) name: String,
     pub(super) peer: bool,
-    /// What the picture shows: the mean processor time of a pose where it is known of all engines, else the median of
-    /// the clock. On a busy machine the clock charges long runs for other programs' work.
+    /// Time that the picture shows, milliseconds: the mean processor time of a pose where it is known of all engines,
+    /// else the median of the clock. On a busy machine the clock charges long runs for other programs' work.
     pub(super) ms: f64,
     pub(super) mean_deg: f64,
     pub(super) median_deg: f64,
-    /// Whether no other engine is at least as fast and as accurate in the mean, and better in one of the two.
+    /// True where no other engine is at least as fast and as accurate in the mean, and better in one of the two.
     pub(super) on_front: bool,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn front(rows: &[EngineRow]) -> Vec<FrontPoint> {
     pareto(points.collect())
 }
 
-/// Whether the system told the processor time of every engine.
+/// True where the system told the processor time of every engine.
 pub(super) fn uses_processor_time(rows: &[EngineRow]) -> bool {
     rows.iter().all(|row| row.cpu_mean_ms.is_some_and(|ms| ms > 0.0))
 }
@@ -62,7 +62,7 @@ const FRONT: RGBColor = RGBColor(60, 150, 90);
 /// Height of the letters.
 const LETTERS: f64 = 16.0;
 
-/// What stands around the picture.
+/// Texts around the picture.
 pub(super) struct Axis<'a> {
     pub(super) title: &'a str,
     /// Of the axis of time.
@@ -215,7 +215,7 @@ impl Labels {
         self.taken.push([a.0.min(b.0) - m, a.1.min(b.1) - m, a.0.max(b.0) + m, a.1.max(b.1) + m]);
     }
 
-    /// Where a label fits beside its point without covering what is there already.
+    /// Place of a label beside its point that covers nothing that is there already.
     fn place(&mut self, [w, h]: [i32; 2], point: (i32, i32)) -> [i32; 4] {
         let (gap, step) = (13 * self.unit, 16 * self.unit);
         let mut places = (0..14).flat_map(|i: i32| {

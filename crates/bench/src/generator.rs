@@ -27,9 +27,9 @@ use touch2touch_work::infer::generator::Generator;
 use touch2touch_work::infer::mask::MaskModel;
 use touch2touch_work::io::atomic;
 
-/// What everything is measured against.
+/// Sampler and steps that everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);
-/// How much worse than the reference the knee may be, and which share of its time it may take.
+/// Largest error of the knee, relative to the reference's, and the share of its time that it may take.
 const WORSE: f64 = 1.02;
 const SHARE: f64 = 0.1;
 
@@ -123,7 +123,7 @@ struct Knee {
     engine: EngineKind,
     /// By root mean square error alone: within 2 % of the reference in at most a tenth of its time.
     by_rmse: Option<String>,
-    /// The same for the mean angle error.
+    /// By the mean angle error alone, likewise.
     by_angle: Option<String>,
     /// For both at once.
     both: Option<String>,

@@ -54,7 +54,7 @@ pub(super) struct LabellingArgs {
     json: JsonArgs,
 }
 
-/// What one source proposes on the imprints of one kind.
+/// Figures of what one source proposes on the imprints of one kind.
 #[derive(Serialize)]
 struct Row {
     imprint: &'static str,
@@ -72,7 +72,7 @@ struct Row {
     ms: Option<f64>,
 }
 
-/// What a stroke costs besides the screen.
+/// Cost of a stroke besides the screen.
 #[derive(Serialize)]
 struct Stroke {
     size: [usize; 2],
@@ -86,10 +86,10 @@ struct Stroke {
     largest_upload: f64,
 }
 
-/// What follows the end of a stroke on the imprints of both fingers until its pose is there, besides the screen.
+/// Work that follows the end of a stroke on the imprints of both fingers until its pose is there, besides the screen.
 #[derive(Serialize)]
 struct Follow {
-    /// What the strokes change: masks of the true contact, or all that is deeper than the threshold.
+    /// Masks that the strokes change: of the true contact, or of all that is deeper than the threshold.
     masks: &'static str,
     size: [usize; 2],
     strokes: usize,
@@ -131,7 +131,7 @@ struct Report {
     follows: Vec<Follow>,
     /// The IoU at which a mask is done.
     target: f64,
-    /// What a mask takes a person, by the way to begin.
+    /// Work of a person on a mask, by the way to begin.
     actions: Vec<actions::Row>,
 }
 
@@ -285,7 +285,7 @@ fn registered(case: &Case, imprints: &PerPad<DepthMap>, masks: &PerPad<Mask>) ->
 
 type Proposed = (&'static str, PerPad<Mask>, f64);
 
-/// What each source proposes for a grasp, with the milliseconds that a finger took.
+/// Masks that each source proposes for a grasp, with the milliseconds that a finger took.
 fn proposals(
     (recipe, models): (&Recipe, &Models),
     case: &Case,

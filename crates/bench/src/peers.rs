@@ -20,7 +20,7 @@ const SCRIPT: &str = include_str!("../../../benches/peers.py");
 /// Surface points of a tool: as many as the lab's loop compares with.
 const MODEL_POINTS: usize = 5000;
 
-/// What Python had.
+/// Results of the libraries that Python had.
 pub(super) struct Peers {
     pub(super) rows: Vec<EngineRow>,
     /// Versions, and libraries that are missing.

@@ -2,7 +2,7 @@
 
 use crate::image;
 
-/// What lies behind the decoder: where each pad's sensor looks, and what it has of its own.
+/// Placement behind the decoder: where each pad's sensor looks, and what it has of its own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// Factor and offset of the decoder's picture, in units.
@@ -59,8 +59,8 @@ impl Placement {
         placement
     }
 
-    /// What the pad's imprints have in common beside the prediction. Its fine part is taken whole; of the smooth part,
-    /// which a few pairs may share by chance, n of n + 1.
+    /// Residual that the pad's imprints have in common beside the prediction, in units. Its fine part is taken whole;
+    /// of the smooth part, which a few pairs may share by chance, n of n + 1.
     fn mean_residual(&self, pad: usize, side: usize, compared: &[Compared]) -> Vec<f32> {
         let mut mean = vec![0.0; side * side];
         let own: Vec<&Compared> = compared.iter().filter(|pair| pair.pad == pad).collect();
@@ -141,7 +141,7 @@ impl Line {
         clear.then(|| [factor, (self.y - factor * self.x) / self.count])
     }
 
-    /// What the line leaves of y.
+    /// Squared residual of y that the line leaves.
     fn unexplained(&self) -> f64 {
         let [xx, xy, yy] = self.centered();
         if xx > 0.0 && xy > 0.0 { yy - xy * xy / xx } else { yy }

@@ -1,6 +1,6 @@
 //! Square images as slices: [`shifted`], [`boxed`], [`blurred`].
 
-/// Where a pixel of a moved line reads.
+/// Tap: where a pixel of a moved line reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tap {
     /// The first of two neighbors.

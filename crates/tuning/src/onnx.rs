@@ -77,7 +77,7 @@ impl Onnx {
     /// Decodes a file; each floating-point initializer becomes a weight.
     ///
     /// # Errors
-    /// What is wrong with the file, for a reader.
+    /// Fault of the file, in words for a reader.
     pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
         let mut initializers = Vec::new();
         let mut nodes = Vec::new();

@@ -16,7 +16,7 @@ use crate::trainer::{Objective, PARTS};
 pub(crate) const LINE: &str = "line";
 /// The shift of each pad, `[pads, 2]`, pixels.
 pub(crate) const SHIFT: &str = "shift";
-/// What each pad's imprints have beside the touch, `[pads, side · side]`.
+/// Field of each pad: what its imprints have beside the touch, `[pads, side · side]`.
 pub(crate) const FIELD: &str = "field";
 
 /// The generator's objective over a set of pairs.
@@ -31,11 +31,11 @@ pub(crate) struct Recipe {
     /// Mean imprint by pad; the last is that of simulated pairs.
     means: Vec<Vec<f32>>,
     clippings: Vec<Clipping>,
-    /// How simulated pairs are varied.
+    /// Ranges in which simulated pairs are varied.
     still: Augment,
 }
 
-/// What is fixed about the generator.
+/// Constants of the generator.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     pub(crate) sizes: Sizes,

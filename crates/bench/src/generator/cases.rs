@@ -23,7 +23,7 @@ pub(crate) struct Case {
     pub(crate) truth: PlanarPose,
 }
 
-/// What a prediction is worth.
+/// Score of a prediction.
 pub(super) struct Score {
     /// Over all pixels of both fingers, against the noise-free imprint.
     pub(super) mse_m2: f64,

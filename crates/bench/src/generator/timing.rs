@@ -1,4 +1,4 @@
-//! What a generation takes, and what of it is not the graphs' own work.
+//! Times of a generation, and the part of them that is not the graphs' own work.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub(super) struct Overhead {
     pub(super) percent_of_shortest: f64,
 }
 
-/// How long one waits for the first result, milliseconds of the clock; both fingers.
+/// Wait for the first result, milliseconds of the clock; both fingers.
 #[derive(Debug, Serialize)]
 pub(super) struct First {
     pub(super) engine: EngineKind,
@@ -46,7 +46,7 @@ pub(super) struct First {
     pub(super) warm_ms: f64,
     /// From the start to the first preview; `None` with a single step.
     pub(super) preview_ms: Option<f64>,
-    /// How much later the result comes with previews of one finger every four steps, percent.
+    /// Delay of the result by previews of one finger every four steps, percent.
     pub(super) preview_percent: Option<f64>,
 }
 

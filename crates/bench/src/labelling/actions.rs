@@ -1,4 +1,4 @@
-//! What a mask takes a person: pre-labeled grasps corrected by a scripted one, for each way to begin.
+//! Work of a person on a mask: pre-labeled grasps corrected by a scripted one, for each way to begin.
 //!
 //! The person knows the true contact, and of all that hands can do next takes what mends most: a clean-up by key or button
 //! (at the size that is set, 1 mm), a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness, or
@@ -31,20 +31,20 @@ const KEY_S: f64 = 0.28;
 const POINT_S: f64 = 1.1;
 /// To press or let go of a button of the mouse, seconds.
 const BUTTON_S: f64 = 0.1;
-/// How fast a hand follows an outline, image pixels per second.
+/// Speed of a hand that follows an outline, image pixels per second.
 const TRACE_PX_PER_S: f64 = 50.0;
-/// How far a drawn line lies off where it should be, standard deviation, pixels.
+/// Distance of a drawn line from where it should be, standard deviation, pixels.
 const JITTER_PX: f32 = 0.5;
 /// Pixels from point to point of a drawn line.
 const POINT_EVERY: usize = 3;
-/// How far beyond what is wrong a line goes where that does no harm, pixels.
+/// Distance of a line beyond what is wrong where that does no harm, pixels.
 const SLOPPY_PX: f64 = 2.0;
 /// Regions that a person looks at in turn, the largest first.
 const REGIONS: usize = 3;
 /// An outline around fewer pixels than this is not drawn.
 const SMALLEST_HOLE_PX: f32 = 6.0;
 
-/// Where a person begins.
+/// Begin of a person's work.
 pub(super) struct Begin {
     /// The mask in force, or that of the proposal.
     pub mask: Mask,
@@ -52,11 +52,11 @@ pub(super) struct Begin {
     pub keys: usize,
     /// Keys pressed to take it over where nothing is to be corrected.
     pub keys_as_it_is: usize,
-    /// What the program took to make it, milliseconds.
+    /// Time that the program took to make it, milliseconds.
     pub ms: f64,
 }
 
-/// What one mask took.
+/// Work on one mask.
 #[derive(Clone, Copy, Debug)]
 struct Took {
     begun_iou: f64,
@@ -67,7 +67,7 @@ struct Took {
     own_ms: f64,
 }
 
-/// What masks took that began in one way, means over fingers.
+/// Work on masks that began in one way, means over fingers.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Row {
     pub way: &'static str,
@@ -80,7 +80,7 @@ pub(super) struct Row {
     pub strokes: f64,
     /// By the model of a person.
     pub seconds: f64,
-    /// What the program took: proposals, drawing, packing for undo and file; milliseconds.
+    /// Time that the program took: proposals, drawing, packing for undo and file; milliseconds.
     pub own_ms: f64,
     /// Share of the masks that reached the target.
     pub reached: f64,
@@ -90,14 +90,14 @@ pub(super) struct Row {
 pub(super) struct Person {
     rig: Arc<Rig>,
     random: ChaCha8Rng,
-    /// Whether the lasso is in hand: it stays so from mask to mask.
+    /// True where the lasso is in hand: it stays so from mask to mask.
     lasso: bool,
     took: Vec<Took>,
 }
 
 /// Something that hands can do next.
 struct Move {
-    /// What is done in turn.
+    /// Acts in their order.
     does: Vec<Does>,
     actions: usize,
     seconds: f64,
@@ -171,8 +171,8 @@ impl Person {
         self.took.push(took);
     }
 
-    /// What mends most for each action, and the IoU after it; where several make the mask good enough, that of the fewest
-    /// actions, then of the least time.
+    /// Move that mends most for each action, and the IoU after it; where several make the mask good enough, that of the
+    /// fewest actions, then of the least time.
     fn best(&mut self, hand: &DrawnMask, now: f64, truth: &Mask, imprint: &DepthMap) -> Option<(Move, f64)> {
         /// A gain that nobody sees is none.
         const LEAST: f64 = 1e-3;
@@ -236,7 +236,7 @@ impl Person {
         sum * 3f32.sqrt()
     }
 
-    /// What all masks took.
+    /// Row of all masks; `None` without any.
     pub(super) fn row(&self, way: &'static str) -> Option<Row> {
         let masks = self.took.len();
         let mean = |of: &dyn Fn(&Took) -> f64| self.took.iter().map(of).sum::<f64>() / masks as f64;

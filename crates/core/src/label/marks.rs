@@ -119,7 +119,7 @@ impl Marks {
     /// Sets what stands behind one pixel, which must be inside.
     pub(super) fn put(&mut self, pixel: (usize, usize), ignored: bool, provenance: &Provenance) {
         let known = self.layers.iter().position(|layer| layer == provenance);
-        let layer = known.map_or_else(|| self.layer(provenance.clone()), |pixel| pixel as u8);
+        let layer = known.map_or_else(|| self.layer(provenance.clone()), |index| index as u8);
         self.set_ignored(pixel, ignored);
         self.of[pixel] = layer;
         if !ignored {

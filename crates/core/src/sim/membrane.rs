@@ -123,10 +123,10 @@ impl<'a> Membrane<'a> {
 
     /// Height of the membrane at `(y, z)`, meters.
     pub fn height(&self, yz: DVec2) -> f64 {
-        let node = (yz - self.origin) / MEMBRANE_STEP_M;
-        let free = self.dome.height(yz) - self.pushed.at(node.x, node.y);
+        let grid = (yz - self.origin) / MEMBRANE_STEP_M;
+        let free = self.dome.height(yz) - self.pushed.at(grid.x, grid.y);
         // between the nodes the tool's edges are sharper than the grid
-        if self.is_near(node) {
+        if self.is_near(grid) {
             let s = self.tool.outline_distance(self.object_from_grasp.transform_yz(yz));
             if s <= 0.0 {
                 return free.min(-self.tool.height_at(s));
@@ -135,12 +135,12 @@ impl<'a> Membrane<'a> {
         free
     }
 
-    fn is_near(&self, node: DVec2) -> bool {
+    fn is_near(&self, grid: DVec2) -> bool {
         let columns = self.pushed.columns;
-        if node.x < 0.0 || node.y < 0.0 {
+        if grid.x < 0.0 || grid.y < 0.0 {
             return false;
         }
-        let (i, j) = (node.x as usize, node.y as usize);
+        let (i, j) = (grid.x as usize, grid.y as usize);
         if i + 1 >= columns || j + 1 >= self.pushed.rows {
             return false;
         }

@@ -4,15 +4,15 @@ use super::MaskTouch;
 use crate::error::{Error, Result};
 use crate::random::Random;
 
-/// How far imprints are varied. What makes a pixel contact is the shape around it, not its depth: another gripper presses
-/// another bubble less, and another camera has another level, grain and place.
+/// Ranges in which imprints are varied. What makes a pixel contact is the shape around it, not its depth: another
+/// gripper presses another bubble less, and another camera has another level, grain and place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensors {
     /// Half of the measured imprints are drawn shallower, by factors from here to 1.
     pub shallowest: f64,
     /// Down to this depth at most, meters: of what is shallower, the grain leaves no shape.
     pub least_m: f64,
-    /// How far the depth of the others varies, as a share.
+    /// Largest change of the depth of the others, as a share.
     pub gain: f64,
     /// Standard deviation of the level, meters.
     pub level_m: f64,
@@ -24,7 +24,7 @@ pub struct Sensors {
     pub smoothed: f64,
     /// Largest shift along each axis, pixels. What comes in from outside does not count.
     pub shift_px: usize,
-    /// Whether imprints are mirrored along either axis.
+    /// True where imprints are mirrored along either axis.
     pub mirrored: bool,
 }
 
@@ -131,7 +131,7 @@ impl Sensors {
     }
 }
 
-/// How deep an imprint is: a hundredth of what was measured is deeper. Meters, above 0.
+/// Depth of an imprint: a hundredth of what was measured is deeper. Meters, above 0.
 fn depth(imprint_m: &[f32]) -> f64 {
     let mut measured: Vec<f32> = imprint_m.iter().copied().filter(|v| v.is_finite()).collect();
     let at = measured.len() * 99 / 100;
@@ -139,7 +139,7 @@ fn depth(imprint_m: &[f32]) -> f64 {
     f64::from(deep).max(1e-6)
 }
 
-/// How a picture is moved and mirrored.
+/// Shift and mirroring of a picture.
 struct Place {
     size: [usize; 2],
     /// Right and down, pixels.

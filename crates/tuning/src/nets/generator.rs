@@ -125,7 +125,7 @@ impl Sizes {
         sizes.check()
     }
 
-    /// What shapes alone do not say: sizes that norms, heads and halvings divide.
+    /// Checks what shapes alone do not say: sizes that norms, heads and halvings divide.
     fn check(self) -> Result<Self> {
         let cells = (self.side / CELL).pow(2);
         let [.., dim] = self.trunk;

@@ -18,7 +18,7 @@ pub(crate) const NETWORK: &str = "mask network";
 const LEVELS: usize = 4;
 /// Classes of a pixel: no contact, contact.
 const CLASSES: usize = 2;
-/// What is taken from the imprint, which is 0..1.
+/// Value that is subtracted from the imprint, which is 0..1.
 const MIDDLE: f32 = 0.5;
 
 /// Reads the network's weights; its widths may be others than those of the shipped one.

@@ -88,7 +88,7 @@ struct Tile {
 
 /// One output row of one row of the matrix of patches.
 struct Run {
-    /// Where it begins in the matrix.
+    /// Index in the matrix where it begins.
     at: usize,
     /// The columns that see the picture, not its padding, and where in the input they begin.
     seen: Option<(std::ops::Range<usize>, usize)>,
@@ -184,7 +184,7 @@ fn forward(input: &[f32], weight: &[f32], bias: &[f32], g: Geometry) -> Vec<f32>
     output
 }
 
-/// What the loss's slope along the output means for input and weights; empty where not asked for.
+/// Slopes of the loss along input and weights; empty where not asked for.
 struct Found {
     input: Vec<f32>,
     weight: Vec<f32>,

@@ -29,14 +29,14 @@ pub fn distance(drawn: &Tensor, measured: &[f32], weights: &[f32]) -> Tensor {
     })
 }
 
-/// What pixels add to the loss, and their slopes.
+/// Loss of the pixels, and its slopes.
 fn pixel_terms(difference: &[f32]) -> (f64, Vec<f32>) {
     let share = 1.0 / difference.len() as f32;
     let sum: f64 = difference.iter().map(|&d| f64::from(SQUARES * d * d + d.abs())).sum();
     (sum * f64::from(share), difference.iter().map(|&d| (2.0 * SQUARES * d + sign(d)) * share).collect())
 }
 
-/// What gradients add to the loss; their slopes are added to those of the pixels.
+/// Loss of the gradients; its slopes are added to those of the pixels.
 fn edge_terms(difference: &[f32], side: usize, along: &mut [f32]) -> f64 {
     let small = side - BOX + 1;
     let smooth = boxes(difference, side);

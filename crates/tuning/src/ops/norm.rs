@@ -11,7 +11,7 @@ use crate::tape::Tensor;
 pub(crate) const GROUPS: usize = 8;
 const EPSILON: f32 = 1e-5;
 
-/// What follows the normalization.
+/// Activation that follows the normalization.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activation {
     /// Nothing.
@@ -112,7 +112,7 @@ struct Saved {
     then: Activation,
 }
 
-/// What the loss's slope along the output means for the three inputs.
+/// Slopes of the loss along the three inputs.
 struct Found {
     input: Vec<f32>,
     scale: Vec<f32>,

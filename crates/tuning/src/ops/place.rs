@@ -38,7 +38,7 @@ pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, p
     })
 }
 
-/// Where each row and column reads.
+/// Taps that each row and column reads with.
 struct Place {
     side: usize,
     rows: Vec<Tap>,

@@ -1,4 +1,4 @@
-//! What a UNet needs beside convolutions: [`relu`], [`halved`], [`padded`], [`cropped`].
+//! Operators that a UNet needs beside convolutions: [`relu`], [`halved`], [`padded`], [`cropped`].
 
 use crate::tape::Tensor;
 
@@ -43,7 +43,7 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// What makes both sides multiples of a number, half on either side, the odd one behind.
+    /// Margins that make both sides multiples of a number, half on either side, the odd one behind.
     pub(crate) fn to_multiples(rows: usize, columns: usize, of: usize) -> Self {
         let split = |size: usize| {
             let more = size.next_multiple_of(of) - size;

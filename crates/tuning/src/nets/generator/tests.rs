@@ -12,7 +12,7 @@ fn shipped(name: &str) -> Vec<u8> {
     std::fs::read(format!("{BUNDLE}/{name}.onnx")).unwrap()
 }
 
-/// What rten makes of the shipped graph.
+/// Output that rten computes with the shipped graph.
 fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, output: &str) -> Vec<f32> {
     let model = Model::load(shipped(name)).unwrap();
     let mut all: Vec<(_, ValueOrView<'_>)> = inputs
