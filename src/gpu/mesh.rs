@@ -171,8 +171,8 @@ impl MeshData {
         let old = data.edges.take();
         if let Some(edges) = &style.edges {
             let what = (item.name.as_str(), item.revision, &*item.mesh);
-            let (found, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
-            data.edges = Some(found);
+            let (edge_data, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
+            data.edges = Some(edge_data);
             did = [did[0] | list, did[1] | numbers];
         }
         Ok((data, did))

@@ -32,8 +32,8 @@ pub fn nearest_point(
         .iter()
         .enumerate()
         .filter_map(|(index, p)| {
-            let (at, depth_m) = projector.project(*p)?;
-            let distance_px = (at - px).length();
+            let (point_px, depth_m) = projector.project(*p)?;
+            let distance_px = (point_px - px).length();
             (distance_px <= radius_px).then_some(Hit { index, distance_px, depth_m })
         })
         .collect();

@@ -298,9 +298,9 @@ impl Projector {
         let p = p.extend(1.0);
         let clip = self.clip * p;
         let depth = self.depth_row.dot(p);
-        let at = DVec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * self.size;
+        let place_px = DVec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * self.size;
         // Reversed depth: in front of the near plane means z <= w.
-        (at.is_finite() && clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0).then_some((at, depth))
+        (place_px.is_finite() && clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0).then_some((place_px, depth))
     }
 }
 

@@ -121,7 +121,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             .map(|i| pair(&grasps[i % count], i, args.seed))
             .collect::<anyhow::Result<_>>()?;
         let begin = Instant::now();
-        let found: Vec<f64> = chunk
+        let errors: Vec<f64> = chunk
             .par_iter()
             .map(|p| {
                 let report = register(&p.points, &tools[p.grasp.tool], args.engine, false);
@@ -129,9 +129,9 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             })
             .collect();
         points_seconds += begin.elapsed().as_secs_f64();
-        points_errors.extend(found);
+        points_errors.extend(errors);
         let begin = Instant::now();
-        let found: Vec<f64> = chunk
+        let errors: Vec<f64> = chunk
             .par_iter()
             .map(|p| {
                 let points = contact_points(&p.grasp.imprints, &p.cameras, &p.grasp.masks).unwrap_or_default();
@@ -140,7 +140,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             })
             .collect();
         depth_seconds += begin.elapsed().as_secs_f64();
-        depth_errors.extend(found);
+        depth_errors.extend(errors);
     }
     let stage = |seconds: f64, errors: &[f64]| Stage {
         seconds,

@@ -130,9 +130,9 @@ pub(super) fn quantile(values: impl Iterator<Item = f64>, q: f64) -> Option<f64>
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
-    let at = q * last as f64;
-    let low = values[at.floor() as usize];
-    Some(low + (values[at.ceil() as usize] - low) * at.fract())
+    let rank = q * last as f64;
+    let low = values[rank.floor() as usize];
+    Some(low + (values[rank.ceil() as usize] - low) * rank.fract())
 }
 
 #[cfg(test)]

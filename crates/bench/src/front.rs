@@ -163,7 +163,8 @@ impl Drawing for Picture<'_> {
             if p.name == self.default {
                 discs.splice(2..2, [(mean, 10.0, color), (mean, 8.0, WHITE)]);
             }
-            let disc = |(at, radius, color): (_, _, RGBColor)| Circle::new(at, paper.wide(radius), color.filled());
+            let disc =
+                |(center, radius, color): (_, _, RGBColor)| Circle::new(center, paper.wide(radius), color.filled());
             chart.draw_series(discs.into_iter().map(disc))?;
         }
 
@@ -181,16 +182,16 @@ impl Drawing for Picture<'_> {
             labels.take(chart.backend_coord(&pair[0]), chart.backend_coord(&pair[1]), 2);
         }
         for (p, color) in colored() {
-            let at = chart.backend_coord(&(p.ms, p.mean_deg));
+            let point = chart.backend_coord(&(p.ms, p.mean_deg));
             let label = if p.name == self.default { format!("{} (default)", p.name) } else { p.name.clone() };
             let style = paper.letters(LETTERS, color);
             let (w, h) = paper.area.estimate_text_size(&label, &style)?;
-            let [left, top, right, bottom] = labels.place([w as i32, h as i32], at);
+            let [left, top, right, bottom] = labels.place([w as i32, h as i32], point);
             // A label that had to give way is joined to its point.
             let middle = (top + bottom) / 2;
-            if (middle - at.1).abs() > paper.px(10.0) {
-                let end = if left > at.0 { left } else { right };
-                paper.area.draw(&PathElement::new([at, (end, middle)], paper.stroke(MUTED, 0.7)))?;
+            if (middle - point.1).abs() > paper.px(10.0) {
+                let end = if left > point.0 { left } else { right };
+                paper.area.draw(&PathElement::new([point, (end, middle)], paper.stroke(MUTED, 0.7)))?;
             }
             // White behind the letters, where lines of other engines pass.
             paper.area.draw(&Rectangle::new([(left, top), (right, bottom)], WHITE.filled()))?;
@@ -224,14 +225,14 @@ impl Labels {
         });
         let first = [point.0 + gap, point.1 - h / 2, point.0 + gap + w, point.1 - h / 2 + h];
         let [left, top, right, bottom] = self.plot;
-        let at = places
+        let rectangle = places
             .find(|b| {
                 let inside = b[0] > left && b[2] < right && b[1] > top && b[3] < bottom;
                 inside && self.taken.iter().all(|t| b[2] < t[0] || b[0] > t[2] || b[3] < t[1] || b[1] > t[3])
             })
             .unwrap_or(first);
-        self.taken.push(at);
-        at
+        self.taken.push(rectangle);
+        rectangle
     }
 }
 

@@ -165,9 +165,9 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
         output.note("asking Python for Open3D and small_gicp ...");
         let asked: Vec<usize> = pairs::spread(prepared.len(), Some(args.peer_limit)).collect();
         match peers::run(&args.python, &prepared, &set.tools, &asked) {
-            Ok(found) => {
-                report.engines.extend(found.rows);
-                report.notes.extend(found.notes);
+            Ok(peers) => {
+                report.engines.extend(peers.rows);
+                report.notes.extend(peers.notes);
             }
             Err(err) => report.notes.push(format!("Open3D and small_gicp were not run: {}", says(&err))),
         }

@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_imprint_moves_with_the_picture() {
-        let dot = |at: usize| (0..SIDE * SIDE).map(|i| f32::from(u8::from(i == at))).collect::<Vec<_>>();
+        let dot = |index: usize| (0..SIDE * SIDE).map(|i| f32::from(u8::from(i == index))).collect::<Vec<_>>();
         let augment = Augment { imprint_per_picture: [1.0, 1.0], shift: 3.0, ..Augment::none() };
         let set = Set { mean: &[0.0; SIDE * SIDE], deviation: [1.0; 3], clippings: &[] };
         let picture = dot(8 * SIDE + 8).repeat(3);

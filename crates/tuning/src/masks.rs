@@ -168,21 +168,22 @@ impl Objective for Recipe {
     fn part(&self, step: usize, part: usize) -> Part {
         let c = &self.config;
         let parts = self.parts(step);
-        let mut made = Part::default();
+        let mut batch = Part::default();
         for place in part * c.batch / parts..(part + 1) * c.batch / parts {
             let touch = &self.touches[dealt(c.seed, &self.all, step * c.batch + place, 0)];
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
             let varied = c.sensors.vary(touch, self.start.size, random);
             let bit = |&v: &bool| f32::from(u8::from(v));
-            made.inputs
+            batch
+                .inputs
                 .extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
-            made.masks.extend(varied.contact.iter().map(bit));
+            batch.masks.extend(varied.contact.iter().map(bit));
             match &varied.counted {
-                Some(counted) => made.counted.extend(counted.iter().map(bit)),
-                None => made.counted.extend(vec![1.0; varied.contact.len()]),
+                Some(counted) => batch.counted.extend(counted.iter().map(bit)),
+                None => batch.counted.extend(vec![1.0; varied.contact.len()]),
             }
         }
-        made
+        batch
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {
@@ -309,8 +310,8 @@ fn check(touches: &[MaskTouch], [width, height]: [usize; 2]) -> Result<()> {
         let counted = touch.counted.as_ref().map_or(pixels, Vec::len);
         let sizes =
             [("imprint", touch.imprint_m.len()), ("mask", touch.contact.len()), ("map of what counts", counted)];
-        if let Some((what, found)) = sizes.into_iter().find(|(_, found)| *found != pixels) {
-            return Err(Error::Mask { index, why: format!("its {what} has {found} values instead of {pixels}") });
+        if let Some((what, length)) = sizes.into_iter().find(|(_, length)| *length != pixels) {
+            return Err(Error::Mask { index, why: format!("its {what} has {length} values instead of {pixels}") });
         }
         if touch.imprint_m.iter().all(|v| !v.is_finite()) {
             return Err(Error::Mask { index, why: "its imprint holds no measurement".into() });

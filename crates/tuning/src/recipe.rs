@@ -162,7 +162,7 @@ impl Objective for Recipe {
         let (first, end) = (part * c.batch / parts, (part + 1) * c.batch / parts);
         let two = Random::new(c.seed, Purpose::Batch, step, 0).happens(c.second);
         let latent = self.model.sizes.latent();
-        let mut made = Part {
+        let mut batch = Part {
             pictures: Vec::new(),
             imprints: Vec::new(),
             pads: Vec::new(),
@@ -178,19 +178,19 @@ impl Objective for Recipe {
             // Moving a simulated picture moves its markers too, by which the network tells one finger from the other.
             let augment = if pair.frame.is_none() { &self.still } else { &c.augment };
             let (picture, imprint) = augment.vary(&pair.picture, &pair.imprint, &set, random);
-            made.pictures.extend(self.model.standardized(&picture));
-            made.imprints.extend(imprint);
-            made.pads.push(pair.frame);
-            made.weights.push(pair.weight / sum);
+            batch.pictures.extend(self.model.standardized(&picture));
+            batch.imprints.extend(imprint);
+            batch.pads.push(pair.frame);
+            batch.weights.push(pair.weight / sum);
             let random = &mut Random::new(c.seed, Purpose::Noise, step, place);
             let zeros = random.happens(0.5);
             let noise = random.normals(latent);
-            made.noise.extend(if zeros { vec![0.0; latent] } else { noise });
-            if let Some(second) = &mut made.second {
+            batch.noise.extend(if zeros { vec![0.0; latent] } else { noise });
+            if let Some(second) = &mut batch.second {
                 second.extend(random.normals(latent));
             }
         }
-        made
+        batch
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {

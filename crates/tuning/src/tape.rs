@@ -68,14 +68,14 @@ impl Tensor {
         values: Vec<f32>,
         backward: impl FnOnce(Vec<f32>, [Slot; N], &mut Slopes) + 'static,
     ) -> Self {
-        let mut made = Self::new(shape, values);
+        let mut tensor = Self::new(shape, values);
         if let Some(tape) = inputs.iter().find_map(|input| input.node.as_ref()).map(|node| node.tape.clone()) {
             let slots = inputs.map(|input| Slot(input.node.as_ref().map(|node| node.place)));
             let step: Backward = Box::new(move |slope, slopes| backward(slope, slots, slopes));
             let place = tape.push(Some(step));
-            made.node = Some(Node { tape, place });
+            tensor.node = Some(Node { tape, place });
         }
-        made
+        tensor
     }
 
     /// Values in another shape.

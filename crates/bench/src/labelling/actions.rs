@@ -195,7 +195,7 @@ impl Person {
 
     /// Lines around what is missing and around what is too much.
     fn lines(&mut self, mask: &Mask, truth: &Mask) -> Vec<Move> {
-        let mut found = Vec::new();
+        let mut moves = Vec::new();
         for paint in [Paint::Contact, Paint::Free] {
             let add = paint == Paint::Contact;
             // What is wrong, and where a line may go without harm.
@@ -208,9 +208,9 @@ impl Person {
                 // The whole contact anew, in one line.
                 regions.extend(largest(&harmless, &wrong));
             }
-            found.extend(regions.iter().filter_map(|region| self.around(region, paint)));
+            moves.extend(regions.iter().filter_map(|region| self.around(region, paint)));
         }
-        found
+        moves
     }
 
     /// The mask cleared, and a line around the largest part of the contact.
@@ -266,7 +266,7 @@ fn largest(mask: &Mask, of: &Mask) -> Vec<Mask> {
     let (labels, sizes) = islands(mask);
     let mut counts: Vec<(usize, u32)> = (1..=sizes.len() as u32).map(|label| (0, label)).collect();
     for (label, counted) in labels.as_slice().iter().zip(of.as_slice()) {
-        if *counted && let Some(entry) = (*label as usize).checked_sub(1).and_then(|at| counts.get_mut(at)) {
+        if *counted && let Some(entry) = (*label as usize).checked_sub(1).and_then(|index| counts.get_mut(index)) {
             entry.0 += 1;
         }
     }
@@ -288,10 +288,10 @@ fn path(region: &Mask) -> Option<Vec<[f32; 2]>> {
         let pairs = (0..line.len()).flat_map(|i| (0..hole.len()).map(move |j| (i, j)));
         let nearest =
             pairs.min_by(|a, b| distance(&line[a.0], &hole[a.1]).total_cmp(&distance(&line[b.0], &hole[b.1])));
-        let Some((at, from)) = nearest else { continue };
+        let Some((index, from)) = nearest else { continue };
         let around = hole[from..].iter().chain(&hole[..=from]).copied();
-        let detour: Vec<[f32; 2]> = around.chain([line[at]]).collect();
-        line.splice(at + 1..at + 1, detour);
+        let detour: Vec<[f32; 2]> = around.chain([line[index]]).collect();
+        line.splice(index + 1..index + 1, detour);
     }
     Some(line)
 }
@@ -316,8 +316,8 @@ fn smooth(outline: &[[f32; 2]]) -> Vec<[f32; 2]> {
 /// pixel.
 fn outlines(mask: &Mask) -> Vec<Vec<[f32; 2]>> {
     let inside = |x: i32, y: i32| {
-        let at = usize::try_from(x).ok().zip(usize::try_from(y).ok());
-        at.is_some_and(|(x, y)| mask.get(x, y) == Some(&true))
+        let pixel = usize::try_from(x).ok().zip(usize::try_from(y).ok());
+        pixel.is_some_and(|(x, y)| mask.get(x, y) == Some(&true))
     };
     // From each corner where the edges lead that have the mask at their right.
     let mut edges: std::collections::BTreeMap<(i32, i32), Vec<(i32, i32)>> = std::collections::BTreeMap::new();
@@ -336,19 +336,19 @@ fn outlines(mask: &Mask) -> Vec<Vec<[f32; 2]>> {
             }
         }
     }
-    let mut found = Vec::new();
+    let mut outlines = Vec::new();
     while let Some((&start, _)) = edges.first_key_value() {
-        let (mut line, mut at) = (Vec::new(), start);
-        while let Some(next) = edges.get_mut(&at).and_then(Vec::pop) {
-            if edges.get(&at).is_some_and(Vec::is_empty) {
-                edges.remove(&at);
+        let (mut line, mut corner) = (Vec::new(), start);
+        while let Some(next) = edges.get_mut(&corner).and_then(Vec::pop) {
+            if edges.get(&corner).is_some_and(Vec::is_empty) {
+                edges.remove(&corner);
             }
-            line.push([at.0 as f32 - 0.5, at.1 as f32 - 0.5]);
-            at = next;
+            line.push([corner.0 as f32 - 0.5, corner.1 as f32 - 0.5]);
+            corner = next;
         }
-        found.push(line);
+        outlines.push(line);
     }
-    found
+    outlines
 }
 
 /// The rows as a table.
