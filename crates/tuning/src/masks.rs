@@ -168,22 +168,22 @@ impl Objective for Recipe {
     fn part(&self, step: usize, part: usize) -> Part {
         let c = &self.config;
         let parts = self.parts(step);
-        let mut batch = Part::default();
+        let mut items = Part::default();
         for place in part * c.batch / parts..(part + 1) * c.batch / parts {
             let touch = &self.touches[dealt(c.seed, &self.all, step * c.batch + place, 0)];
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
             let varied = c.sensors.vary(touch, self.start.size, random);
             let bit = |&v: &bool| f32::from(u8::from(v));
-            batch
+            items
                 .inputs
                 .extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
-            batch.masks.extend(varied.contact.iter().map(bit));
+            items.masks.extend(varied.contact.iter().map(bit));
             match &varied.counted {
-                Some(counted) => batch.counted.extend(counted.iter().map(bit)),
-                None => batch.counted.extend(vec![1.0; varied.contact.len()]),
+                Some(counted) => items.counted.extend(counted.iter().map(bit)),
+                None => items.counted.extend(vec![1.0; varied.contact.len()]),
             }
         }
-        batch
+        items
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {

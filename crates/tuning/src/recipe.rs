@@ -162,7 +162,7 @@ impl Objective for Recipe {
         let (first, end) = (part * c.batch / parts, (part + 1) * c.batch / parts);
         let two = Random::new(c.seed, Purpose::Batch, step, 0).happens(c.second);
         let latent = self.model.sizes.latent();
-        let mut batch = Part {
+        let mut items = Part {
             pictures: Vec::new(),
             imprints: Vec::new(),
             pads: Vec::new(),
@@ -178,19 +178,19 @@ impl Objective for Recipe {
             // Moving a simulated picture moves its markers too, by which the network tells one finger from the other.
             let augment = if pair.frame.is_none() { &self.still } else { &c.augment };
             let (picture, imprint) = augment.vary(&pair.picture, &pair.imprint, &set, random);
-            batch.pictures.extend(self.model.standardized(&picture));
-            batch.imprints.extend(imprint);
-            batch.pads.push(pair.frame);
-            batch.weights.push(pair.weight / sum);
+            items.pictures.extend(self.model.standardized(&picture));
+            items.imprints.extend(imprint);
+            items.pads.push(pair.frame);
+            items.weights.push(pair.weight / sum);
             let random = &mut Random::new(c.seed, Purpose::Noise, step, place);
             let zeros = random.happens(0.5);
             let noise = random.normals(latent);
-            batch.noise.extend(if zeros { vec![0.0; latent] } else { noise });
-            if let Some(second) = &mut batch.second {
+            items.noise.extend(if zeros { vec![0.0; latent] } else { noise });
+            if let Some(second) = &mut items.second {
                 second.extend(random.normals(latent));
             }
         }
-        batch
+        items
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {
