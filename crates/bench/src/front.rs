@@ -65,9 +65,9 @@ const LETTERS: f64 = 16.0;
 /// Texts around the picture.
 pub(super) struct Axis<'a> {
     pub(super) title: &'a str,
-    /// Of the axis of time.
+    /// Title of the axis of time.
     pub(super) time: &'a str,
-    /// Behind the numbers of the axis of the error.
+    /// Unit behind the numbers of the axis of the error.
     pub(super) unit: &'a str,
     /// The colors in words.
     pub(super) legend: &'a [(RGBColor, &'a str)],

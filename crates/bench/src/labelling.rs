@@ -62,9 +62,9 @@ struct Row {
     /// With the true contact, mean over fingers; `None` where nothing could be proposed.
     iou: Option<f64>,
     iou_worst: Option<f64>,
-    /// Of the poses registered from the proposed masks, degrees, mean.
+    /// Angle error of the poses registered from the proposed masks, degrees, mean.
     angle_error_deg: Option<f64>,
-    /// Between those and the poses registered from the true masks of the same imprints, degrees, mean.
+    /// Angle between those and the poses registered from the true masks of the same imprints, degrees, mean.
     apart_from_true_masks_deg: Option<f64>,
     /// Grasps without a pose.
     no_pose: usize,
@@ -238,7 +238,7 @@ const WAYS: [(&str, Option<&str>, [usize; 2]); 7] = [
     ("another grasp's mask, carried, for all at once", Some("carried from another grasp"), [0, 0]),
 ];
 
-/// Who corrects the masks of each of [`WAYS`].
+/// Persons who correct the masks of each of [`WAYS`].
 #[derive(Default)]
 struct Persons(Vec<actions::Person>);
 

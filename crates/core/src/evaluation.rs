@@ -47,7 +47,7 @@ pub enum Group {
     CleanPictures,
     /// Pictures whose GelSlim image was cut off at black or white.
     ClippedPictures,
-    /// Of unknown tools.
+    /// Grasps of unknown tools.
     Unknown,
 }
 

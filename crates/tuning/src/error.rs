@@ -35,9 +35,9 @@ pub enum Error {
         network: &'static str,
         /// The weight's name.
         weight: String,
-        /// As in the file.
+        /// Shape in the file.
         found: Vec<usize>,
-        /// As the architecture asks for.
+        /// Shape that the architecture asks for.
         expected: Vec<usize>,
     },
     /// A value that is given beside the networks does not fit them.

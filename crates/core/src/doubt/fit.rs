@@ -66,7 +66,7 @@ pub(super) fn likeness(sample: &Sample, field: &DistanceField, grasp_from_object
     if felt.len() < FEWEST { 0.0 } else { correlation(&felt, &outline) }
 }
 
-/// Of values whose mean is 0; 0 where one does not vary.
+/// Correlation of values whose mean is 0; 0 where one does not vary.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let size = (dot(a, a) * dot(b, b)).sqrt();

@@ -197,7 +197,7 @@ fn best_reading(pairs: &Pairs<'_>, stored: &[f64]) -> Option<(ReadAs, Gain)> {
         .max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))
 }
 
-/// By what a reading of the imprints is better.
+/// Figures by which a reading of the imprints is better, in words.
 fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> String {
     let errors = |readings: &[ReadAs]| {
         let error = |(sample, tool): (&Sample, &&str)| {

@@ -10,7 +10,7 @@ use crate::postprocess::Correction;
 use crate::rig::{PadId, PerPad};
 use crate::sample::{Sample, Scale};
 
-/// From what a fit was made, as it stands in a bundle's manifest.
+/// Source of a fit: the data and the bundle that it was made from, as they stand in a bundle's manifest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitSource {
@@ -68,7 +68,7 @@ pub struct PadFit {
 /// A fit of a generator to a rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
-    /// From what it was made.
+    /// Data and bundle that it was made from.
     pub source: FitSource,
     /// In the order of the rig's pads.
     pub pads: PerPad<PadFit>,

@@ -9,9 +9,9 @@ use crate::sample::DepthCamera;
 /// An imprint with the camera that felt it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
-    /// Meters.
+    /// Imprint, meters.
     pub imprint: &'a DepthMap,
-    /// Of the same finger.
+    /// Camera of the same finger.
     pub camera: &'a DepthCamera,
 }
 

@@ -38,7 +38,7 @@ const DOUBLES_PX: f32 = 24.0;
 /// One stroke or shape that a hand draws on a mask.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drawing {
-    /// With what.
+    /// Tool that it is drawn with.
     #[serde(flatten)]
     pub tool: DrawTool,
     /// The pointer's way or the corners, pixels of the image, or of the picture of [`Self::sight`]: `(0, 0)` is the center of

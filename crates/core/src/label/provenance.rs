@@ -43,7 +43,7 @@ pub enum Provenance {
     Nothing,
     /// A person looked at it and painted it.
     Hand {
-        /// Who.
+        /// Name of the person; empty where nobody knows.
         person: String,
     },
     /// Imprint above a depth.
@@ -88,7 +88,7 @@ pub enum Provenance {
     Grown,
     /// A copy of another mask.
     Copied {
-        /// Of which, in words.
+        /// Words for the mask it was copied from.
         from: String,
         /// Motion in the grasp frame before it was copied, where it was moved.
         #[serde(default, skip_serializing_if = "Option::is_none")]
