@@ -56,7 +56,7 @@ fn from_opening_to_the_figures() {
     bench.settle();
     assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (2, 1));
     let recipe = bench.state.chosen(RIGHT).unwrap().clone();
-    assert_eq!(recipe.seed, 42);
+    assert_eq!(recipe.config.seed, 42);
     assert_eq!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
     let comparison = bench.state.comparison(RIGHT).ready().unwrap();
     assert!(comparison.psnr_db.is_some_and(f64::is_finite) && comparison.mae_m > 0.0);

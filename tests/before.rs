@@ -75,7 +75,7 @@ fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
         .tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::ScenePredicted].into()))]);
     runtime.settle(&mut state);
     let shown = state.chosen(lab::RIGHT).expect("it is predicted by itself");
-    assert_eq!((shown.steps, shown.config().eta, state.outdated(lab::RIGHT)), (2, 0.1, None));
+    assert_eq!((shown.config.steps, shown.config.eta, state.outdated(lab::RIGHT)), (2, 0.1, None));
     assert!(state.drawn_mask(ImprintSource::Predicted, lab::RIGHT).is_some());
     assert!(state.by_hand(ImprintSource::Predicted).is_some());
     state.accepted_elsewhere().len()

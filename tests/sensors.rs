@@ -114,7 +114,7 @@ fn the_studio_shows_a_predicted_color_picture() {
     let mut generator =
         Generator::open(&Bundle::open(&bundle("bubble_to_gelslim")).unwrap(), EngineChoice::Auto).unwrap();
     let condition = state.touch(lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
-    let config = state.chosen(lab::RIGHT).unwrap().config();
+    let config = state.chosen(lab::RIGHT).unwrap().config;
     let raw = generator.generate(&condition, &config, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
     assert_eq!(generator.picture(&raw, ShiftMode::default()), Ok(Picture::Color(picture.clone())));
     for absent in [

@@ -276,7 +276,7 @@ macro_rules! actions {
         Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [],
             state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [],
-            _ => does(prefer(|s| s.pose_engine = next_of(&s.pose_engine.by).into()));
+            _ => does(prefer(|s| s.registration = next_of(&s.registration.by).into()));
 
         LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)],
             _ => does(prefer(|s| s.range.locked ^= true));

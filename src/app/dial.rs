@@ -59,7 +59,7 @@ pub(super) fn step(state: &mut State, command: DialCommand, effects: &mut Vec<Ef
             let Ok(Recipe { mask, registration, shift, .. }) = setting.put(&before) else { return };
             let change = match setting {
                 Setting::Threshold(_) | Setting::Probability(_) => prefer(move |s| s.mask.choice = mask),
-                Setting::Rejection(_) => prefer(move |s| s.pose_engine = registration),
+                Setting::Rejection(_) => prefer(move |s| s.registration = registration),
                 Setting::Shift(_) => prefer(move |s| s.shift = shift),
             };
             settings::step(state, change, effects);

@@ -115,7 +115,7 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     let recipe = &case.recipe;
     state.settings.shift = recipe.shift;
     state.settings.mask.choice = recipe.mask;
-    state.settings.pose_engine = recipe.registration;
+    state.settings.registration = recipe.registration;
     state.settings.runtime = recipe.engine;
     if let Some((model, config)) = &recipe.generator {
         state.settings.generate = GenerateSettings {
@@ -166,7 +166,7 @@ pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
     let (pair, runtime) = (open.key(pair), case.recipe.engine);
     let imprints = held.imprints.iter().filter(|((source, _), _)| *source == ImprintSource::Predicted);
     for ((_, finger), imprint) in imprints {
-        let recipe = PredictionKey::new(pair.finger(*finger), id.clone(), runtime, config);
+        let recipe = PredictionKey { touch: pair.finger(*finger), bundle: id.clone(), config: *config, runtime };
         state.hold(recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
     }
 }

@@ -136,7 +136,7 @@ fn pin(state: &mut State) {
     let new = Pin {
         pair,
         source: state.inspect.source,
-        engine: state.settings.pose_engine,
+        registration: state.settings.registration,
         run: shown.run,
         at: shown.at,
         grasp_from_object: shown.step.grasp_from_object,

@@ -1,7 +1,7 @@
 //! Names of what is open and looked at, and the words that recipes are made of. The recipes themselves stand with their
 //! results in [`super::results`].
 
-pub use touch2touch_core::bits::{Bits, Bits64};
+pub use touch2touch_core::bits::Bits;
 pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
 pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_work::labels::{ImprintSource, Revision};

@@ -279,7 +279,7 @@ results! {
     ProvisionalPose(pose::ProvisionalPoseKey) in provisional_poses, 4 * MIB;
     /// A registration with everything recorded.
     Run(run::RunKey) in runs, 32 * MIB;
-    /// Reasons, residuals and distances of a recorded registration from the engine's own starts.
+    /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
     Layers(layers::LayersKey) in layers, 16 * MIB;
     /// Signed distances between contact points and the registered model.
     Deviation(deviation::DeviationKey) in deviations, 64 * MIB;

@@ -286,28 +286,28 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            let text = format!("seed {}", recipe.seed);
+            let text = format!("seed {}", recipe.config.seed);
             let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));
             if label.on_hover_text("Show this prediction").clicked() {
                 choose(cx, recipe);
             }
-            ui.label(caption(format!("{} steps", recipe.steps), cx.p));
+            ui.label(caption(format!("{} steps", recipe.config.steps), cx.p));
             ui.label(value(psnr, cx.p).size(SMALL));
             ui.label(caption(seconds, cx.p)).on_hover_text(took);
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
-            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
+            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.config.seed));
             if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
-                let recipe = recipe.clone();
+                let config = recipe.config;
                 cx.push(prefer(move |s| {
                     s.generate = GenerateSettings {
                         preset: None,
-                        steps: recipe.steps,
-                        seed: recipe.seed,
+                        steps: config.steps,
+                        seed: config.seed,
                         seed_locked: true,
-                        sampler: recipe.sampler,
-                        eta: recipe.eta.get(),
-                        spacing: recipe.spacing,
-                        guidance: recipe.guidance.get(),
+                        sampler: config.sampler,
+                        eta: config.eta,
+                        spacing: config.spacing,
+                        guidance: config.guidance,
                         ..s.generate.clone()
                     }
                 }));

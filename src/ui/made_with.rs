@@ -50,8 +50,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: 
     let model = cx.state.model_name(recipe);
     let why = cx.state.outdated(finger).map(|outdated| outdated.why);
     let settings = match why {
-        None => format!(" · {} · {}", settings_text(&recipe.config()), shift.label().to_lowercase()),
-        Some(_) => format!(" · {}", settings_text(&recipe.config())),
+        None => format!(" · {} · {}", settings_text(&recipe.config), shift.label().to_lowercase()),
+        Some(_) => format!(" · {}", settings_text(&recipe.config)),
     };
     let (lead, tip) = match why {
         None => ("", "What is shown was predicted so"),

@@ -61,17 +61,19 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(section("Pose", cx.p));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let engine = cx.state.settings.pose_engine;
-            let combo =
-                eframe::egui::ComboBox::from_id_salt("engine").width(150.0).truncate().selected_text(engine.label());
+            let registration = cx.state.settings.registration;
+            let combo = eframe::egui::ComboBox::from_id_salt("engine")
+                .width(150.0)
+                .truncate()
+                .selected_text(registration.label());
             let response = combo.show_ui(ui, |ui| {
                 for e in Registration::iter() {
-                    if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                        cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
+                    if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
+                        cx.out.push(prefer(move |s| s.registration = e.into()).into());
                     }
                 }
             });
-            response.response.accessible_name("Registration").on_hover_text(engine.by.description());
+            response.response.accessible_name("Registration").on_hover_text(registration.by.description());
         });
     });
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {

@@ -83,7 +83,9 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
             cx.push(Command::Seeds(SeedsCommand::EveryPair(every)));
         }
         let text = match running && there < recipes.len() {
-            true => format!("{there} of {}, seed {}…", recipes.len(), recipes[0].seed.wrapping_add(there as u64)),
+            true => {
+                format!("{there} of {}, seed {}…", recipes.len(), recipes[0].config.seed.wrapping_add(there as u64))
+            }
             false => format!("{there} of {}", recipes.len()),
         };
         ui.label(caption(text, cx.p));
@@ -103,7 +105,7 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
         let at = vec2((i % columns) as f32, (i / columns) as f32) * (size + vec2(GAP, GAP));
         let rect = Rect::from_min_size(area.min + at, size);
         let response = ui.interact(rect, ui.scope_id().with(("seed", i)), Sense::click());
-        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Seed {}", recipe.seed)));
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Seed {}", recipe.config.seed)));
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 2.0, cx.p.canvas);
         let angle = poses.get(i).copied().flatten().map(|pose| units::text_deg(pose.angle_rad));
@@ -111,13 +113,13 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
             Some(imprint) => {
                 let shown = (recipe, state.settings.shift);
                 thumbnail::depth(cx, &painter, rect, ("seed", i), shown, (imprint, map, range));
-                shade(&painter, rect, Align2::LEFT_TOP, &recipe.seed.to_string());
+                shade(&painter, rect, Align2::LEFT_TOP, &recipe.config.seed.to_string());
                 shade(&painter, rect, Align2::RIGHT_BOTTOM, angle.as_deref().unwrap_or(""));
                 if state.chosen(recipe.touch.finger) == Some(recipe) {
                     painter.rect_stroke(rect, 2.0, Stroke::new(2.0, cx.p.accent), egui::StrokeKind::Inside);
                 }
                 if response
-                    .on_hover_text(format!("Seed {}: click to show it in the other panes", recipe.seed))
+                    .on_hover_text(format!("Seed {}: click to show it in the other panes", recipe.config.seed))
                     .clicked()
                 {
                     cx.push(PredictCommand::Choose(recipe.clone()));

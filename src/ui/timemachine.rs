@@ -130,16 +130,16 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     }
     ui.add_space(4.0);
-    let engine = cx.state.settings.pose_engine;
-    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(engine.label());
+    let registration = cx.state.settings.registration;
+    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(registration.label());
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
-            if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
+            if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
+                cx.out.push(prefer(move |s| s.registration = e.into()).into());
             }
         }
     });
-    combo.response.accessible_name("Registration of the steps").on_hover_text(engine.by.description());
+    combo.response.accessible_name("Registration of the steps").on_hover_text(registration.by.description());
     ui.add_space(4.0);
     match inspect.start.map(PoseBits::get) {
         Some(start) => {

@@ -50,7 +50,7 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold", "--engine", "gicp"];
     let why = json(&verb, home.path())["cases"][0]["no_influence"].as_str().unwrap().to_owned();
     let engine = touch2touch_core::pose::Registration::Gicp.into();
-    studio.send(prefer(move |s| s.pose_engine = engine).into());
+    studio.send(prefer(move |s| s.registration = engine).into());
     let Lookup::Failed(said) = studio.state.influence(MEASURED) else { panic!("{:?}", studio.state.tasks.failed) };
     assert!(why.contains(&said.why), "{why}: {}", said.why);
     studio.send(ViewCommand::ShowInfluence(false).into());

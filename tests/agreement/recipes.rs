@@ -125,7 +125,7 @@ fn put(studio: &mut Studio, recipe: &Recipe) {
     let change = prefer(move |s| {
         s.runtime = EngineChoice::Rten;
         s.generate = generate.clone();
-        (s.shift, s.mask.choice, s.pose_engine) = (shift, mask, registration);
+        (s.shift, s.mask.choice, s.registration) = (shift, mask, registration);
     });
     studio.send(change.into());
 }

@@ -30,7 +30,7 @@ const RIGHT: PadId = lab::RIGHT;
 const LEFT: PadId = lab::LEFT;
 
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
-    let picture = PreviewPicture { step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) };
+    let picture = PreviewPicture { step, of: recipe.config.steps, depth: DepthMap::filled(4, 3, 0.001) };
     Arc::new(Preview { recipe: recipe.clone(), picture })
 }
 
@@ -152,7 +152,7 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let touch = again.state.touch_key(RIGHT).unwrap();
     assert_eq!(again.state.results.made[&touch].len(), 2);
     // Shown is the one that the settings would make (seed 42), not simply the last.
-    assert_eq!(again.state.chosen(RIGHT).unwrap().seed, 42);
+    assert_eq!(again.state.chosen(RIGHT).unwrap().config.seed, 42);
     assert!(again.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
     assert_eq!(again.services.generated(), 0);
     let looked = again.services.looked_up.load(Ordering::Relaxed);
@@ -171,14 +171,14 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     bench.settle();
     let touch = bench.state.touch_key(RIGHT).unwrap();
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
-    assert_eq!(bench.state.recipe(touch).unwrap().steps, 20, "what the bundle recommends");
+    assert_eq!(bench.state.recipe(touch).unwrap().config.steps, 20, "what the bundle recommends");
     let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = fast.clone()));
-    assert!(bench.state.recipe(touch).unwrap().steps <= 4);
+    assert!(bench.state.recipe(touch).unwrap().config.steps <= 4);
     let own = GenerateSettings { steps: 33, ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = own.clone()));
     assert_eq!(bench.state.settings.generate.preset, None);
-    assert_eq!(bench.state.recipe(touch).unwrap().steps, 33);
+    assert_eq!(bench.state.recipe(touch).unwrap().config.steps, 33);
 }
 
 #[test]

@@ -150,13 +150,13 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
     bench.settle();
     assert_eq!(bench.state.inspection().ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);
     send(&mut bench, InspectCommand::Pin);
     let [Some(a), Some(b)] = bench.state.pins() else { panic!("{:?}", bench.state.pins()) };
-    assert_eq!((a.engine, b.engine), (Registration::DistanceField.into(), Registration::LabIcp.into()));
+    assert_eq!((a.registration, b.registration), (Registration::DistanceField.into(), Registration::LabIcp.into()));
     assert_ne!(a.grasp_from_object, b.grasp_from_object);
     // A third takes the place of the older one.
     send(&mut bench, InspectCommand::Begin);

@@ -97,7 +97,7 @@ fn holds(state: &State, after: &str) {
                     "{outdated:?} after {after}"
                 );
                 let model = &state.library.bundle(&shown.bundle).expect("it is there").name;
-                let (steps, seed) = (format!(" {} step", shown.steps), format!("seed {}", shown.seed));
+                let (steps, seed) = (format!(" {} step", shown.config.steps), format!("seed {}", shown.config.seed));
                 for word in [model.as_str(), &steps, &seed] {
                     assert!(outdated.made_with.contains(word), "{word:?} is not in {:?}", outdated.made_with);
                 }
@@ -204,6 +204,6 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
     // Generating asks for what the settings say.
     bench.send(PredictCommand::Generate);
-    assert_eq!((bench.state.chosen(RIGHT).unwrap().seed, bench.state.outdated(RIGHT)), (41, None));
+    assert_eq!((bench.state.chosen(RIGHT).unwrap().config.seed, bench.state.outdated(RIGHT)), (41, None));
     assert_eq!(bench.state.settings.generate.sampler, Sampler::default());
 }

@@ -50,11 +50,11 @@ fn the_pose_follows_the_mask() {
     let after = bench.state.pose(MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
     bench.settle();
     let lab = bench.state.pose(MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(prefer(|s| s.pose_engine = Registration::DistanceField.into()));
+    bench.send(prefer(|s| s.registration = Registration::DistanceField.into()));
     assert!(bench.state.pose(MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
@@ -193,7 +193,7 @@ fn threads_give_the_same_and_wake_the_window() {
         }
     }
     assert_eq!(services.source.loads_of(0), 1);
-    assert_eq!(state.chosen(lab::RIGHT).unwrap().seed, 42);
+    assert_eq!(state.chosen(lab::RIGHT).unwrap().config.seed, 42);
 }
 
 #[test]

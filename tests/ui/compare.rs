@@ -66,7 +66,7 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     let found = state(&rig).subjects_compared(&a, &b, lab::RIGHT).ready().expect("the figures");
     let key = state(&rig).subject_key(&a, lab::RIGHT).unwrap();
     let ImprintKey::Predicted(recipe, ShiftMode::ExactInverse) = &key else { panic!("{key:?}") };
-    assert_eq!(recipe.seed, 7);
+    assert_eq!(recipe.config.seed, 7);
     let measured = state(&rig).imprint(ImprintSource::Measured, lab::RIGHT).ready().unwrap();
     let predicted = state(&rig).subject(&a, lab::RIGHT).ready().unwrap();
     assert_eq!(found.error[(60, 70)], predicted[(60, 70)] - measured[(60, 70)]);

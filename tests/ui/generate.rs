@@ -52,7 +52,7 @@ fn presets_are_one_click_and_show_their_numbers() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     let steps = |rig: &Rig| {
         let state = rig.harness.state().state();
-        state.recipe(state.touch_key(lab::RIGHT).unwrap()).unwrap().steps
+        state.recipe(state.touch_key(lab::RIGHT).unwrap()).unwrap().config.steps
     };
     assert_eq!(steps(&rig), 4, "what the bundle recommends");
     for (label, preset) in [("Fast", Preset::Fast), ("Sharp", Preset::Sharp), ("Default", Preset::Default)] {

@@ -54,7 +54,7 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
 
     // A click on one shows it everywhere; the ones made meanwhile do not.
     let third = recipes[2].clone();
-    click(&mut rig, &format!("Seed {}", third.seed));
+    click(&mut rig, &format!("Seed {}", third.config.seed));
     assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
     rig.send(Command::Seeds(SeedsCommand::Count(12)));
     assert_eq!(there(&rig), 12);

@@ -222,7 +222,7 @@ impl State {
             mask_bundle: origin(BundleKind::Mask),
             classifier: origin(BundleKind::Classifier),
             mask: self.settings.mask.choice,
-            engine: self.settings.pose_engine,
+            engine: self.settings.registration,
             shift: self.settings.shift,
             runtime: self.settings.runtime,
             grasps_per_tool: self.table.grasps_per_tool,

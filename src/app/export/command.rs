@@ -163,7 +163,7 @@ impl State {
         let recipe = self.in_force(imprint);
         match shown {
             Some((bundle, key)) => {
-                Recipe { generator: Some((bundle.into(), key.config())), engine: key.runtime, ..recipe }
+                Recipe { generator: Some((bundle.into(), key.config)), engine: key.runtime, ..recipe }
             }
             None => Recipe { generator: None, ..recipe },
         }

@@ -203,7 +203,7 @@ pub struct PairExport {
     rig: Arc<Rig>,
     clouds: Arc<Clouds>,
     mask: String,
-    engine: RegistrationChoice,
+    registration: RegistrationChoice,
     pose: Option<Arc<PoseResult>>,
     truth: Option<PlanarPose>,
     tool: Option<Arc<NamedTool>>,
@@ -224,7 +224,7 @@ impl PairExport {
             rig: &self.rig,
             clouds: &self.clouds,
             mask: &self.mask,
-            engine: self.engine,
+            engine: self.registration,
             pose: self.pose.as_deref(),
             truth: self.truth,
             tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
@@ -294,7 +294,7 @@ impl State {
         let recipes = self.figure_recipes(&setup);
         let mut said: Vec<String> = Vec::new();
         for (recipe, bundle) in recipes.iter().flat_map(|(_, list)| list) {
-            let text = note(&bundle.name, &recipe.config(), setup.shift);
+            let text = note(&bundle.name, &recipe.config, setup.shift);
             if !said.contains(&text) {
                 said.push(text);
             }
@@ -353,7 +353,7 @@ impl State {
             rig: self.rig(),
             clouds: self.results.clouds.get(&cloud)?.clone(),
             mask: self.masks_made_of(&cloud),
-            engine: self.settings.pose_engine,
+            registration: self.settings.registration,
             pose,
             truth: self.sample().ready()?.grasp_from_object,
             tool: self.tool_key().ok().and_then(|key| self.results.tools.get(&key)).cloned(),
@@ -364,7 +364,7 @@ impl State {
     pub(crate) fn case_setup(&self, camera: &str) -> Option<CaseSetup> {
         let pair = self.selection.pair?;
         let chosen = self.chosen(self.selection.finger).or_else(|| self.rig().pads().find_map(|pad| self.chosen(pad)));
-        let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone().into(), key.config())));
+        let generator = chosen.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone().into(), key.config)));
         // What is of the person stays with the person.
         let settings = self.settings.clone().of_person(&Settings::default());
         let view = CaseView {

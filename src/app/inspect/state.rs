@@ -81,7 +81,7 @@ pub struct Pin {
     /// The imprint.
     pub source: ImprintSource,
     /// The registration.
-    pub engine: RegistrationChoice,
+    pub registration: RegistrationChoice,
     /// The start it belongs to.
     pub run: usize,
     /// Its position in the run.

@@ -10,9 +10,7 @@ use touch2touch_work::recipe::{Model, Recipe};
 impl State {
     /// The recipe that the settings give a touch; `None` without a generator.
     pub fn recipe(&self, touch: TouchKey) -> Option<PredictionKey> {
-        let bundle = self.bundle(BundleKind::Generator).ok()?;
-        let config = self.settings.generate.config(bundle);
-        Some(PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config))
+        PredictionKey::of(touch, &self.in_force(ImprintSource::Predicted))
     }
 
     /// The recipe that the settings give, of an imprint.
@@ -25,7 +23,7 @@ impl State {
             mask: self.settings.mask.choice,
             mask_model: self.bundle(BundleKind::Mask).ok().cloned().map(Model::from),
             hand: true,
-            registration: self.settings.pose_engine,
+            registration: self.settings.registration,
             engine: self.settings.runtime,
         }
     }

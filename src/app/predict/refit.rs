@@ -64,7 +64,7 @@ impl Errand for Refit {
             pairs: pairs.map(|at| PairId(at as u32)).collect(),
             fingers: rig.pad_list(),
             input: ends.ok_or_else(|| TaskError::new(TITLE, "the bundle is not a generator"))?.input,
-            config: recipe.config(),
+            config: recipe.config,
             dataset: source.title().to_owned(),
             bundle,
         };

@@ -22,9 +22,9 @@ impl Computes for BasinKey {
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Basin>> {
         let Registered { clouds, tool, .. } = self.pose.find(state)?;
-        let (engine, plane) = (self.pose.engine, self.plane);
+        let (registration, plane) = (self.pose.registration, self.plane);
         Some(Job::new(Lane::Compute, "Basin map", move |cx| {
-            basin(&clouds.contact_points(), &tool.model, engine, plane, cx)
+            basin(&clouds.contact_points(), &tool.model, registration, plane, cx)
         }))
     }
 

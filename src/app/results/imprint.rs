@@ -94,7 +94,7 @@ impl ImprintKey {
     pub fn of(&self) -> Option<ImprintOf> {
         match self {
             Self::Measured(_) => Some(ImprintOf::Measured),
-            Self::Predicted(recipe, shift) => Some(ImprintOf::predicted(&recipe.bundle, &recipe.config(), *shift)),
+            Self::Predicted(recipe, shift) => Some(ImprintOf::predicted(&recipe.bundle, &recipe.config, *shift)),
             Self::Mean(_) | Self::Picture(_) => None,
         }
     }

@@ -18,9 +18,9 @@ impl Computes for InfluenceKey {
         let Registered { clouds, tool, .. } = self.0.find(state)?;
         let pose = state.results.poses.get(&self.0)?.grasp_from_object;
         let sample = state.results.samples.get(&self.0.cloud.place()?.0)?.clone();
-        let engine = self.0.engine;
+        let registration = self.0.registration;
         Some(Job::new(Lane::Compute, "Influence of the pixels", move |_| {
-            influence(&clouds, &sample, &tool.model, engine, pose)
+            influence(&clouds, &sample, &tool.model, registration, pose)
         }))
     }
 

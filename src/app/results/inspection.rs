@@ -22,10 +22,10 @@ impl Computes for InspectionKey {
     type Value = Inspection;
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
-        let (Registered { clouds, tool, .. }, engine) = (self.0.pose.find(state)?, self.0.pose.engine);
+        let (Registered { clouds, tool, .. }, registration) = (self.0.pose.find(state)?, self.0.pose.registration);
         let run = state.results.runs.get(&self.0)?.clone();
         Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
-            Ok(Inspection::new(run, clouds.contact_points(), &tool.model, engine))
+            Ok(Inspection::new(run, clouds.contact_points(), &tool.model, registration))
         }))
     }
 
@@ -55,7 +55,12 @@ pub struct Inspection {
 
 impl Inspection {
     /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, engine: RegistrationChoice) -> Self {
+    pub fn new(
+        result: Arc<PoseResult>,
+        points: Vec<DVec3>,
+        tool: &ToolModel,
+        registration: RegistrationChoice,
+    ) -> Self {
         let report = &result.report;
         let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
         for (i, step) in report.trace.iter().enumerate() {
@@ -64,7 +69,7 @@ impl Inspection {
             }
             runs[step.run].push(i);
         }
-        Self { result, points, counterparts: Counterparts::new(tool, engine.by), runs }
+        Self { result, points, counterparts: Counterparts::new(tool, registration.by), runs }
     }
 
     /// The registration's report with its trace.

@@ -9,7 +9,7 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::layers::{LayerResult, layers};
 
-/// The layers of a recorded registration from the engine's own starts.
+/// The layers of a recorded registration from the registration's own starts.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct LayersKey(pub PoseKey);
 

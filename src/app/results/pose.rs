@@ -22,7 +22,7 @@ pub struct PoseKey {
     /// The tool.
     pub tool: Arc<str>,
     /// The registration.
-    pub engine: RegistrationChoice,
+    pub registration: RegistrationChoice,
 }
 
 /// What is registered: the inputs of every job about a pose.
@@ -36,9 +36,9 @@ pub(crate) struct Registered {
 impl PoseKey {
     /// The job that registers it.
     fn registering(&self, state: &State, ask: Ask<'static>) -> Option<Job<PoseResult>> {
-        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
+        let (Registered { clouds, tool, truth }, registration) = (self.find(state)?, self.registration);
         Some(Job::new(Lane::Compute, "Pose", move |_| {
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
+            pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
         }))
     }
 
@@ -108,7 +108,7 @@ impl State {
         if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
             return Err(self.rig().pads().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
         }
-        Ok(Some(PoseKey { cloud, tool: tool?.into(), engine: self.settings.pose_engine }))
+        Ok(Some(PoseKey { cloud, tool: tool?.into(), registration: self.settings.registration }))
     }
 
     /// The pose of an imprint.
@@ -165,7 +165,7 @@ impl Demands<'_> {
         let provisional = ProvisionalPoseKey(key.clone());
         let tried =
             results.provisional_poses.contains(&provisional) || self.state.failure(provisional.clone()).is_some();
-        if key.engine.by.may_prove() && !tried && !results.poses.contains(&key) {
+        if key.registration.by.may_prove() && !tried && !results.poses.contains(&key) {
             self.ask(provisional);
         } else {
             self.ask(key);

@@ -4,7 +4,6 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::{Bits64, Sampler, Spacing};
 use super::super::services::{DataSource, Services};
 use super::preview::Onlooker;
 use super::{Computes, Demands, Job, Lane, Results, SharedServices, State, TouchKey};
@@ -19,6 +18,7 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models;
 use touch2touch_work::prediction::Prediction;
+use touch2touch_work::recipe::Recipe;
 
 /// Everything that decides a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -27,53 +27,28 @@ pub struct PredictionKey {
     pub touch: TouchKey,
     /// The bundle's identity (its digest): a changed bundle is another recipe.
     pub bundle: Arc<str>,
-    /// Denoising steps asked for.
-    pub steps: u32,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// The sampler.
-    pub sampler: Sampler,
-    /// DDIM's noise share, 0..1.
-    pub eta: Bits64,
-    /// The training steps visited.
-    pub spacing: Spacing,
-    /// Scale of the guidance; 1 is none.
-    pub guidance: Bits64,
+    /// The choices of the generation.
+    pub config: GenerateConfig,
     /// The model runtime: two of them round differently.
     pub runtime: EngineChoice,
 }
 
 impl PredictionKey {
-    /// The recipe of a touch with a bundle, a runtime and the choices of one generation.
-    pub fn new(touch: TouchKey, bundle: Arc<str>, runtime: EngineChoice, config: &GenerateConfig) -> Self {
-        Self {
-            touch,
-            bundle,
-            steps: config.steps,
-            seed: config.seed,
-            sampler: config.sampler,
-            eta: config.eta.into(),
-            spacing: config.spacing,
-            guidance: config.guidance.into(),
-            runtime,
-        }
+    /// The key of a touch by a recipe; `None` where that has no generator.
+    pub fn of(touch: TouchKey, recipe: &Recipe) -> Option<Self> {
+        let (model, config) = recipe.generator.as_ref()?;
+        Some(Self { touch, bundle: model.id.clone(), config: *config, runtime: recipe.engine })
     }
 
-    /// The recipes that differ from it in their seeds alone: `count` of them, from its own on.
+    /// The keys that differ from it in their seeds alone: `count` of them, from its own on.
     pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
-        seeds(self.seed, count).into_iter().map(|seed| Self { seed, ..self.clone() }).collect()
+        seeds(self.config.seed, count).into_iter().map(|seed| self.with_seed(seed)).collect()
     }
 
-    /// The choices of one generation.
-    pub fn config(&self) -> GenerateConfig {
-        GenerateConfig {
-            steps: self.steps,
-            eta: self.eta.get(),
-            seed: self.seed,
-            sampler: self.sampler,
-            spacing: self.spacing,
-            guidance: self.guidance.get(),
-        }
+    /// The key that differs in its seed alone.
+    #[must_use]
+    pub fn with_seed(&self, seed: u64) -> Self {
+        Self { config: GenerateConfig { seed, ..self.config }, ..self.clone() }
     }
 }
 
@@ -219,7 +194,7 @@ pub fn generate(
         Some(sample) => sample,
         None => Arc::new(source.load(first.touch.pair.pair)?),
     };
-    let (engine, config) = (first.runtime, first.config());
+    let (engine, config) = (first.runtime, first.config);
     let touched = |recipe: PredictionKey| {
         let touch = sample.pad(recipe.touch.finger)?;
         let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
@@ -234,7 +209,7 @@ pub fn generate(
     }
     let wanted = |key: &PredictionKey| {
         let (picture, size) = &pictures[&key.touch.finger];
-        models::GenerateInput { difference: picture, seed: key.seed, size: *size }
+        models::GenerateInput { difference: picture, seed: key.config.seed, size: *size }
     };
     let wanted: Vec<models::GenerateInput<'_>> = keys.iter().map(wanted).collect();
     if keys.is_empty() {

@@ -50,8 +50,9 @@ impl State {
     /// What a prediction made as this one would be cost on this machine, seconds: the median of those of the open data
     /// set; `None` if there are none.
     pub fn cost_of(&self, recipe: &PredictionKey) -> Option<f64> {
-        let same =
-            |made: &PredictionKey| PredictionKey { touch: recipe.touch, seed: recipe.seed, ..made.clone() } == *recipe;
+        let same = |made: &PredictionKey| {
+            PredictionKey { touch: recipe.touch, ..made.with_seed(recipe.config.seed) } == *recipe
+        };
         let made = self.results.predictions.iter().filter(|(key, _)| same(key));
         let mut seconds: Vec<f64> = made.map(|(_, prediction)| prediction.seconds).collect();
         seconds.sort_by(f64::total_cmp);

@@ -11,7 +11,7 @@ use touch2touch_work::pose::{PoseResult, pose};
 pub struct RunKey {
     /// What is registered, and how.
     pub pose: PoseKey,
-    /// Where it starts (`grasp_from_object`); `None` = where the engine starts by itself.
+    /// Where it starts (`grasp_from_object`); `None` = where the registration starts by itself.
     pub start: Option<PoseBits>,
 }
 
@@ -20,10 +20,10 @@ impl Computes for RunKey {
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
         let Registered { clouds, tool, truth } = self.pose.find(state)?;
-        let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
+        let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
+            pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
         }))
     }
 
@@ -33,7 +33,7 @@ impl Computes for RunKey {
 }
 
 impl State {
-    /// The recorded registration from the engine's own starts; `None` while its inputs are not there.
+    /// The recorded registration from the registration's own starts; `None` while its inputs are not there.
     pub(crate) fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
         Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
     }

@@ -127,7 +127,7 @@ impl State {
 
     /// How a prediction was made, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
     pub fn made_with(&self, recipe: &PredictionKey) -> String {
-        made_with(self.model_name(recipe), &recipe.config())
+        made_with(self.model_name(recipe), &recipe.config)
     }
 
     /// The name of the model that made a prediction.

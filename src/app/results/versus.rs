@@ -172,7 +172,7 @@ impl State {
         let mut config = self.settings.generate.config(bundle);
         config.steps = wish.steps.unwrap_or(config.steps);
         config.seed = wish.seed.unwrap_or(config.seed);
-        let key = PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config);
+        let key = PredictionKey { touch, bundle: bundle.id.clone(), config, runtime: self.settings.runtime };
         if self.is_color(&key) {
             return Err(Absent::PredictsColor);
         }
@@ -264,7 +264,7 @@ impl State {
 
     fn subject_pose_key(&self, subject: &Subject) -> Option<PoseKey> {
         let cloud = self.subject_cloud(subject).ok()?;
-        Some(PoseKey { cloud, tool: self.tool_name().ok()?.into(), engine: self.settings.pose_engine })
+        Some(PoseKey { cloud, tool: self.tool_name().ok()?.into(), registration: self.settings.registration })
     }
 
     /// The pose of a subject, where it is there.

@@ -89,7 +89,7 @@ impl State {
 
     fn seed_pose_key(&self, at: usize) -> Option<PoseKey> {
         let tool = self.tool_name().ok()?.into();
-        Some(PoseKey { cloud: self.seed_cloud(at).ok()?, tool, engine: self.settings.pose_engine })
+        Some(PoseKey { cloud: self.seed_cloud(at).ok()?, tool, registration: self.settings.registration })
     }
 
     /// The pose of each seed, where it is there.

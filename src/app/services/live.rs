@@ -286,7 +286,7 @@ impl Services for LiveServices {
     ) -> Vec<(PredictionKey, Prediction)> {
         let keyed = |kept: KeptPrediction| {
             let bundle = kept.prediction.bundle.clone();
-            (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
+            (PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine }, kept.prediction)
         };
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }

@@ -61,7 +61,8 @@ pub struct Settings {
     /// The mask tools.
     pub mask: MaskSettings,
     /// The registration.
-    pub pose_engine: RegistrationChoice,
+    #[serde(rename = "pose_engine")]
+    pub registration: RegistrationChoice,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
@@ -132,7 +133,7 @@ impl Default for Settings {
             refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
-            pose_engine: RegistrationChoice::default(),
+            registration: RegistrationChoice::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),

@@ -204,7 +204,7 @@ fn curve(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize, shown: boo
 fn pins(cx: &Cx<'_>, painter: &Painter, plot: &Plot<'_>) {
     for (i, pin) in cx.state.pins().into_iter().enumerate() {
         let Some(pin) = pin else { continue };
-        let here = pin.source == cx.state.inspect.source && pin.engine == cx.state.settings.pose_engine;
+        let here = pin.source == cx.state.inspect.source && pin.registration == cx.state.settings.registration;
         let step = plot.inspection.step(pin.run, pin.at).filter(|s| s.grasp_from_object == pin.grasp_from_object);
         if let (true, Some(step)) = (here, step) {
             let at = plot.cost_at(pin.at, step);

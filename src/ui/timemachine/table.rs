@@ -56,7 +56,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         let of = |p: Pin| column(p.grasp_from_object, Some(p.cost_m2));
         let mut difference = minus(of(b), of(a));
         // Costs of different kernels are not of one kind.
-        if a.kernel_m != b.kernel_m || a.engine != b.engine {
+        if a.kernel_m != b.kernel_m || a.registration != b.registration {
             difference[3] = None;
         }
         columns.push(("B − A", cx.p.strong, difference));
@@ -141,8 +141,8 @@ fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, StepFigures)],
             let response = ui.interact(place, ui.scope_id().with(("unpin", pin)), Sense::click());
             response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Let pin {name} go")));
             let about = pins[pin].map_or(String::new(), |p| {
-                let engine = p.engine.label();
-                format!("{}: {engine}, start {}, step {}. Click to let it go", p.source.name(), p.run + 1, p.at)
+                let registration = p.registration.label();
+                format!("{}: {registration}, start {}, step {}. Click to let it go", p.source.name(), p.run + 1, p.at)
             });
             if response.on_hover_text(about).clicked() {
                 cx.push(Command::Inspect(InspectCommand::Unpin(pin)));

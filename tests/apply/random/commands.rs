@@ -100,7 +100,7 @@ fn touch() -> impl Strategy<Value = TouchKey> {
 fn recipe() -> impl Strategy<Value = PredictionKey> {
     let recipe = |(touch, seed)| {
         let config = GenerateConfig { steps: 20, seed, ..GenerateConfig::default() };
-        PredictionKey::new(touch, "gen".into(), EngineChoice::Auto, &config)
+        PredictionKey { touch, bundle: "gen".into(), config, runtime: EngineChoice::Auto }
     };
     (touch(), 40u64..50).prop_map(recipe)
 }
@@ -231,7 +231,7 @@ fn change() -> impl Strategy<Value = Change> {
             })
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
-        1 => registration().prop_map(|v| prefer(move |s| s.pose_engine = v)),
+        1 => registration().prop_map(|v| prefer(move |s| s.registration = v)),
         1 => any_of::<EngineChoice>().prop_map(|v| prefer(move |s| s.runtime = v)),
         1 => person.prop_map(|v| prefer(move |s| s.person = v.clone())),
         1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
