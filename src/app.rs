@@ -26,7 +26,6 @@ pub mod effect;
 pub mod evaluate;
 pub mod export;
 pub mod follow;
-pub mod history;
 pub mod inspect;
 pub mod jobs;
 pub mod keys;

@@ -9,16 +9,16 @@ use super::command::{
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
     UiRequest, ViewCommand, WorkbenchCommand,
 };
-use super::export::state::Output;
-use super::inspect::state::Inspected;
 use super::keys::{ImprintSource, Request, ShiftMode};
-use super::labels::state::Review;
-use super::library::state::Place;
-use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
-use super::settings::state::{ColorRange, MaskTool, Workspace};
+use super::state::export::Output;
+use super::state::inspect::Inspected;
+use super::state::labels::Review;
+use super::state::library::Place;
+use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
+use super::state::settings::{ColorRange, MaskTool, Workspace};
+use super::state::tasks::TaskKind;
+use super::state::workbench::{SceneTool, Section};
 use super::state::{Absent, State};
-use super::tasks::state::TaskKind;
-use super::workbench::state::{SceneTool, Section};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 

@@ -1,10 +1,8 @@
 //! The room of fitting a generator to one's own pairs.
 
-pub mod state;
-
-pub use state::AdaptPairs;
-pub(crate) use state::AdaptState;
-pub(crate) use state::TUNING_STEPS;
+pub use super::state::adapt::AdaptPairs;
+pub(crate) use super::state::adapt::AdaptState;
+pub(crate) use super::state::adapt::TUNING_STEPS;
 
 use std::sync::Arc;
 
@@ -12,8 +10,8 @@ use super::effect::{Access, Effect, Errand};
 use super::services::DataSource;
 use super::settings::{self, prefer};
 use super::state::State;
+use super::state::tasks::{Level, TaskKind};
 use super::tasks;
-use super::tasks::state::{Level, TaskKind};
 use touch2touch_work::adapt::{self, AdaptSetup, Adapted};
 use touch2touch_work::bundles::{self, BundleInfo};
 use touch2touch_work::error::TaskError;

@@ -1,9 +1,7 @@
 //! The room of the dial: what a choice does to all pairs.
 
-pub mod state;
-
-pub use state::DialPairs;
-pub(crate) use state::DialState;
+pub use super::state::dial::DialPairs;
+pub(crate) use super::state::dial::DialState;
 
 use std::sync::Arc;
 
@@ -11,8 +9,8 @@ use super::effect::{Access, Effect, Errand};
 use super::services::DataSource;
 use super::settings::{self, prefer};
 use super::state::State;
+use super::state::tasks::{Level, TaskKind};
 use super::tasks;
-use super::tasks::state::{Level, TaskKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::recipe::Recipe;

@@ -5,13 +5,13 @@ use std::sync::Arc;
 
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Revision};
-use super::labels::state::PairLabels;
 use super::results::preview::Onlooker;
 use super::services::{DataSource, SharedServices};
-use super::settings::state::Settings;
 use super::state::State;
-use super::tasks::state::{TaskKind, Ticket};
-use super::view::state::UiRequest;
+use super::state::labels::PairLabels;
+use super::state::settings::Settings;
+use super::state::tasks::{TaskKind, Ticket};
+use super::state::view::UiRequest;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{Operation, Unsaved};

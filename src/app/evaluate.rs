@@ -1,10 +1,8 @@
 //! The room of the results table.
 
-pub mod state;
-
-pub(crate) use state::GRASPS;
-pub use state::ScoreChoice;
-pub(crate) use state::{Grade, ScoreTable, SourceScores};
+pub(crate) use super::state::evaluate::GRASPS;
+pub use super::state::evaluate::ScoreChoice;
+pub(crate) use super::state::evaluate::{Grade, ScoreTable, SourceScores};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -13,8 +11,8 @@ use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
 use super::services::DataSource;
 use super::state::State;
+use super::state::tasks::{Level, TaskKind};
 use super::tasks;
-use super::tasks::state::{Level, TaskKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::evaluate::{self, Evaluation, Setup};
 use touch2touch_work::job::{JobCx, Progress};

@@ -1,11 +1,10 @@
 //! The room of what is taken away: figures and pictures.
 
 mod command;
-pub mod state;
 
-pub(crate) use state::{CaseView, ImportForm};
-pub use state::{FigureForm, Output};
-pub(crate) use state::{MOST_PAIRS, SCALES};
+pub(crate) use super::state::export::{CaseView, ImportForm};
+pub use super::state::export::{FigureForm, Output};
+pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,11 +14,11 @@ use super::jobs::Lane;
 use super::keys::{ImprintSource, PredictionKey};
 use super::labels::ImportMasks;
 use super::results::prediction::generate;
-use super::settings::state::GenerateSettings;
 use super::state::State;
-use super::tasks::state::TaskKind;
+use super::state::settings::GenerateSettings;
+use super::state::tasks::TaskKind;
+use super::state::view::UiRequest;
 use super::tasks::{self, Write};
-use super::view::state::UiRequest;
 use super::{library, predict, settings};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;

@@ -2,11 +2,11 @@
 
 use super::effect::Effect;
 use super::keys::Request;
-use super::library::state::Follow;
 use super::results::Results;
 use super::services::Followed;
 use super::state::State;
-use super::tasks::state::Ticket;
+use super::state::library::Follow;
+use super::state::tasks::Ticket;
 use super::{library, predict};
 use touch2touch_work::error::TaskError;
 

@@ -1,9 +1,7 @@
 //! The room of the time machine and the basin map: moving about in what was recorded.
 
-pub mod state;
-
-pub use state::{BasinColor, Inspect, Pin};
-pub(crate) use state::{Inspected, Inspection};
+pub use super::state::inspect::{BasinColor, Inspect, Pin};
+pub(crate) use super::state::inspect::{Inspected, Inspection};
 
 use super::keys::{ImprintSource, Request};
 use super::state::State;

@@ -3,13 +3,12 @@
 mod batch;
 pub mod ghost;
 mod repeat;
-pub mod state;
 pub(super) mod unsaved;
 
+pub(crate) use super::state::labels::{Changed, Merged};
+pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 pub use batch::{ImportMasks, ProposeAll};
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
-pub(crate) use state::{Changed, Merged};
-pub use state::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 pub use unsaved::UnsavedCommand;
 
 use std::borrow::Cow;
@@ -17,11 +16,11 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::effect::{Effect, LabelsToSave};
-use super::history::{Edit, Gesture, KeptMask};
 use super::keys::ImprintSource;
 use super::settings;
+use super::state::history::{Edit, Gesture, KeptMask};
+use super::state::tasks::Level;
 use super::state::{Lookup, State};
-use super::tasks::state::Level;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Sight, VisiblePixels};
 use touch2touch_core::manual::AcceptedPose;

@@ -1,9 +1,7 @@
 //! The room of the open data set and its list.
 
-pub mod state;
-
-pub(crate) use state::OpenDataset;
-pub use state::{Follow, Library, Place, Sort, short_name};
+pub(crate) use super::state::library::OpenDataset;
+pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -12,14 +10,14 @@ use std::sync::Arc;
 use super::adapt::AdaptState;
 use super::dial::DialState;
 use super::effect::{Access, Effect, Errand};
-use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
-use super::labels::state::{Document, Review};
 use super::results::{Request, Results};
 use super::services::{DataSource, Opened};
-use super::settings::state::MAX_RECENT;
 use super::state::State;
-use super::tasks::state::{Level, TaskKind};
+use super::state::evaluate::ScoreChoice;
+use super::state::labels::{Document, Review};
+use super::state::settings::MAX_RECENT;
+use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;

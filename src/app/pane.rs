@@ -2,7 +2,7 @@
 //! window and what is computed while a pane is on screen all follow from its row.
 
 use super::keys::ImprintSource;
-use super::settings::state::Workspace;
+use super::state::settings::Workspace;
 
 /// What a pane shows, as far as mouse, colors and links between panes depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

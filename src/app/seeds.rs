@@ -1,8 +1,6 @@
 //! The room of several seeds of one touch.
 
-pub mod state;
-
-pub use state::{COUNT, Seeds};
+pub use super::state::seeds::{COUNT, Seeds};
 
 use super::state::State;
 

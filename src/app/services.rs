@@ -10,9 +10,9 @@ use std::sync::{Arc, LazyLock};
 use std::time::Duration;
 
 use super::keys::{PredictionKey, TouchKey};
-use super::labels::state::{PairLabels, Review};
-use super::library::state::Place;
-use super::settings::state::Settings;
+use super::state::labels::{PairLabels, Review};
+use super::state::library::Place;
+use super::state::settings::Settings;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;

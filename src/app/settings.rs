@@ -1,11 +1,9 @@
 //! The room of the preferences. Each change is saved.
 
-pub mod state;
-
-pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
-pub use state::versus::{Versus, VersusMode};
-pub(crate) use state::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
-pub use state::{
+pub use super::state::settings::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
+pub use super::state::settings::versus::{Versus, VersusMode};
+pub(crate) use super::state::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
+pub use super::state::settings::{
     ColorMap, ColorRange, GenerateSettings, Last, MaskChoice, MaskSettings, MaskSource, MaskTool, ProposalSource,
     Settings, Theme, ToolRow, Workspace,
 };

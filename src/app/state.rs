@@ -2,26 +2,41 @@
 
 use std::sync::Arc;
 
-use super::adapt::state::AdaptState;
-use super::dial::state::DialState;
-use super::evaluate::state::TableState;
-use super::export::state::ExportState;
-use super::history::History;
-use super::inspect::state::Inspect;
+pub mod adapt;
+pub mod dial;
+pub mod evaluate;
+pub mod export;
+pub mod history;
+pub mod inspect;
+pub mod labels;
+pub mod library;
+pub mod seeds;
+pub mod settings;
+pub mod tasks;
+pub mod train;
+pub mod view;
+pub mod workbench;
+
 use super::keys::{PairKey, TouchKey};
-use super::labels::state::Document;
-use super::library::state::Library;
 use super::pane::Demand;
 use super::results::Results;
-use super::seeds::state::Seeds;
-use super::settings::state::Settings;
-use super::tasks::state::{Log, Tasks};
-use super::train::state::TrainState;
-use super::view::state::Selection;
-use super::workbench::state::Workbench;
+use adapt::AdaptState;
+use dial::DialState;
+use evaluate::TableState;
+use export::ExportState;
+use history::History;
+use inspect::Inspect;
+use labels::Document;
+use library::Library;
+use seeds::Seeds;
+use settings::Settings;
+use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
 use touch2touch_core::rig::{PadId, Rig, Text};
 use touch2touch_work::error::TaskError;
+use train::TrainState;
+use view::Selection;
+use workbench::Workbench;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]

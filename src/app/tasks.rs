@@ -1,11 +1,9 @@
 //! The room of running jobs and the log.
 
-pub mod state;
-
 use std::path::PathBuf;
 
-pub(crate) use state::Task;
-pub use state::{Entry, Level, Log, TaskKind, Tasks, Ticket};
+pub(crate) use super::state::tasks::Task;
+pub use super::state::tasks::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 
 use super::effect::{Access, Effect, Errand, Started};
 use super::jobs::Lane;

@@ -1,21 +1,18 @@
 //! The room of training a mask model on the masks that people corrected.
 
-pub mod state;
-
-pub use state::TrainForm;
-pub(crate) use state::TrainState;
-pub(crate) use state::{MINUTES, STEPS};
+pub use super::state::train::TrainForm;
+pub(crate) use super::state::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainState};
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
-use super::labels::state::PairLabels;
 use super::services::DataSource;
 use super::settings::{self, prefer};
 use super::state::State;
+use super::state::labels::PairLabels;
+use super::state::tasks::{Level, TaskKind};
 use super::tasks;
-use super::tasks::state::{Level, TaskKind};
 use touch2touch_work::bundles::{self, BundleInfo};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::DrawnMasks;

@@ -1,8 +1,6 @@
 //! The room of what is on screen.
 
-pub mod state;
-
-pub use state::{CameraPreset, Hover, UiRequest};
+pub use super::state::view::{CameraPreset, Hover, UiRequest};
 
 use std::collections::BTreeSet;
 
@@ -12,8 +10,8 @@ use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::labels;
 use super::pane::Pane;
-use super::settings::state::Workspace;
 use super::state::State;
+use super::state::settings::Workspace;
 use touch2touch_core::rig::PadId;
 
 /// What can happen to what is on screen.

@@ -1,9 +1,7 @@
 //! The room of the workbench: layers, poses by hand, measuring.
 
-pub mod state;
-
-pub(crate) use state::SECTION_REACH_M;
-pub use state::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
+pub(crate) use super::state::workbench::SECTION_REACH_M;
+pub use super::state::workbench::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 

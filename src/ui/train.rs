@@ -10,7 +10,7 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
-use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
+use crate::app::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainForm};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::train::{MaskScore, Trained};

@@ -1,12 +1,12 @@
 //! The command that does in a shell what a pane shows: [`State::equivalent`].
 
-use super::super::adapt::state::AdaptPairs;
 use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode};
-use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
-use super::super::settings::state::ColorMap;
 use super::super::state::State;
+use super::super::state::adapt::AdaptPairs;
+use super::super::state::library::Place;
+use super::super::state::settings::ColorMap;
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};

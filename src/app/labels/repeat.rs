@@ -4,8 +4,8 @@
 //! studio has to know. When it is done and left, it is forgotten, and read again as it was.
 
 use super::super::state::State;
+use super::super::state::labels::Repeating;
 use super::Review;
-use super::state::Repeating;
 use touch2touch_core::dataset::PairId;
 
 /// So many pairs are done between two that come back.

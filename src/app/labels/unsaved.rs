@@ -2,13 +2,13 @@
 
 use std::path::PathBuf;
 
-use super::state::Question;
+use super::super::state::labels::Question;
 use super::{end_stroke, save_again};
 use crate::app::effect::{Effect, NotSaved};
 use crate::app::keys::Revision;
 use crate::app::state::State;
-use crate::app::tasks::state::Level;
-use crate::app::view::state::UiRequest;
+use crate::app::state::tasks::Level;
+use crate::app::state::view::UiRequest;
 use touch2touch_work::error::TaskErrorKind;
 use touch2touch_work::labels::{Operation, Unsaved};
 

@@ -7,7 +7,7 @@ use super::super::effect::{Access, Effect, Errand};
 use super::super::keys::{PredictionKey, ShiftMode};
 use super::super::services::DataSource;
 use super::super::state::State;
-use super::super::tasks::state::TaskKind;
+use super::super::state::tasks::TaskKind;
 use super::super::{settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;

@@ -1,7 +1,7 @@
 //! What an import of masks would change.
 
-use super::super::export::state::ImportForm;
 use super::super::keys::{DatasetSeq, Revision};
+use super::super::state::export::ImportForm;
 use super::{Computes, Demands, Job, Lane, SharedServices, State};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::import::{Import, plan_import};

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use super::super::labels::state::{PairLabels, Stored};
-use super::super::tasks::state::Level;
+use super::super::state::labels::{PairLabels, Stored};
+use super::super::state::tasks::Level;
 use super::{Computes, Job, Lane, PairKey, SharedServices, State};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::JournalHistory;

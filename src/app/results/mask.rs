@@ -5,9 +5,9 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{MaskRecipe, Revision};
-use super::super::labels::state::{DrawnMask, MaskPlace};
 use super::super::pane::Pane;
-use super::super::tasks::state::Level;
+use super::super::state::labels::{DrawnMask, MaskPlace};
+use super::super::state::tasks::Level;
 use super::Request;
 use super::imprint::ImprintKey;
 use super::tool::ToolKey;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::keys::RegistrationChoice;
-use super::super::workbench::state::PoseOf;
+use super::super::state::workbench::PoseOf;
 use super::cloud::CloudKey;
 use super::tool::ToolKey;
 use super::{Absent, Computed, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use super::super::keys::{MaskRecipe, Revision};
-use super::super::labels::state::{MaskPlace, Stored};
 use super::super::pane::Demand;
+use super::super::state::labels::{MaskPlace, Stored};
 use super::imprint::ImprintKey;
 use super::mask::{MaskKey, MaskVersion};
 use super::pose::PoseKey;

@@ -1,7 +1,7 @@
 //! The scores that are kept of the open data set.
 
-use super::super::evaluate::state::ScoreTable;
 use super::super::pane::Demand;
+use super::super::state::evaluate::ScoreTable;
 use super::{Computes, DatasetSeq, Demands, Job, Lane, SharedServices, State};
 use std::sync::Arc;
 use touch2touch_work::evaluate::{self, Setup};

@@ -2,7 +2,7 @@
 
 use super::super::keys::{DatasetSeq, Revision};
 use super::super::pane::Demand;
-use super::super::tasks::state::TaskKind;
+use super::super::state::tasks::TaskKind;
 use super::{Computes, Demands, Job, Lane, SharedServices, State};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::DrawnMasks;

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::super::keys::ShiftMode;
 use super::super::pane::Demand;
-use super::super::settings::state::versus::{Versus, VersusMode};
+use super::super::state::settings::versus::{Versus, VersusMode};
 use super::cloud::CloudKey;
 use super::imprint::{EnsembleKey, Imprint, ImprintKey, MetersKey};
 use super::mask::MaskKey;

@@ -10,10 +10,10 @@ use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::{PairLabels, Review};
-use super::super::library::state::Place;
 use super::super::services::Opened;
-use super::super::settings::state::{SETTINGS_VERSION, Settings};
+use super::super::state::labels::{PairLabels, Review};
+use super::super::state::library::Place;
+use super::super::state::settings::{SETTINGS_VERSION, Settings};
 use super::{DataSource, Following, Services};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::state::State;
+use super::State;
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{Condition, GraspScore, Metric, Row, Scores, paper_rows};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};

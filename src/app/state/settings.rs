@@ -10,7 +10,7 @@ use strum::EnumIter;
 
 use super::super::action::{Action, Bindings};
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
-use super::super::library::state::Place;
+use super::library::Place;
 use scene::SceneLook;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::super::state::State;
-use super::super::tasks::state::TaskKind;
+use super::State;
+use super::tasks::TaskKind;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::job::Curve;
 use touch2touch_work::train::{TrainChoice, TrainSetup, Trained};

@@ -4,7 +4,7 @@ use super::super::demand::Demands;
 use super::super::keys::{CloudKey, ImprintKey, MaskKey, MetersKey, PoseKey, PredictionKey, Request};
 use super::super::pane::Demand;
 use super::super::results::prediction::SeedKey;
-use super::super::state::{Absent, State};
+use super::{Absent, State};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::pose::PoseResult;

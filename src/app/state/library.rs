@@ -8,11 +8,11 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::evaluate::state::TableState;
 use super::super::keys::{DatasetSeq, PairKey};
-use super::super::labels::state::Document;
 use super::super::services::DataSource;
-use super::super::state::State;
+use super::State;
+use super::evaluate::TableState;
+use super::labels::Document;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
 use touch2touch_core::rig::Rig;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::state::State;
+use super::State;
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pairs;

@@ -7,7 +7,7 @@ use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
 use super::super::pane::Demand;
-use super::super::state::State;
+use super::State;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::{AcceptedPose, ManualCost, ManualPose, PoseDifference};
 use touch2touch_core::rig::{PadId, Rig};

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::super::jobs::Lane;
 use super::super::keys::{DatasetSeq, PredictionKey, Request};
-use super::super::state::State;
+use super::State;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
 

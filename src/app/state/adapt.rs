@@ -3,9 +3,9 @@
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use super::super::labels::state::Review;
-use super::super::state::State;
-use super::super::tasks::state::TaskKind;
+use super::State;
+use super::labels::Review;
+use super::tasks::TaskKind;
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, HeldBack, Tuning};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};

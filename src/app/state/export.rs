@@ -8,8 +8,8 @@ use strum::IntoEnumIterator as _;
 
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
 use super::super::pane::{Kind, Pane};
-use super::super::settings::state::{ColorMap as MapChoice, Settings};
-use super::super::state::State;
+use super::State;
+use super::settings::{ColorMap as MapChoice, Settings};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
