@@ -11,11 +11,13 @@ use super::adapt::AdaptState;
 use super::dial::DialState;
 use super::effect::{Access, Effect, Errand};
 use super::keys::DatasetSeq;
-use super::results::{Request, Results};
-use super::services::{DataSource, Opened};
+use super::services::Opened;
+use super::source::DataSource;
 use super::state::State;
 use super::state::evaluate::ScoreChoice;
 use super::state::labels::{Document, Review};
+use super::state::results::Request;
+use super::state::results::Results;
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
@@ -352,7 +354,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     labels::end_stroke(state, effects);
     // What is being written goes on; what could not be would be forgotten.
     let failed = state.document.failed.clone();
-    let unsaved: Vec<_> = state.unsaved().into_iter().filter(|one| failed.contains_key(&one.name)).collect();
+    let unsaved: Vec<_> = labels::unsaved(state).into_iter().filter(|one| failed.contains_key(&one.name)).collect();
     if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
         effects.push(Effect::keep_waiting(open.source.clone(), unsaved));
     }

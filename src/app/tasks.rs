@@ -57,7 +57,7 @@ pub(super) fn start<'a, E: Errand>(
     errand: E,
     effects: &mut Vec<Effect>,
 ) -> Option<&'a mut Task> {
-    if E::KIND.lane() == Lane::Batch && state.running(E::KIND).is_some() {
+    if E::KIND.lane() == Lane::Batch && state.tasks.of_kind(E::KIND).is_some() {
         return None;
     }
     state.tasks.last_ticket += 1;

@@ -9,9 +9,8 @@ use glam::DVec3;
 use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::labels;
-use super::pane::Pane;
+use super::pane::{Pane, Workspace};
 use super::state::State;
-use super::state::settings::Workspace;
 use touch2touch_core::rig::PadId;
 
 /// What can happen to what is on screen.

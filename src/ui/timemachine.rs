@@ -3,6 +3,7 @@
 mod plot;
 mod table;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Color32, ComboBox, Layout, Pos2, Rect, RichText, Shape, Slider, Stroke, Ui, UiBuilder, pos2, vec2,
@@ -43,8 +44,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         ui.set_min_size(full.size());
         row(ui, Rect::from_min_size(full.min, vec2(full.width(), ROW)), |ui| header(cx, ui));
         let body = Rect::from_min_max(pos2(full.left(), full.top() + ROW + 2.0), full.max);
-        let lookup = cx.state.inspection();
-        match (lookup, cx.state.inspected()) {
+        let lookup = results::inspection(cx.state);
+        match (lookup, results::inspected(cx.state)) {
             (Lookup::Failed(err), _) => {
                 let (why, own) = (err.why.clone(), cx.state.inspect.start.is_some());
                 let action = own.then(|| (Action::OwnStarts.name(), Action::OwnStarts.tooltip()));
@@ -161,7 +162,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// One button per start; the winner is marked.
 fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let Some(shown) = cx.state.inspected() else { return };
+    let Some(shown) = results::inspected(cx.state) else { return };
     ui.label(caption("start", cx.p));
     let inspection = shown.inspection.clone();
     /// More do not fit beside each other: they are chosen in the curves.

@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::super::effect::{Access, Effect, Errand};
 use super::super::keys::{PredictionKey, ShiftMode};
-use super::super::services::DataSource;
+use super::super::source::DataSource;
 use super::super::state::State;
 use super::super::state::tasks::TaskKind;
-use super::super::{settings, tasks};
+use super::super::{recipe, results, settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
@@ -27,7 +27,7 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     if state.tasks.running.values().any(|task| task.kind == TaskKind::Refit && !task.cancelling) {
         return;
     }
-    let ready = state.can_generate().and_then(|()| state.bundle(BundleKind::Generator).cloned());
+    let ready = results::can_generate(state).and_then(|()| recipe::bundle(state, BundleKind::Generator).cloned());
     let bundle = match ready {
         Ok(bundle) => bundle,
         Err(absent) => return state.log.error(&TaskError::new(TITLE, absent.text().trim_end_matches('.'))),
@@ -37,7 +37,7 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     else {
         return;
     };
-    let Some(recipe) = state.recipe(touch) else { return };
+    let Some(recipe) = recipe::prediction(state, touch) else { return };
     let title = format!("{TITLE} of {}", source.title());
     tasks::start(state, title, Refit { recipe, bundle, source }, effects);
 }

@@ -5,7 +5,7 @@ use std::sync::mpsc::Sender;
 
 use super::super::answers::Answer;
 use super::super::keys::DatasetSeq;
-use super::super::services::{DataSource, Following};
+use super::super::source::{DataSource, Following};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
 use touch2touch_work::error::TaskError;

@@ -5,6 +5,7 @@ use eframe::egui::{self, Align2, Color32, FontId, Role, Sense, Ui, WidgetInfo, p
 use super::pose_text;
 use crate::app::command::Command;
 use crate::app::inspect::{InspectCommand, Inspected, Pin};
+use crate::app::results;
 use crate::ui::cx::Cx;
 use crate::ui::scene;
 use crate::ui::theme::{SMALL, caption};
@@ -41,8 +42,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     ui.spacing_mut().item_spacing.y = 0.0;
     let step = shown.step;
     let now = column(step.grasp_from_object, Some(step.cost_m2));
-    let truth = cx.state.truth();
-    let pins = cx.state.pins();
+    let truth = results::truth(cx.state);
+    let pins = cx.state.inspect.pins_of(cx.state.pair_key());
     let mut columns: Vec<(&str, Color32, StepFigures)> = vec![("now", cx.p.strong, now)];
     if let Some(truth) = truth {
         columns.push(("− true", cx.p.truth, minus(now, column(truth, None))));

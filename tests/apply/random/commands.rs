@@ -21,20 +21,19 @@ use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
+use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
-    TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, StrokeIn3d};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
-use touch2touch::app::results::ambiguity::AmbiguityKey;
-use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource,
     MaskTool, SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
+use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::train::{Train, TrainForm};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};

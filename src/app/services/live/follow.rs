@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::sync::{Arc, Mutex};
 use std::time::Instant;
 
-use super::super::{DataSource, Followed, Following};
+use super::super::super::source::{DataSource, Followed, Following};
 use super::LiveSource;
 use touch2touch_core::dataset::Problem;
 use touch2touch_work::error::TaskError;
