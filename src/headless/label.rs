@@ -87,7 +87,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
     Ok(complete)
 }
 
-/// What masks and poses of a pair are made from.
+/// Inputs that masks and poses of a pair are made from.
 struct Maker<'a> {
     args: &'a LabelArgs,
     dataset: &'a Dataset,
@@ -125,7 +125,7 @@ impl<'a> Maker<'a> {
         Ok(felt.pose().map_err(Clone::clone)?.grasp_from_object)
     }
 
-    /// What `--propose` asks for, for pads of the pair; `felt` are its imprints.
+    /// Proposals that `--propose` asks for, for pads of the pair; `felt` are its imprints.
     fn proposals(
         &self,
         all: &Labels,

@@ -59,8 +59,8 @@ pub(super) struct WatchArgs {
     /// The registration.
     #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = EnginesParser)]
     engine: Engines,
-    /// What is written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001 mm
-    /// steps from -20 mm) as .png.
+    /// Files that are written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001
+    /// mm steps from -20 mm) as .png.
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Save::Npz, Save::Png])]
     save: Vec<Save>,
     /// Take up what lies there already as well, unless it was done with the same recipe.
@@ -69,7 +69,7 @@ pub(super) struct WatchArgs {
     /// Take up what lies there, and end.
     #[arg(long)]
     once: bool,
-    /// How long a file that cannot be read may stay unchanged before it counts as broken, seconds.
+    /// Time that a file that cannot be read may stay unchanged before it counts as broken, seconds.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     patience: f64,
     #[command(flatten)]
@@ -78,7 +78,7 @@ pub(super) struct WatchArgs {
     common: Common,
 }
 
-/// What a touch was when it was done: with the same numbers and the same recipe it need not be done again.
+/// File of a touch when it was done: with the same numbers and the same recipe it need not be done again.
 #[derive(Debug, Clone, Serialize)]
 struct Source {
     file: String,
