@@ -44,9 +44,7 @@ fn held(verb: &str) -> Option<Held> {
             super::two_predictions_are_compared_by_one_function,
         ]),
         "ledger" => By(&[chain::a_random_recipe_has_the_same_depth_chain_in_the_pane_and_by_the_verb]),
-        "stats" => {
-            By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same])
-        }
+        "stats" => By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same]),
         "watch" => By(&[watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
         "sweep" => By(&[

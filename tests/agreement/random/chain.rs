@@ -5,6 +5,7 @@ use touch2touch::app::seeds::SeedsCommand;
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::ensemble::AngleFan;
 use touch2touch_core::units::angle_error;
+use touch2touch_work::io::names::Outputs;
 use touch2touch_work::ledger::LedgerResult;
 use touch2touch_work::recipe::Stage;
 
@@ -115,7 +116,8 @@ pub(in crate::agreement) fn the_seeds_of_a_random_recipe_have_one_mean_spread_an
             let spread = [found.spread.mean_std(), found.spread.max_std()];
             count += same(&written(&spread[0]), &figures["spread_mean_m"], "mean spread");
             count += same(&written(&spread[1]), &figures["spread_max_m"], "largest spread");
-            let stem = format!("{}_{}", both.at("predictions/") + state.pair_name(), state.finger_name(finger));
+            let stem = Outputs::new(Path::new(&both.at("predictions"))).unwrap().stem(state.pair_name()).unwrap();
+            let stem = format!("{}_{}", stem.display(), state.finger_name(finger));
             let maps = [("mean", Some(&found.spread.mean)), ("spread", Some(&found.spread.std))];
             for (what, map) in maps.into_iter().chain([("channels", found.channels.as_ref())]) {
                 let file = PathBuf::from(format!("{stem}_{what}.npy"));

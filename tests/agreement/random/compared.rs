@@ -12,8 +12,12 @@ use super::*;
 
 fn change() -> impl Strategy<Value = RecipeChange> {
     let shift = proptest::sample::select(Mapping::iter().collect::<Vec<_>>());
-    (option::of(1..=2u32), option::of(any::<u64>()), option::of(shift))
-        .prop_map(|(steps, seed, shift)| RecipeChange { bundle: None, steps, seed, shift })
+    (option::of(1..=2u32), option::of(any::<u64>()), option::of(shift)).prop_map(|(steps, seed, shift)| RecipeChange {
+        bundle: None,
+        steps,
+        seed,
+        shift,
+    })
 }
 
 fn subject() -> impl Strategy<Value = Subject> {

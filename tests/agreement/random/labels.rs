@@ -31,7 +31,12 @@ fn same_labels(both: &Both, twin: &Path, what: &str) -> usize {
     for entry in &own.index.pairs {
         let [shown, said] = [&own, &other].map(|set| Labels::of(set).load(&entry.name).unwrap());
         let what = format!("{}: {what}", entry.name);
-        assert!(shown.masks.keys().eq(said.masks.keys()), "{what}: {:?} and {:?}", shown.masks.keys(), said.masks.keys());
+        assert!(
+            shown.masks.keys().eq(said.masks.keys()),
+            "{what}: {:?} and {:?}",
+            shown.masks.keys(),
+            said.masks.keys()
+        );
         for (place, mask) in &shown.masks {
             let other = &said.masks[place];
             let differ = mask.mask.as_slice().iter().zip(other.mask.as_slice()).filter(|(a, b)| a != b).count();
@@ -83,7 +88,8 @@ pub(in crate::agreement) fn random_edits_of_masks_by_hand_are_those_of_the_verb(
         both.studio.send(LabelsCommand::EndStroke.into());
         both.studio.send(LabelsCommand::CleanUp(clean).into());
         let paint = if erase { "free" } else { "contact" };
-        let drawing = serde_json::json!({"tool": "brush", "radius_px": 3, "paint": paint, "points": [from, to]}).to_string();
+        let drawing =
+            serde_json::json!({"tool": "brush", "radius_px": 3, "paint": paint, "points": [from, to]}).to_string();
         let cleaned = if kind.is_sized() { format!("{}=1.5", kind.key()) } else { kind.key().to_owned() };
         label(&both, &["--finger", &name, "--imprint", source.key(), "--draw", &drawing, "--clean", &cleaned]);
         counts.push(same_labels(&both, &twin, &format!("{drawing}, {cleaned}, {what}")));

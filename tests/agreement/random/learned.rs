@@ -29,7 +29,8 @@ pub(in crate::agreement) fn a_fit_is_the_same_by_button_and_verb() {
     put(&mut both.studio, &recipe);
     let words = both.words(Pane::Adapt);
     both.studio.send(AdaptCommand::Start.into());
-    let found = both.studio.state.adapt.result.clone().expect("the fit is there");
+    let found = both.studio.state.adapt.result.clone();
+    let found = found.unwrap_or_else(|| panic!("{recipe:?}: {:?}", both.studio.state.log.entries));
     let said = both.run(&words).unwrap();
     let shown = without(written(&*found), &OWN);
     let count = same(&shown, &without(said.clone(), &[&OWN[..], &["from", "engine"]].concat()), &format!("{recipe:?}"));
@@ -53,12 +54,14 @@ pub(in crate::agreement) fn a_training_is_the_same_by_button_and_verb() {
     let mut both = Both::open(Place::Path(folder), home.path());
     both.show(&[Pane::Train]);
     let choice = TrainChoice { held_out_percent: 40, seed: 7, ..TrainChoice::default() };
-    both.studio.send(TrainCommand::SetForm(TrainForm { choice, by_steps: true, steps: 3, ..TrainForm::default() }).into());
+    both.studio
+        .send(TrainCommand::SetForm(TrainForm { choice, by_steps: true, steps: 3, ..TrainForm::default() }).into());
     both.studio.send(prefer(|s| s.runtime = touch2touch_work::infer::engine::EngineChoice::Rten).into());
     let out = ["--out".to_owned(), both.at("trained")];
     let words = [both.words(Pane::Train), out.to_vec()].concat();
     both.studio.send(TrainCommand::Start.into());
-    let found = both.studio.state.train.result.clone().expect("the training is there");
+    let found = both.studio.state.train.result.clone();
+    let found = found.unwrap_or_else(|| panic!("{:?}", both.studio.state.log.entries));
     let said = both.run(&words).unwrap();
     let count = same(&without(written(&*found), &OWN), &without(said, &OWN), "training");
     assert!(count >= 20, "{count}");

@@ -113,8 +113,13 @@ fn same_influence(both: &Both, found: &Influence, case: &Value, what: &str) -> u
     assert_eq!(places.len(), found.places.len(), "{what}");
     for (said, place) in places.iter().zip(&found.places) {
         let shown = written(place);
-        let said: serde_json::Map<String, Value> =
-            said.as_object().unwrap().iter().filter(|(key, _)| *key != "finger").map(|(k, v)| (k.clone(), v.clone())).collect();
+        let said: serde_json::Map<String, Value> = said
+            .as_object()
+            .unwrap()
+            .iter()
+            .filter(|(key, _)| *key != "finger")
+            .map(|(k, v)| (k.clone(), v.clone()))
+            .collect();
         count += same(&shown, &Value::Object(said), what);
     }
     count

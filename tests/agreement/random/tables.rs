@@ -132,7 +132,12 @@ pub(in crate::agreement) fn a_random_recipe_orders_the_masks_the_same_in_the_lis
                     serde_json::json!([state.library.entry(*id).unwrap().name, queued.overall, why])
                 })
                 .collect();
-            let verb: Vec<_> = said["pairs"].as_array().unwrap().iter().map(|line| serde_json::json!([line["pair"], line["overall"], line["why"]])).collect();
+            let verb: Vec<_> = said["pairs"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|line| serde_json::json!([line["pair"], line["overall"], line["why"]]))
+                .collect();
             count += same(&written(&lines), &verb.into(), &format!("{by:?}"));
         }
         counts.push(count);

@@ -1,7 +1,5 @@
 //! A followed folder: what the studio shows of what arrives, and what `watch` writes of it.
 
-use strum::IntoEnumIterator as _;
-use touch2touch::app::command::FollowCommand;
 use touch2touch_core::postprocess::Stats;
 use touch2touch_work::io::pt::Tensor;
 use touch2touch_work::mask::MaskSource;
@@ -25,7 +23,8 @@ fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
         assert!(imprint.as_slice().iter().map(|v| v.to_bits()).eq(pixels.iter().map(|v| v.to_bits())), "{what}");
         let stats = Stats::of(imprint);
         let shown = [stats.min, stats.max, stats.mean];
-        count += same(&written(&shown), &serde_json::json!([finger["min_m"], finger["max_m"], finger["mean_m"]]), &what);
+        count +=
+            same(&written(&shown), &serde_json::json!([finger["min_m"], finger["max_m"], finger["mean_m"]]), &what);
         let in_force = state.mask_in_force(source, pad).unwrap_or_else(|_| panic!("{what}: no mask"));
         let px = in_force.mask.as_slice().iter().filter(|&&on| on).count();
         assert_eq!(finger["contact_px"], px, "{what}");
@@ -89,10 +88,8 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
         let out = both.at("watched");
         let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
         let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
-        let lines = super::super::run(
-            &begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect::<Vec<_>>(),
-            &both.home,
-        );
+        let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
+        let lines = run(&all, &both.home);
         assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));
         let found = results(Path::new(&out));
         assert_eq!(found.len() as u32, both.pairs(), "{found:?}");
