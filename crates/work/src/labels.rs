@@ -284,10 +284,11 @@ impl DrawnMask {
         marks.take_over(mask, new, ignored, by, keep_manual)
     }
 
-    /// Cleans it up; whether anything changed. Sizes are those of the rig's depth images.
+    /// Cleans it up; whether anything changed. What changes nothing leaves no trace. Sizes are those of the rig's depth
+    /// images.
     pub fn clean(&mut self, clean_up: CleanUp, rig: &Rig) -> bool {
         let clean = clean_up.apply(&self.mask, rig.depth_px_per_mm());
-        self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
+        clean != *self.mask && self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
     }
 
     /// A copy of it for the other imprint of the touch, `from` being that of this one.
