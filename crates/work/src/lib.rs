@@ -37,6 +37,7 @@ pub mod infer;
 pub mod influence;
 pub mod io;
 pub mod job;
+pub mod label_edit;
 pub mod label_stats;
 pub mod labels;
 pub mod layers;
