@@ -34,8 +34,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
@@ -178,7 +178,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
         mask: args.mask.choice(),
         hand: !args.mask.no_hand,
-        engine: args.engine,
+        engine: args.registration,
         shift,
         steps: args.steps,
         seed: args.seed,

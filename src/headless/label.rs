@@ -221,7 +221,7 @@ fn taken_up(felt: &Felt, pad: PadId, labels: &PairLabels) -> Option<TakenUp> {
 fn recipe(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<Recipe> {
     let imprints = [Some(args.imprint), args.from, args.accept, args.withdraw];
     let imprint = imprints.into_iter().flatten().max().unwrap_or_default();
-    args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)
+    args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)
 }
 
 /// The other imprints of a kind that poses were accepted of, as the end of a sentence.

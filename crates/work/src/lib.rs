@@ -30,6 +30,7 @@ pub mod fan;
 pub mod feel;
 pub mod figure;
 pub mod filter;
+pub mod follow;
 pub mod fonts;
 pub mod import;
 pub mod imprint;

@@ -39,8 +39,8 @@ pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mapping: MappingArgs,
     /// The engine that runs the models.
@@ -75,7 +75,7 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         classifier: first(|b| b.tool_classifier().is_some()),
         mask: args.mask.choice(),
         hand: !args.mask.no_hand,
-        engine: args.engine,
+        engine: args.registration,
         shift: args.mapping.mode(None)?,
         runtime: args.runtime.choice(),
         ..Setup::default()
