@@ -287,8 +287,8 @@ mod tests {
     use super::*;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
-    use touch2touch_core::predicted_id::PredictedId;
     use touch2touch_core::rig::{PadId, lab};
+    use touch2touch_work::io::predicted_id::PredictedId;
     use touch2touch_work::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> DrawnMask {

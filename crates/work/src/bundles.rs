@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
+use crate::io::model_id::current;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::fit::FitSource;
@@ -15,7 +16,7 @@ use touch2touch_core::sample::Sample;
 /// A model bundle that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundleInfo {
-    /// Its identity: the digest of its manifest and files.
+    /// Identity: the digest of what decides its results ([`Bundle::hash`]).
     pub id: Arc<str>,
     /// The name on screen.
     pub name: String,
@@ -86,7 +87,10 @@ impl BundleInfo {
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
-                fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
+                fit: spec.fit.as_ref().map(|fit| {
+                    let from_sha256 = current(&fit.source.from_sha256);
+                    FitSource { from_sha256, ..fit.source.clone() }
+                }),
             }),
             trained: bundle.provenance().get(TRAINED).is_some(),
         }
@@ -170,6 +174,12 @@ pub struct FoundBundles {
     pub bundles: Vec<BundleInfo>,
     /// What is wrong with the others.
     pub problems: Vec<Problem>,
+}
+
+/// The bundle that a stored identity names, also as builds before this one wrote it.
+pub fn by_id<'a>(bundles: &'a [BundleInfo], id: &str) -> Option<&'a BundleInfo> {
+    let id = current(id);
+    bundles.iter().find(|bundle| *bundle.id == *id)
 }
 
 /// All bundles there are: those of the user, those in the program, and those in `folders`.

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
-use super::bundles::{self, BundleInfo, FoundBundles};
+use super::bundles::{self, BundleInfo, FoundBundles, by_id};
 use super::error::TaskError;
 use super::feel::{Touch, feel};
 use super::job::JobCx;
@@ -442,9 +442,7 @@ impl OpenedCase {
 pub fn check(opened: &OpenedCase, found: &FoundBundles, models: &Models, cx: &JobCx) -> Result<CaseReport, TaskError> {
     let OpenedCase { case, dataset, pair, labels, .. } = opened;
     let sample = dataset.load(*pair).map_err(|err| TaskError::from_error(WHAT, &err).with_hint(err.hint()))?;
-    let here = |named: ModelName| -> Option<Model> {
-        found.bundles.iter().find(|bundle| *bundle.id == *named.id).cloned().map(Model::from)
-    };
+    let here = |named: ModelName| -> Option<Model> { by_id(&found.bundles, &named.id).cloned().map(Model::from) };
     let lacking = || {
         let (generator, mask_model) = (case.recipe.generator.iter().map(|(model, _)| model), &case.recipe.mask_model);
         let named = generator.chain(mask_model).find(|named| here((*named).clone()).is_none());

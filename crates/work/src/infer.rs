@@ -19,6 +19,7 @@ pub mod kept_key;
 mod library;
 pub mod mask;
 mod onnx_header;
+pub(crate) mod recipe_id;
 pub mod runtime;
 pub mod sandbox;
 pub mod sheets;

@@ -24,13 +24,13 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::prediction::settings_text;
 use crate::io::masks;
+use crate::io::predicted_id::PredictedId;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance, merge};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
 
 /// Which imprint of a touch.

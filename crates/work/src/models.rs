@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use strum::IntoEnumIterator as _;
 
-use super::bundles::{BundleInfo, BundleKind};
+use super::bundles::{BundleInfo, BundleKind, by_id};
 use super::error::TaskError;
 use super::imprint::in_meters;
 use super::job::{JobCx, PreviewPicture};
 use super::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
 use super::prediction::{Chains, Prediction};
 use crate::infer::bundle::GeneratorSpec;
-use crate::infer::engine::{EngineChoice, EngineKind, resolve};
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{MaskError, MaskModel};
@@ -246,7 +246,7 @@ impl Models {
             let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
             let recipe = |(item, at): (&GenerateInput<'_>, &usize)| {
                 let config = GenerateConfig { seed: item.seed, ..*config };
-                KeptKey::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
+                KeptKey { input: digests[*at].clone(), bundle: bundle.id.to_string(), engine: kind, config }
             };
             keys = wanted.iter().zip(&image).map(recipe).collect();
             let store = lock(store);
@@ -341,12 +341,11 @@ impl Models {
         let mut kept = Vec::new();
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
-            let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
+            let Some(bundle) = by_id(bundles, &stored.recipe.bundle) else { continue };
             let Ok(OutputChains { chains, fit, color, .. }) = self.outputs(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
-                EngineKind::Rten => EngineChoice::Rten,
-                EngineKind::Ort => EngineChoice::Ort,
+                made => made.into(),
             };
             let prediction = Prediction {
                 raw: stored.raw,
@@ -358,7 +357,7 @@ impl Models {
                 seconds: stored.seconds,
                 kept: true,
             };
-            kept.push(KeptPrediction { engine, config: stored.recipe.config(), prediction });
+            kept.push(KeptPrediction { engine, config: stored.recipe.config, prediction });
         }
         kept
     }

@@ -10,7 +10,9 @@ use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{Condition, GraspScore, Metric, Row, Scores, paper_rows};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::evaluate::{Evaluation, Setup};
+use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::queue::{Queue, QueueBy};
+use touch2touch_work::recipe::Recipe;
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
@@ -215,16 +217,11 @@ impl State {
     /// What an evaluation started now would do; `None` without data or with nothing to score.
     pub(crate) fn evaluation_setup(&self) -> Option<Setup> {
         self.library.open.as_ref()?;
-        let origin = |kind| self.bundle(kind).ok().map(|b| b.origin.clone());
         let bundles: Vec<_> = self.evaluated().filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
         (!bundles.is_empty()).then(|| Setup {
             bundles,
-            mask_bundle: origin(BundleKind::Mask),
-            classifier: origin(BundleKind::Classifier),
-            mask: self.settings.mask.choice,
-            engine: self.settings.pose_engine,
-            shift: self.settings.shift,
-            runtime: self.settings.runtime,
+            classifier: self.bundle(BundleKind::Classifier).ok().map(|b| b.origin.clone()),
+            recipe: Recipe { generator: None, ..self.in_force(ImprintSource::Measured) },
             grasps_per_tool: self.table.grasps_per_tool,
             ..Setup::default()
         })

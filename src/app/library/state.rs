@@ -15,7 +15,7 @@ use super::super::services::DataSource;
 use super::super::state::State;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::bundles::{BundleInfo, BundleKind, by_id};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::filter::Filter;
 
@@ -170,7 +170,7 @@ impl Library {
 
     /// The bundle with this identity.
     pub fn bundle(&self, id: &str) -> Option<&BundleInfo> {
-        self.bundles.iter().find(|b| &*b.id == id)
+        by_id(&self.bundles, id)
     }
 
     /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind; nothing in

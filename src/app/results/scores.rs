@@ -5,7 +5,6 @@ use super::super::pane::Demand;
 use super::{Computes, DatasetSeq, Demands, Job, Lane, SharedServices, State};
 use std::sync::Arc;
 use touch2touch_work::evaluate::{self, Setup};
-use touch2touch_work::infer::engine::EngineChoice;
 
 /// Everything that decides which scores are there.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -15,7 +14,6 @@ pub struct ScoresKey {
     pairs: usize,
     /// How they are scored, as text.
     setup: String,
-    runtime: EngineChoice,
     /// How often scores were computed since.
     round: u64,
 }
@@ -58,7 +56,6 @@ impl State {
             dataset: open.seq,
             pairs: open.index().pairs.len(),
             setup: serde_json::to_string(&setup).ok()?,
-            runtime: setup.runtime,
             round: self.table.round,
         })
     }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::recipe::{MappingArgs, RuntimeArg};
+use super::super::recipe::{MappingArgs, RuntimeArg, common};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::RegistrationChoice;
@@ -69,15 +69,11 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let bundles = find_all(&[]).bundles;
     let first = |fits: fn(&Bundle) -> bool| bundles.iter().find(|b| fits(b)).map(|b| b.origin().clone());
     let generator = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
+    let mask_model = args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some()));
     Ok(Setup {
         bundles: bundles.iter().filter(generator).map(|b| b.origin().clone()).collect(),
-        mask_bundle: args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some())),
         classifier: first(|b| b.tool_classifier().is_some()),
-        mask: args.mask.choice(),
-        hand: !args.mask.no_hand,
-        engine: args.registration,
-        shift: args.mapping.mode(None)?,
-        runtime: args.runtime.choice(),
+        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.registration, args.runtime)?,
         ..Setup::default()
     })
 }

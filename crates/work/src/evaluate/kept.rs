@@ -13,12 +13,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::load::Labeled;
-use super::methods::Models;
+use super::methods::{Method, Models};
 use super::{Setup, ToolWork};
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::sheets::Sheets;
 use crate::io::dataset::{Dataset, SourceKind, UNIT_FILE};
 use crate::io::digest::sha256;
 use crate::io::files;
+use crate::recipe::{Recipe, RecipeId, Stage};
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem};
 use touch2touch_core::evaluation::{GraspScore, Group};
@@ -27,7 +29,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.
@@ -139,8 +141,7 @@ impl KeptScores {
         work: &[ToolWork],
         only_known: bool,
     ) -> Self {
-        let names: Vec<String> =
-            models.methods.iter().map(|method| sheet(dataset, setup, models, &method.recipe(setup))).collect();
+        let names: Vec<String> = models.methods.iter().map(|method| sheet(dataset, setup, models, method)).collect();
         let work = if only_known && names.iter().all(|name| sheets.is_empty(name)) { &[] } else { work };
         let labels = Labeled::of(dataset, setup);
         let files = Files::new(sheets.clone());
@@ -186,29 +187,29 @@ impl KeptScores {
 }
 
 /// The name of the sheet of a method (by its recipe) and a way to score.
-fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &str) -> String {
+fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &Method) -> String {
     #[derive(Serialize)]
     struct Way<'a> {
         version: u32,
         program: &'a str,
-        method: &'a str,
-        mask: Option<String>,
+        stored: bool,
+        recipe: RecipeId,
         classifier: Option<&'a str>,
         engine: &'a str,
-        registration: String,
         finger: Option<PadId>,
         kind: String,
         rig: String,
     }
-    let recipe = setup.mask.recipe(models.mask_bundle.as_ref().map(|bundle| &bundle.id));
+    let recipe = method.posed(models.common());
+    // Any choice of an engine is what it stands for.
+    let engine = resolve(recipe.engine).map_or(recipe.engine, EngineChoice::from);
     let way = Way {
         version: VERSION,
         program: program(),
-        method,
-        mask: recipe.map(|recipe| format!("{recipe:?}")),
+        stored: matches!(method, Method::Stored),
+        recipe: Recipe { engine, ..recipe }.id(Stage::Pose),
         classifier: models.classifier_hash(),
         engine: models.engine(),
-        registration: setup.engine.to_string(),
         finger: setup.finger,
         kind: format!("{:?}", dataset.kind),
         rig: format!("{:?}", dataset.rig),

@@ -47,7 +47,7 @@ pub(super) struct Labeled(Option<Labels>);
 
 impl Labeled {
     pub(super) fn of(dataset: &Dataset, setup: &Setup) -> Self {
-        Self(setup.hand.then(|| Labels::of(dataset)))
+        Self(setup.recipe.hand.then(|| Labels::of(dataset)))
     }
 
     /// Nobody's.

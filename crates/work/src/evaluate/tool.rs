@@ -133,15 +133,16 @@ impl<'a> Tool<'a> {
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
     ) {
-        let Models { methods, masks: by_models, mask_bundle, classifier, .. } = models;
+        let common = models.common().clone();
+        let Models { methods, masks: by_models, classifier, .. } = models;
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
-            let recipe = method.posed(setup, mask_bundle.as_ref());
+            let recipe = method.posed(&common);
             let with_masks = recipe.mask_recipe().is_ok();
             let cases: Vec<&LoadedPair> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
-            let Some(made) = method.make(&cases, setup, cx) else { return };
+            let Some(made) = method.make(&cases, common.shift, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
             let mut skip = |case: &LoadedPair, why: String| {
                 failed.insert(case.id);
@@ -300,7 +301,7 @@ pub(super) struct Again {
 /// The images of some grasps by a method; those that fail now are left out.
 fn images_again(cases: &[&LoadedPair], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
     let upper = matches!(method, Method::Measured);
-    let made = method.make(cases, setup, cx).unwrap_or_default();
+    let made = method.make(cases, setup.recipe.shift, cx).unwrap_or_default();
     let one = |(case, made): (&&LoadedPair, Result<Made, String>)| {
         let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
         Some(Again { id: case.id, images })

@@ -120,6 +120,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::io::digest::sha256;
 use crate::io::files;
+use crate::io::model_id::identity;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::units::counted;
@@ -282,7 +283,7 @@ impl Bundle {
         match (manifest.spec, problems.list.is_empty()) {
             (Some(spec), true) => {
                 let (name, provenance) = (manifest.name, manifest.provenance);
-                Ok(Self { hash: sha256(&text), origin, name, files, bytes: size, spec, fit, provenance })
+                Ok(Self { hash: identity(&text), origin, name, files, bytes: size, spec, fit, provenance })
             }
             _ => Err(refuse(problems.list)),
         }
@@ -298,7 +299,8 @@ impl Bundle {
         &self.name
     }
 
-    /// SHA-256 of the manifest, lower-case hex. The manifest holds the files' checksums, so this identifies everything.
+    /// Digest of what decides the bundle's results, lower-case hex: the manifest without name, note and places, with the
+    /// files' checksums ([`crate::io::model_id`]).
     pub fn hash(&self) -> &str {
         &self.hash
     }

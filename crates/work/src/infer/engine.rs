@@ -55,6 +55,15 @@ pub enum EngineChoice {
     Ort,
 }
 
+impl From<EngineKind> for EngineChoice {
+    fn from(kind: EngineKind) -> Self {
+        match kind {
+            EngineKind::Rten => Self::Rten,
+            EngineKind::Ort => Self::Ort,
+        }
+    }
+}
+
 impl EngineChoice {
     /// The name on screen.
     pub fn name(self) -> &'static str {

@@ -136,7 +136,7 @@ impl Generator {
     /// The key of what [`Generator::generate`] returns for the image with the digest `input` (see
     /// [`super::kept_key::input_digest`]).
     pub fn recipe(&self, input: String, config: &GenerateConfig) -> KeptKey {
-        KeptKey::new(input, self.hash.clone(), self.engine, config)
+        KeptKey { input, bundle: self.hash.clone(), engine: self.engine, config: *config }
     }
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).

@@ -19,12 +19,12 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
 use super::home::{Away, Home};
+use super::predicted_id::PredictedId;
 use super::{atomic, files, folders, names};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{Marks, PackedMask};
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::MANIFEST;
-use crate::io::digest::sha256;
+use crate::io::model_id::identity;
 
 use crate::io::files;
 
@@ -58,10 +58,10 @@ impl Origin {
         EMBEDDED.iter().map(|(name, _)| Self::BuiltIn(name))
     }
 
-    /// Whether a bundle of this hash is one of the program's.
+    /// True of a bundle of this identity that the program brings.
     pub(crate) fn ships(hash: &str) -> bool {
         Self::built_in()
-            .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| sha256(&manifest) == hash))
+            .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| identity(&manifest) == hash))
     }
 
     /// The last part of the folder's path, or the name in the program.
@@ -173,7 +173,7 @@ mod tests {
         for (name, files) in EMBEDDED {
             assert_eq!(names(&models.join(name)), files.iter().map(|(file, _)| (*file).to_owned()).collect());
             let manifest = std::fs::read(models.join(name).join(MANIFEST)).unwrap();
-            assert!(Origin::ships(&sha256(&manifest)) && !Origin::ships(&sha256(&manifest[1..])), "{name}");
+            assert!(Origin::ships(&identity(&manifest)) && !Origin::ships(&identity(&manifest[1..])), "{name}");
             for (file, bytes) in *files {
                 assert!(std::fs::read(models.join(name).join(file)).unwrap() == *bytes, "{name}/{file}");
             }
