@@ -110,8 +110,8 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
-        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
+    pub(super) fn write(&self, stem: &Path, name: &str, registration: RegistrationChoice) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", registration.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;

@@ -382,9 +382,15 @@ impl PairLabels {
         self.masks.get(&MaskPlace::measured(pad))
     }
 
-    /// The mask drawn by hand on an imprint, if it is as large.
+    /// The mask drawn by hand on an imprint, if it is as large: where there is one it is in force, and no other. The one place
+    /// that says so; [`super::mask::contact_mask`] makes what is in force elsewhere.
     pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&DrawnMask> {
-        self.masks.get(place).filter(|hand| hand.mask.size() == imprint.size())
+        self.drawn_of_size(place, imprint.size())
+    }
+
+    /// The same of an imprint of a size.
+    pub(crate) fn drawn_of_size(&self, place: &MaskPlace, size: [usize; 2]) -> Option<&DrawnMask> {
+        self.masks.get(place).filter(|hand| hand.mask.size() == size)
     }
 
     /// Puts a mask in its place, or takes it away; returns what was there.

@@ -21,7 +21,7 @@ use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
-use touch2touch_core::manual::ManualPose;
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -113,10 +113,54 @@ impl ProposalSource {
         }
     }
 
-    /// True where it measures the distance to the CAD model.
-    pub fn is_cad(self) -> bool {
-        matches!(self, Self::CadTruth | Self::CadRegistered | Self::CadHand)
+    /// What a proposal of it is made of.
+    pub fn takes(self) -> Takes {
+        match self {
+            Self::Automatic => Takes::AutomaticMask,
+            Self::CadTruth => Takes::CadModel(CadAt::Truth),
+            Self::CadRegistered => Takes::CadModel(CadAt::Registered),
+            Self::CadHand => Takes::CadModel(CadAt::Hand),
+            Self::Grow => Takes::DrawnMask,
+            Self::Carry => Takes::OtherPair,
+            Self::OtherFinger => Takes::OtherPad,
+        }
     }
+
+    /// It measures the distance to the CAD model.
+    pub fn is_cad(self) -> bool {
+        matches!(self.takes(), Takes::CadModel(_))
+    }
+}
+
+/// What a proposal is made of, besides the imprint. Each has one function that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// The mask of the automatic source: [`automatic`].
+    AutomaticMask,
+    /// The distances to the CAD model at a pose ([`cad_distances`]): [`near_cad`].
+    CadModel(CadAt),
+    /// The mask that a person drew on the imprint: [`grown`].
+    DrawnMask,
+    /// The mask that a person drew of the pair that [`carries_from`] names: [`carried_from_pair`].
+    OtherPair,
+    /// The mask in force of the other pad: [`carried_across`].
+    OtherPad,
+}
+
+/// Where the CAD model lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CadAt {
+    /// At the true pose.
+    Truth,
+    /// At the pose that is registered from the masks in force.
+    Registered,
+    /// Where a hand holds it, else where one put it: [`hand_pose`].
+    Hand,
+}
+
+/// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
+pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Option<ManualPose> {
+    held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
 }
 
 /// A proposed mask.

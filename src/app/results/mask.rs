@@ -184,17 +184,17 @@ impl State {
         self.fingers().into_iter().flat_map(places).collect()
     }
 
-    /// The mask that a person drew on an imprint.
+    /// The mask that is in force on an imprint because a person drew it.
     pub(crate) fn drawn_mask_on(&self, imprint: &ImprintKey) -> Option<&DrawnMask> {
         let touch = imprint.touch();
         let name = &self.library.entry(touch.pair.pair)?.name;
-        self.document.drawn_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
+        let place = MaskPlace { pad: touch.finger, of: imprint.of()? };
+        self.document.pair(name)?.drawn(&place, imprint.find(self)?.get().ok()?)
     }
 
     /// The corrected mask of one finger's imprint, if it is there and as large.
     pub fn drawn_mask(&self, source: ImprintSource, finger: PadId) -> Option<&DrawnMask> {
-        let place = self.mask_place(source, finger)?;
-        self.document.pair(self.pair_name())?.drawn(&place, self.imprint(source, finger).ready()?)
+        self.drawn_mask_on(&self.imprint_key(source, finger).ok()?)
     }
 
     /// The mask in force on one finger's imprint: the corrected one, else the automatic one.

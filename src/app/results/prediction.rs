@@ -19,6 +19,7 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models;
 use touch2touch_work::prediction::Prediction;
+use touch2touch_work::recipe::Recipe;
 
 /// Everything that decides a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -57,6 +58,12 @@ impl PredictionKey {
             guidance: config.guidance.into(),
             runtime,
         }
+    }
+
+    /// The prediction of a touch by a recipe; `None` where it names no generator.
+    pub(crate) fn of(touch: TouchKey, recipe: &Recipe) -> Option<Self> {
+        let (model, config) = recipe.generator.as_ref()?;
+        Some(Self::new(touch, model.id.clone(), recipe.engine, config))
     }
 
     /// The recipes that differ from it in their seeds alone: `count` of them, from its own on.

@@ -17,7 +17,7 @@ use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::propose::{self, Proposal, ProposalSource, Side};
+use touch2touch_work::propose::{self, CadAt, Proposal, Side, Takes, hand_pose};
 
 const WHAT: &str = "Propose a mask";
 
@@ -195,7 +195,7 @@ impl State {
     /// Whether the proposal needs the pose of an imprint.
     pub(crate) fn proposes_at_pose(&self, source: ImprintSource) -> bool {
         self.proposes()
-            && self.settings.mask.proposal == ProposalSource::CadRegistered
+            && self.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
             && self.worked_on(self.selection.finger) == source
     }
 
@@ -213,9 +213,9 @@ impl State {
     pub fn proposal_key(&self, source: ImprintSource, finger: PadId) -> Result<Option<ProposalKey>, Absent> {
         let imprint = self.imprint_key(source, finger)?;
         let within = Bits::from(self.settings.mask.choice.cad_distance_m);
-        let of = match self.settings.mask.proposal {
-            ProposalSource::Automatic => ProposalInputs::Automatic(self.mask_recipe(finger)?),
-            ProposalSource::CadTruth => {
+        let of = match self.settings.mask.proposal.takes() {
+            Takes::AutomaticMask => ProposalInputs::Automatic(self.mask_recipe(finger)?),
+            Takes::CadModel(CadAt::Truth) => {
                 self.tool_name()?;
                 let sample = self.sample().ready();
                 if sample.is_some_and(|sample| sample.grasp_from_object.is_none()) {
@@ -223,26 +223,27 @@ impl State {
                 }
                 ProposalInputs::Cad(CadPlace::Truth, within)
             }
-            ProposalSource::CadRegistered => match self.pose_key(source)? {
+            Takes::CadModel(CadAt::Registered) => match self.pose_key(source)? {
                 Some(key) => ProposalInputs::Cad(CadPlace::Registered(Box::new(key)), within),
                 None => return Ok(None),
             },
-            ProposalSource::CadHand => {
+            Takes::CadModel(CadAt::Hand) => {
                 self.tool_name()?;
-                let held = self.workbench.hand(source).map(|hand| hand.pose).or_else(|| self.by_hand(source));
-                ProposalInputs::Cad(CadPlace::hand(held.ok_or(Absent::NoHandPose)?), within)
+                let held = self.workbench.hand(source).map(|hand| hand.pose);
+                let pose = hand_pose(held, self.accepted(source)).ok_or(Absent::NoHandPose)?;
+                ProposalInputs::Cad(CadPlace::hand(pose), within)
             }
-            ProposalSource::Grow => {
+            Takes::DrawnMask => {
                 let hand = self.drawn_mask(source, finger).filter(|hand| hand.marks.has_hand_work());
                 ProposalInputs::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
             }
-            ProposalSource::Carry => {
+            Takes::OtherPair => {
                 let from = self.carries_from().ok_or(Absent::NoOtherMask)?;
                 let name = self.library.entry(from.pair).map(|entry| entry.name.as_str()).unwrap_or_default();
                 let hand = self.document.drawn_mask(name, &MaskPlace::measured(finger));
                 ProposalInputs::Carry(from, hand.map(|hand| hand.revision))
             }
-            ProposalSource::OtherFinger => {
+            Takes::OtherPad => {
                 let other = self.rig().other_pad(finger).ok_or(Absent::NoFinger)?;
                 let key = self.imprint_key(source, other)?;
                 match self.mask_in_force(source, other) {
@@ -279,11 +280,11 @@ impl Demands<'_> {
         if !state.proposes() || state.document.stroke.is_some() || state.imprint(source, finger).ready().is_none() {
             return;
         }
-        let is_cad = state.settings.mask.proposal.is_cad();
-        if is_cad && state.tool_name().is_ok() && state.tool().ready().is_none() {
+        let takes = state.settings.mask.proposal.takes();
+        if matches!(takes, Takes::CadModel(_)) && state.tool_name().is_ok() && state.tool().ready().is_none() {
             return self.tool();
         }
-        if state.settings.mask.proposal == ProposalSource::OtherFinger
+        if takes == Takes::OtherPad
             && let Some(other) = state.rig().other_pad(finger)
         {
             self.mask(source, other);

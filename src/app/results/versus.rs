@@ -23,7 +23,8 @@ use touch2touch_work::deviation::{CloudDifference, cloud_difference};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{RecipeChange, Subject};
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 
 /// A prediction that is compared with something.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -160,35 +161,36 @@ impl State {
         self.settings.versus.get(&self.settings.workspace).cloned().unwrap_or_default()
     }
 
-    /// The recipe of a wished prediction of a touch, and how it becomes meters.
-    fn wished(&self, touch: TouchKey, wish: &RecipeChange) -> Result<(PredictionKey, ShiftMode), Absent> {
-        let bundle = match &wish.bundle {
-            None => self.bundle(BundleKind::Generator)?,
-            Some(name) => {
-                let found = self.library.bundle_named(BundleKind::Generator, Some(name), &self.rig());
-                found.filter(|bundle| bundle.name == *name).ok_or(Absent::NoSuchGenerator)?
-            }
-        };
-        let mut config = self.settings.generate.config(bundle);
-        config.steps = wish.steps.unwrap_or(config.steps);
-        config.seed = wish.seed.unwrap_or(config.seed);
-        let key = PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config);
-        if self.is_color(&key) {
-            return Err(Absent::PredictsColor);
-        }
-        Ok((key, wish.shift.map_or(self.settings.shift, |mapping| mapping.mode())))
+    /// What a subject is made from by the settings.
+    ///
+    /// # Errors
+    /// Why it cannot be made.
+    fn made_from(&self, subject: &Subject) -> Result<MadeFrom, Absent> {
+        subject.made_from(|named| {
+            let Some(name) = named else {
+                self.bundle(BundleKind::Generator)?;
+                return Ok(self.in_force(ImprintSource::Predicted));
+            };
+            let found = self.library.bundle_named(BundleKind::Generator, Some(name), &self.rig());
+            let bundle = found.filter(|bundle| bundle.name == name).ok_or(Absent::NoSuchGenerator)?;
+            let generator = Some((bundle.clone().into(), self.settings.generate.config(bundle)));
+            Ok(Recipe { generator, ..self.in_force(ImprintSource::Predicted) })
+        })
     }
 
-    /// The recipes of the predictions that a subject is made of, and how they become meters; none of what is not made.
+    /// The keys of the predictions that a subject of a touch is made of, and how they become meters; none of what is not made.
     fn made_for(&self, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
-        match subject {
-            Subject::Measured | Subject::Stored => Ok((Vec::new(), self.settings.shift)),
-            Subject::Predicted(wish) => self.wished(touch, wish).map(|(recipe, shift)| (vec![recipe], shift)),
-            Subject::Mean(wish, count) => {
-                let (first, shift) = self.wished(touch, wish)?;
-                Ok((first.with_seeds(*count), shift))
-            }
+        let recipes = match self.made_from(subject)? {
+            MadeFrom::Measurement | MadeFrom::Picture => Vec::new(),
+            MadeFrom::Prediction(recipe) => vec![recipe],
+            MadeFrom::Mean(recipes) => recipes,
+        };
+        let shift = recipes.first().map_or(self.settings.shift, |recipe| recipe.shift);
+        let keys: Vec<PredictionKey> = recipes.iter().filter_map(|recipe| PredictionKey::of(touch, recipe)).collect();
+        if keys.first().is_some_and(|key| self.is_color(key)) {
+            return Err(Absent::PredictsColor);
         }
+        Ok((keys, shift))
     }
 
     /// The imprint that a subject is of a finger.
@@ -203,8 +205,9 @@ impl State {
             Subject::Predicted(wish) if *wish == RecipeChange::default() => {
                 self.imprint_key(ImprintSource::Predicted, finger)
             }
-            Subject::Predicted(wish) => {
-                let (recipe, shift) = self.wished(touch, wish)?;
+            Subject::Predicted(_) => {
+                let (mut recipes, shift) = self.made_for(subject, touch)?;
+                let recipe = recipes.pop().ok_or(Absent::NoSuchGenerator)?;
                 Ok(ImprintKey::Predicted(recipe, shift))
             }
             Subject::Mean(..) => {

@@ -12,6 +12,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::{AcceptedPose, ManualCost, ManualPose, PoseDifference};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_work::labels::ImprintOf;
+use touch2touch_work::propose::hand_pose;
 
 /// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -269,7 +270,7 @@ impl State {
 
     /// The pose that a person set and accepted.
     pub fn by_hand(&self, source: ImprintSource) -> Option<ManualPose> {
-        self.accepted(source).filter(|a| a.by_hand).map(|a| a.pose)
+        hand_pose(None, self.accepted(source))
     }
 
     /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
