@@ -4,7 +4,9 @@ mod exchange;
 mod in_3d;
 mod influence;
 mod proposals;
+mod random;
 mod recipes;
+mod verbs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,6 +41,7 @@ use touch2touch_work::export::{ExportChoice, Which};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::images;
+use touch2touch_work::io::masks::MaskStore;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
@@ -673,6 +676,14 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     json(&[&begun[..], &draw[..]].concat(), home.path());
     assert_eq!(stored(), drawn, "by the verb");
     assert!(drawn.as_slice().contains(&true));
+    // The journal says the same of both: what was done one after the other, each with its numbers.
+    let store = MaskStore::for_dataset(&Dataset::open(&folder).unwrap()).unwrap();
+    let journal = String::from_utf8(store.journal(&name).unwrap()).unwrap();
+    let lines = journal.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let deeds: Vec<(Value, Value)> = lines.map(|line| (line["name"].clone(), line["how"].clone())).collect();
+    let [by_hand, by_verb] = [&deeds[..3], &deeds[4..]];
+    assert_eq!((by_hand, &deeds[3].0), (by_verb, &"correction removed".into()));
+    assert_eq!(by_hand[0].0, "polygon");
     // The mask of a prediction is another one, until it is taken over.
     let of_prediction = ["--imprint", "predicted", "--from", "measured", "--steps", "1"];
     let labeled = json(&[&begun[..], &of_prediction[..]].concat(), home.path());

@@ -18,8 +18,8 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::effect::{Effect, LabelsToSave};
-use super::keys::ImprintSource;
-use super::state::history::{Edit, Gesture, KeptMask};
+use super::keys::{ImprintSource, Revision};
+use super::state::history::Gesture;
 use super::state::tasks::Level;
 use super::state::{Lookup, State};
 use super::{results, settings};
@@ -28,9 +28,8 @@ use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Sig
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::labels::{Act, Operation, note};
-use touch2touch_work::propose::accepted;
+use touch2touch_work::label_edit::{self, Edited, LabelEdit, TakenUp};
+use touch2touch_work::labels::{Act, Operation};
 
 /// What can happen to the document.
 #[derive(Clone, Debug)]
@@ -255,21 +254,14 @@ fn redraw(state: &mut State, from: usize) {
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
-    let labels = doc.labels.entry(stroke.pair.clone()).or_default();
-    let Some(now) = labels.masks.get(&stroke.place) else { return };
-    if now.is_same(&stroke.start) {
-        labels.put(&stroke.place, stroke.before);
-        return;
-    }
-    let (pair, finger, place) = (stroke.pair, stroke.place.pad, stroke.place);
-    let edit = Edit::Mask { pair: pair.clone(), place, mask: stroke.before.as_ref().map(KeptMask::of) };
-    let name = stroke.drawing.name();
-    let name = if stroke.drawing.sight.is_some() { format!("{name} in 3D") } else { name.to_owned() };
-    let how = serde_json::to_value(&stroke.drawing).ok();
-    record(state, &pair, Operation { how, ..Operation::named(name.clone()) }, edit, effects);
-    let (source, mask, before) = (stroke.source, Some(stroke.start.mask), stroke.pose);
+    let Stroke { pair, place, source, drawing, pose, before, start, .. } = stroke;
+    let labels = doc.labels.entry(pair.clone()).or_default();
+    let Some(mask) = labels.put(&place, before) else { return };
+    let (finger, shown, drawn) = (place.pad, Some(start.mask.clone()), mask.revision);
+    let edit = LabelEdit::Draw { on: TakenUp { place, mask: start }, mask, drawing: &drawing };
+    let Some(name) = change(state, &pair, edit, Some(drawn), effects) else { return };
     let revision = state.document.next_revision();
-    state.document.changed = Some(Changed { pair, source, name: name.into(), finger, revision, mask, before });
+    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask: shown, before: pose });
 }
 
 /// Takes in what somebody else made of a pair's masks meanwhile. What was done here before cannot be taken back any more: it
@@ -304,15 +296,29 @@ fn cancel_stroke(state: &mut State) {
     }
 }
 
-/// Records a change that was made; `edit` is its inverse. The pair counts as begun, and is saved.
-fn record(state: &mut State, pair: &str, deed: Operation, edit: Edit, effects: &mut Vec<Effect>) {
-    let mut edits = vec![edit];
-    if state.document.review(pair) == Review::Todo {
-        let before = state.document.set_review(pair, Review::InProgress);
-        edits.push(Edit::Review { pair: pair.to_owned(), review: before });
+/// Does something to the labels of a pair, which are saved: one gesture. New masks get the revision. Its name; `None` where
+/// nothing changed.
+fn change(
+    state: &mut State,
+    pair: &str,
+    edit: LabelEdit<'_>,
+    revision: Option<Revision>,
+    effects: &mut Vec<Effect>,
+) -> Option<Cow<'static, str>> {
+    let labels = state.document.pair(pair).cloned().unwrap_or_default();
+    match label_edit::edit(&labels, edit) {
+        Ok(edited) => {
+            let Edited { deed, change } = edited?;
+            let name = deed.name.clone();
+            state.history.make(&mut state.document, Gesture::forth(pair, name.clone(), &change, revision));
+            save_pair(state, pair, deed, effects);
+            Some(name)
+        }
+        Err(err) => {
+            state.log.error(&err);
+            None
+        }
     }
-    state.history.record(Gesture { name: deed.name.clone(), edits });
-    save_pair(state, pair, deed, effects);
 }
 
 /// Cleans the mask in force of the active finger up.
@@ -324,34 +330,25 @@ fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
     }
     let finger = state.selection.finger;
     let source = results::worked_on(state, finger);
-    let (Some(mut hand), Some(place)) = (start_from(state, source, finger), results::mask_place(state, source, finger))
+    let (Some(mask), Some(place)) = (start_from(state, source, finger), results::mask_place(state, source, finger))
     else {
         return state.log.error(&TaskError::new(what, "there is no mask to work on yet"));
     };
-    if !hand.clean(clean_up, &state.rig()) {
-        return state.log.info(format!("{what}: nothing to change"));
+    let (rig, on) = (state.rig(), TakenUp { place: place.clone(), mask });
+    if !change_mask(state, &place, LabelEdit::CleanUp { on, clean_up, rig: &rig }, effects) {
+        state.log.info(format!("{what}: nothing to change"));
     }
-    let deed = Operation { how: serde_json::to_value(clean_up).ok(), ..Operation::named(what) };
-    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
-fn set_hand_mask(
-    state: &mut State,
-    deed: Operation,
-    place: MaskPlace,
-    mask: Option<DrawnMask>,
-    effects: &mut Vec<Effect>,
-) {
+/// Does something to the mask of an imprint of the selected pair; what it was before is still shown.
+fn change_mask(state: &mut State, place: &MaskPlace, edit: LabelEdit<'_>, effects: &mut Vec<Effect>) -> bool {
     let pair = state.pair_name().to_owned();
-    let revision = state.document.next_revision();
-    let mask = mask.map(|mask| KeptMask::of(&DrawnMask { revision, ..mask }));
-    let (source, finger, name) = (place.of.source(), place.pad, deed.name.clone());
+    let (source, finger, revision) = (place.of.source(), place.pad, state.document.next_revision());
     let before = ghost::shown_pose_key(state, source);
-    let shown = results::mask_in_force(state, source, finger).ok().map(|mask| mask.mask.clone());
-    let mut edit = Edit::Mask { pair: pair.clone(), place, mask };
-    edit.swap(&mut state.document);
-    state.document.changed = Some(Changed { pair: pair.clone(), source, name, finger, revision, mask: shown, before });
-    record(state, &pair, deed, edit, effects);
+    let mask = results::mask_in_force(state, source, finger).ok().map(|mask| mask.mask.clone());
+    let Some(name) = change(state, &pair, edit, Some(revision), effects) else { return false };
+    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask, before });
+    true
 }
 
 fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
@@ -365,8 +362,10 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
     let Some(place) = results::mask_place(state, source, finger) else { return };
     match (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            let adopted = DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe));
-            set_hand_mask(state, Operation::named("automatic mask taken over"), place, Some(adopted), effects);
+            let mask = DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe));
+            if !change_mask(state, &place, LabelEdit::Adopt(TakenUp { place: place.clone(), mask }), effects) {
+                state.log.info(format!("{WHAT}: nothing to change"));
+            }
         }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
@@ -400,14 +399,11 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
         }
     };
     state.selection.proposing = false;
-    let drawn = results::drawn_mask(state, source, finger);
-    let hand = accepted(drawn, &proposal, state.settings.mask.over_drawn);
-    if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
-        return state.log.info(format!("{WHAT}: the mask is so already"));
+    let over_drawn = state.settings.mask.over_drawn;
+    let accept = LabelEdit::AcceptProposal { place: place.clone(), proposal: &proposal, over_drawn };
+    if !change_mask(state, &place, accept, effects) {
+        state.log.info(format!("{WHAT}: the mask is so already"));
     }
-    let how = serde_json::to_value(&proposal.provenance).ok();
-    let deed = Operation { how, ..Operation::named("proposal accepted") };
-    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
 fn reset(state: &mut State, effects: &mut Vec<Effect>) {
@@ -416,7 +412,7 @@ fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     let source = results::worked_on(state, finger);
     let Some(place) = results::mask_place(state, source, finger) else { return };
     if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Remove the correction") {
-        set_hand_mask(state, Operation::named("correction removed"), place, None, effects);
+        change_mask(state, &place, LabelEdit::Remove(place.clone()), effects);
     }
 }
 
@@ -431,15 +427,13 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
     let to = results::worked_on(state, finger);
     let from = to.other();
     let size = results::imprint(state, to, finger).ready().map(|imprint| imprint.size());
-    let (Some(other), Some(place)) = (start_from(state, from, finger), results::mask_place(state, to, finger)) else {
+    let places = results::mask_place(state, from, finger).zip(results::mask_place(state, to, finger));
+    let (Some(mask), Some((other, place))) = (start_from(state, from, finger), places) else {
         let why = format!("there is no mask on the {} imprint", from.key());
         return state.log.error(&TaskError::new(WHAT, why));
     };
-    if Some(other.mask.size()) != size {
-        return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
-    }
-    let copy = other.copied(from);
-    set_hand_mask(state, Operation::named("mask of the other imprint taken over"), place, Some(copy), effects);
+    let from = TakenUp { place: other, mask };
+    change_mask(state, &place, LabelEdit::TakeOver { from, to: place.clone(), size }, effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -448,21 +442,13 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     if state.document.review(&pair) == review || !check_editable(state, "Review state") {
         return;
     }
-    let before = state.document.set_review(&pair, review);
-    let edit = Edit::Review { pair: pair.clone(), review: before };
-    state.history.record(Gesture { name: "review state".into(), edits: vec![edit] });
-    save_pair(state, &pair, Operation::named("review state"), effects);
+    change(state, &pair, LabelEdit::Review(review), None, effects);
 }
 
 fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
-    let text = note(text);
-    if !state.document.is_editable(pair) || state.document.note(pair) == text {
-        return;
+    if state.document.is_editable(pair) {
+        change(state, pair, LabelEdit::Note(text), None, effects);
     }
-    let before = state.document.set_note(pair, text);
-    let edit = Edit::Note { pair: pair.to_owned(), note: before };
-    state.history.record(Gesture { name: "note".into(), edits: vec![edit] });
-    save_pair(state, pair, Operation::named("note"), effects);
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
@@ -474,14 +460,12 @@ fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: 
         (true, Lookup::Ready(pose)) => Some(pose.grasp_from_object.into()),
         (true, _) => return state.log.error(&TaskError::new("Accept the pose", "there is no pose yet")),
     };
-    let name = if accept { "pose accepted" } else { "pose withdrawn" };
-    set_accepted(state, name, source, pose, effects);
+    set_accepted(state, source, pose, effects);
 }
 
 /// Stores or withdraws the accepted pose of an imprint: one gesture. The pair must be editable.
 pub(super) fn set_accepted(
     state: &mut State,
-    name: &'static str,
     source: ImprintSource,
     pose: Option<AcceptedPose>,
     effects: &mut Vec<Effect>,
@@ -490,19 +474,11 @@ pub(super) fn set_accepted(
         return state.log.error(&TaskError::new("Accept the pose", "the fingers show different predictions"));
     };
     let pair = state.pair_name().to_owned();
-    let before = state.document.pair(&pair).cloned().unwrap_or_default();
-    let mut after = before.clone();
-    after.accept(&of, pose);
-    let mut edits = Vec::new();
-    for of in [ImprintOf::unknown(), of] {
-        let pose = after.accepted.get(&of).copied();
-        if before.accepted.get(&of).copied() != pose {
-            edits.push(Edit::Pose { pair: pair.clone(), of, pose });
-        }
-    }
-    edits.iter_mut().for_each(|edit| edit.swap(&mut state.document));
-    state.history.record(Gesture { name: name.into(), edits });
-    save_pair(state, &pair, Operation::named(name), effects);
+    let edit = match pose {
+        Some(pose) => LabelEdit::AcceptPose(of, pose),
+        None => LabelEdit::WithdrawPose(of),
+    };
+    change(state, &pair, edit, None, effects);
 }
 
 fn undo(state: &mut State, effects: &mut Vec<Effect>) {

@@ -4,7 +4,6 @@ use super::keys::{ImprintSource, MaskRecipe, PredictionKey, TouchKey};
 use super::state::{Absent, State};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::recipe::{Model, Recipe};
-use touch2touch_work::subject::RecipeChange;
 
 /// The recipe of the automatic masks that the settings ask for, of whatever pair.
 ///
@@ -34,24 +33,19 @@ pub fn in_force(state: &State, imprint: ImprintSource) -> Recipe {
     }
 }
 
-/// The recipe in force of predictions, changed as a subject of a comparison wishes.
+/// The recipe in force of predictions, by a generator of a name where one is named.
 ///
 /// # Errors
 /// Why there is no such generator.
-pub(crate) fn changed(state: &State, wish: &RecipeChange) -> Result<Recipe, Absent> {
-    let generator = match &wish.bundle {
-        None => bundle(state, BundleKind::Generator)?,
-        Some(name) => {
-            let found = state.library.bundle_named(BundleKind::Generator, Some(name), &state.rig());
-            found.filter(|bundle| bundle.name == *name).ok_or(Absent::NoSuchGenerator)?
-        }
-    };
-    let mut config = state.settings.generate.config(generator);
-    config.steps = wish.steps.unwrap_or(config.steps);
-    config.seed = wish.seed.unwrap_or(config.seed);
+pub(crate) fn of_generator(state: &State, named: Option<&str>) -> Result<Recipe, Absent> {
     let recipe = in_force(state, ImprintSource::Predicted);
-    let shift = wish.shift.map_or(recipe.shift, |mapping| mapping.mode());
-    Ok(Recipe { generator: Some((generator.clone().into(), config)), shift, ..recipe })
+    let Some(name) = named else {
+        bundle(state, BundleKind::Generator)?;
+        return Ok(recipe);
+    };
+    let known = state.library.bundle_named(BundleKind::Generator, Some(name), &state.rig());
+    let bundle = known.filter(|bundle| bundle.name == name).ok_or(Absent::NoSuchGenerator)?;
+    Ok(Recipe { generator: Some((bundle.clone().into(), state.settings.generate.config(bundle))), ..recipe })
 }
 
 /// The bundle that the settings name, or the first of its kind.

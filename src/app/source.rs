@@ -11,6 +11,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_work::case::{Case, Held};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{ExportChoice, Plan};
+use touch2touch_work::follow::Following;
 use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
@@ -72,7 +73,12 @@ pub trait DataSource: Send + Sync {
     }
 
     /// Follows its folder for touches that appear; `None` for a source without a folder.
-    fn follow(&self) -> Option<Box<dyn Following>> {
+    fn follow(&self) -> Option<Following> {
+        None
+    }
+
+    /// Itself with a data set that grew while it was followed: known pairs keep their ids, and what was labeled stays known.
+    fn grown(&self, _dataset: &Arc<Dataset>) -> Option<Arc<dyn DataSource>> {
         None
     }
 
@@ -151,12 +157,6 @@ pub trait DataSource: Send + Sync {
         folder: &Path,
         cx: &JobCx,
     ) -> Result<String, TaskError>;
-}
-
-/// A data set whose folder is followed.
-pub trait Following: Send {
-    /// The next touch that arrived since the last call; returns soon if there is none.
-    fn poll(&mut self) -> Option<Followed>;
 }
 
 /// What happened in a followed folder.

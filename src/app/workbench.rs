@@ -215,5 +215,5 @@ fn accept(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let accepted = AcceptedPose { pose: hand.pose, by_hand: true };
     state.workbench.hand = None;
-    labels::set_accepted(state, "pose set by hand", hand.source, Some(accepted), effects);
+    labels::set_accepted(state, hand.source, Some(accepted), effects);
 }

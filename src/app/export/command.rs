@@ -1,4 +1,4 @@
-//! The command that does in a shell what a pane shows: [`State::equivalent`].
+//! The command that does in a shell what a pane shows: [`equivalent`].
 
 use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode};
@@ -9,6 +9,7 @@ use super::super::state::library::Place;
 use super::super::state::settings::ColorMap;
 use super::super::{adapt, dial, recipe, results};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
@@ -16,6 +17,19 @@ use touch2touch_work::sweep::Setting;
 
 fn command(verb: &str) -> Words {
     Words::default().word("touch2touch").word(verb)
+}
+
+/// A start as `--start` reads it: degrees and twice millimeters.
+fn start_text(start: PlanarPose) -> String {
+    let degrees = read_as(start.theta_rad, start.theta_rad.to_degrees(), f64::to_radians);
+    let [y_mm, z_mm] = [start.y_m, start.z_m].map(|length_m| read_as(length_m, length_m * 1e3, |mm| mm * 1e-3));
+    format!("{degrees},{y_mm},{z_mm}")
+}
+
+/// A number at or beside `near` that is read as exactly this value, a short one first; `near` where there is none.
+fn read_as(value: f64, near: f64, read: impl Fn(f64) -> f64) -> f64 {
+    let short = (near * 1e9).round() / 1e9;
+    [short, near, near.next_up(), near.next_down()].into_iter().find(|n| read(*n) == value).unwrap_or(near)
 }
 
 /// The words of the command that does what a pane shows, with the settings in force; `None` for panes that only choose.
@@ -54,8 +68,15 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             if shown.is_predicted() { words.then(drawn()) } else { words }
         }
         (_, Kind::Scene(side)) => posed(of_pair("export")?.option("--out", "exported"), side),
-        (Pane::TimeMachine | Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
-        (Pane::BasinMap, _) => posed(of_pair("basin")?, side),
+        (Pane::TimeMachine, _) => {
+            let start = state.inspect.start.map(|start| start_text(start.get()));
+            posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
+        }
+        (Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
+        (Pane::BasinMap, _) => {
+            let plane: &'static str = state.inspect.plane.into();
+            posed(of_pair("basin")?, side).option("--plane", plane)
+        }
         (Pane::Metrics | Pane::Poses, _) => {
             let recipe = recipe_shown(state, ImprintSource::Predicted);
             of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))
@@ -133,7 +154,7 @@ fn train_words(state: &State, words: Words) -> Words {
     }
 }
 
-/// [`Self::equivalent_words`] as one line for a shell.
+/// [`equivalent_words`] as one line for a shell.
 pub fn equivalent(state: &State, pane: Pane, error_m: f32) -> Option<String> {
     let words: Vec<String> = equivalent_words(state, pane, error_m)?.iter().map(|word| quoted(word)).collect();
     Some(words.join(" "))

@@ -69,7 +69,7 @@ impl PairExport {
             rig: &self.rig,
             clouds: &self.clouds,
             mask: &self.mask,
-            engine: self.registration,
+            registration: self.registration,
             pose: self.pose.as_deref(),
             truth: self.truth,
             tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),

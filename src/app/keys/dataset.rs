@@ -9,7 +9,6 @@ use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::import::Import;
-use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{JournalHistory, PairLabels};
 use touch2touch_work::tool::NamedTool;
@@ -105,7 +104,6 @@ pub struct ScoresKey {
     pub(crate) pairs: usize,
     /// How they are scored, as text.
     pub(crate) setup: String,
-    pub(crate) runtime: EngineChoice,
     /// How often scores were computed since.
     pub(crate) round: u64,
 }

@@ -5,6 +5,7 @@ use super::super::results;
 use super::super::state::State;
 use touch2touch_core::manual::{AcceptedPose, ManualPose, PoseDifference};
 use touch2touch_work::labels::ImprintOf;
+use touch2touch_work::propose::hand_pose;
 
 /// The imprint that a pose is made from, where all fingers show the same.
 pub(crate) fn shown_imprint(state: &State, source: ImprintSource) -> Option<ImprintOf> {
@@ -29,7 +30,7 @@ pub fn accepted_elsewhere(state: &State) -> Vec<&ImprintOf> {
 
 /// The pose that a person set and accepted.
 pub fn by_hand(state: &State, source: ImprintSource) -> Option<ManualPose> {
-    accepted(state, source).filter(|a| a.by_hand).map(|a| a.pose)
+    hand_pose(None, accepted(state, source))
 }
 
 /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.

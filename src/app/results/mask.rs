@@ -132,17 +132,17 @@ pub fn mask_places(state: &State) -> Vec<MaskPlace> {
     state.fingers().into_iter().flat_map(places).collect()
 }
 
-/// The mask that a person drew on an imprint.
+/// The mask that is in force on an imprint because a person drew it.
 pub(crate) fn drawn_mask_on<'a>(state: &'a State, imprint: &ImprintKey) -> Option<&'a DrawnMask> {
     let touch = imprint.touch();
     let name = &state.library.entry(touch.pair.pair)?.name;
-    state.document.drawn_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
+    let place = MaskPlace { pad: touch.finger, of: imprint.of()? };
+    state.document.pair(name)?.drawn(&place, results::imprint_input(state, imprint)?.get().ok()?)
 }
 
 /// The corrected mask of one finger's imprint, if it is there and as large.
 pub fn drawn_mask(state: &State, source: ImprintSource, finger: PadId) -> Option<&DrawnMask> {
-    let place = mask_place(state, source, finger)?;
-    state.document.pair(state.pair_name())?.drawn(&place, results::imprint(state, source, finger).ready()?)
+    drawn_mask_on(state, &results::imprint_key(state, source, finger).ok()?)
 }
 
 /// The mask in force on one finger's imprint: the corrected one, else the automatic one.

@@ -6,7 +6,7 @@ use super::super::state::State;
 use super::super::state::workbench::Layer;
 use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
-use touch2touch_work::propose::ProposalSource;
+use touch2touch_work::propose::{CadAt, Takes};
 
 /// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
 /// whether it is needed at all.
@@ -28,7 +28,7 @@ pub fn proposes(state: &State) -> bool {
 /// Whether the proposal needs the pose of an imprint.
 pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
     proposes(state)
-        && state.settings.mask.proposal == ProposalSource::CadRegistered
+        && state.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
         && results::worked_on(state, state.selection.finger) == source
 }
 

@@ -14,6 +14,7 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::cloud::Clouds;
+use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::tool::NamedTool;
 
@@ -73,6 +74,22 @@ impl Computes for ProvisionalPoseKey {
 /// # Errors
 /// Why there can be none.
 pub fn pose_key(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
+    match unmasked(state, source) {
+        Some(_) => Err(Absent::NoContact),
+        None => pose_key_of_the_rest(state, source),
+    }
+}
+
+/// Why a finger of an imprint has no mask, where none can be made: a pose of the others alone is not that of all.
+fn unmasked(state: &State, source: ImprintSource) -> Option<&TaskError> {
+    state.rig().pads().find_map(|finger| match results::mask_in_force(state, source, finger) {
+        Err(Lookup::Failed(err)) => Some(err),
+        _ => None,
+    })
+}
+
+/// [`pose_key`] of the fingers that have masks.
+fn pose_key_of_the_rest(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
     let tool = results::tool_name(state);
     let Some(cloud) = results::cloud_key(state, source)? else {
         return Ok(None);
@@ -87,6 +104,9 @@ pub fn pose_key(state: &State, source: ImprintSource) -> Result<Option<PoseKey>,
 pub fn pose(state: &State, source: ImprintSource) -> Lookup<'_, PoseResult> {
     if let failed @ Lookup::Failed(_) = results::tool(state) {
         return failed.without();
+    }
+    if let Some(err) = unmasked(state, source) {
+        return Lookup::Failed(err);
     }
     let before = || {
         let latest = || state.results.poses.get(results::latest(state, source)?.pose.as_ref()?);
@@ -109,15 +129,14 @@ pub fn provisional_pose(state: &State, source: ImprintSource) -> Option<&Arc<Pos
 /// # Errors
 /// Why there can be none.
 pub(crate) fn pose_key_of(state: &State, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
-    let Some(mut key) = pose_key(state, source)? else { return Ok(None) };
-    if let PoseOf::Finger(finger) = of {
-        let part = key.cloud.parts[finger].take();
-        if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-            return Err(Absent::NoFinger);
-        }
-        key.cloud.parts = PerPad::default();
-        key.cloud.parts[finger] = part;
+    let PoseOf::Finger(finger) = of else { return pose_key(state, source) };
+    let Some(mut key) = pose_key_of_the_rest(state, source)? else { return Ok(None) };
+    let part = key.cloud.parts[finger].take();
+    if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
+        return Err(Absent::NoFinger);
     }
+    key.cloud.parts = PerPad::default();
+    key.cloud.parts[finger] = part;
     Ok(Some(key))
 }
 

@@ -18,7 +18,7 @@ use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::MaskPlace;
-use touch2touch_work::propose::{self, Proposal, ProposalSource, Side};
+use touch2touch_work::propose::{self, CadAt, Proposal, Side, Takes, hand_pose};
 
 const WHAT: &str = "Propose a mask";
 
@@ -123,9 +123,9 @@ pub(crate) fn carries_from(state: &State) -> Option<PairKey> {
 pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Result<Option<ProposalKey>, Absent> {
     let imprint = results::imprint_key(state, source, finger)?;
     let within = Bits::from(state.settings.mask.choice.cad_distance_m);
-    let of = match state.settings.mask.proposal {
-        ProposalSource::Automatic => ProposalInputs::Automatic(results::mask_recipe(state, finger)?),
-        ProposalSource::CadTruth => {
+    let of = match state.settings.mask.proposal.takes() {
+        Takes::AutomaticMask => ProposalInputs::Automatic(results::mask_recipe(state, finger)?),
+        Takes::CadModel(CadAt::Truth) => {
             results::tool_name(state)?;
             let sample = results::sample(state).ready();
             if sample.is_some_and(|sample| sample.grasp_from_object.is_none()) {
@@ -133,26 +133,27 @@ pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Resu
             }
             ProposalInputs::Cad(CadPlace::Truth, within)
         }
-        ProposalSource::CadRegistered => match results::pose_key(state, source)? {
+        Takes::CadModel(CadAt::Registered) => match results::pose_key(state, source)? {
             Some(key) => ProposalInputs::Cad(CadPlace::Registered(Box::new(key)), within),
             None => return Ok(None),
         },
-        ProposalSource::CadHand => {
+        Takes::CadModel(CadAt::Hand) => {
             results::tool_name(state)?;
-            let held = state.workbench.hand(source).map(|hand| hand.pose).or_else(|| results::by_hand(state, source));
-            ProposalInputs::Cad(CadPlace::hand(held.ok_or(Absent::NoHandPose)?), within)
+            let held = state.workbench.hand(source).map(|hand| hand.pose);
+            let pose = hand_pose(held, results::accepted(state, source)).ok_or(Absent::NoHandPose)?;
+            ProposalInputs::Cad(CadPlace::hand(pose), within)
         }
-        ProposalSource::Grow => {
+        Takes::DrawnMask => {
             let hand = results::drawn_mask(state, source, finger).filter(|hand| hand.marks.has_hand_work());
             ProposalInputs::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
         }
-        ProposalSource::Carry => {
+        Takes::OtherPair => {
             let from = carries_from(state).ok_or(Absent::NoOtherMask)?;
             let name = state.library.entry(from.pair).map(|entry| entry.name.as_str()).unwrap_or_default();
             let hand = state.document.drawn_mask(name, &MaskPlace::measured(finger));
             ProposalInputs::Carry(from, hand.map(|hand| hand.revision))
         }
-        ProposalSource::OtherFinger => {
+        Takes::OtherPad => {
             let other = state.rig().other_pad(finger).ok_or(Absent::NoFinger)?;
             let key = results::imprint_key(state, source, other)?;
             match results::mask_in_force(state, source, other) {
@@ -190,11 +191,14 @@ pub(crate) fn want_proposal(wants: &mut Demands<'_>) {
     {
         return;
     }
-    let is_cad = state.settings.mask.proposal.is_cad();
-    if is_cad && results::tool_name(state).is_ok() && results::tool(state).ready().is_none() {
+    let takes = state.settings.mask.proposal.takes();
+    if matches!(takes, Takes::CadModel(_))
+        && results::tool_name(state).is_ok()
+        && results::tool(state).ready().is_none()
+    {
         return results::want_tool(wants);
     }
-    if state.settings.mask.proposal == ProposalSource::OtherFinger
+    if takes == Takes::OtherPad
         && let Some(other) = state.rig().other_pad(finger)
     {
         results::want_mask(wants, source, other);

@@ -12,6 +12,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::evaluate::{self, Setup};
+use touch2touch_work::recipe::Recipe;
 
 impl Computes for ScoresKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ScoreTable>> {
@@ -44,7 +45,6 @@ pub(crate) fn scores_key(state: &State) -> Option<ScoresKey> {
         dataset: open.seq,
         pairs: open.index().pairs.len(),
         setup: serde_json::to_string(&setup).ok()?,
-        runtime: setup.runtime,
         round: state.table.round,
     })
 }
@@ -72,17 +72,11 @@ pub fn evaluated(state: &State) -> impl Iterator<Item = (&BundleInfo, bool)> {
 /// What an evaluation started now would do; `None` without data or with nothing to score.
 pub(crate) fn evaluation_setup(state: &State) -> Option<Setup> {
     state.library.open.as_ref()?;
-    let origin = |kind| recipe::bundle(state, kind).ok().map(|b| b.origin.clone());
     let bundles: Vec<_> = evaluated(state).filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();
-    let recipe = recipe::in_force(state, ImprintSource::Measured);
     (!bundles.is_empty()).then(|| Setup {
         bundles,
-        mask_bundle: origin(BundleKind::Mask),
-        classifier: origin(BundleKind::Classifier),
-        mask: recipe.mask,
-        engine: recipe.registration,
-        shift: recipe.shift,
-        runtime: recipe.engine,
+        classifier: recipe::bundle(state, BundleKind::Classifier).ok().map(|b| b.origin.clone()),
+        recipe: Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Measured) },
         grasps_per_tool: state.table.grasps_per_tool,
         ..Setup::default()
     })

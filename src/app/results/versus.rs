@@ -23,7 +23,7 @@ use touch2touch_work::deviation::{CloudDifference, cloud_difference};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{RecipeChange, Subject};
+use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 
 impl Computes for ComparedKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
@@ -120,26 +120,27 @@ fn side_of(subject: &Subject) -> Option<ImprintSource> {
     }
 }
 
-/// The recipe of a wished prediction of a touch, and how it becomes meters.
-fn wished(state: &State, touch: TouchKey, wish: &RecipeChange) -> Result<(PredictionKey, ShiftMode), Absent> {
-    let recipe = recipe::changed(state, wish)?;
-    let key = PredictionKey::of(touch, &recipe).ok_or(Absent::NoGenerator)?;
-    if state.library.predicts_color(&key.bundle) {
-        return Err(Absent::PredictsColor);
-    }
-    Ok((key, recipe.shift))
+/// What a subject is made from by the settings.
+///
+/// # Errors
+/// Why it cannot be made.
+fn made_from(state: &State, subject: &Subject) -> Result<MadeFrom, Absent> {
+    subject.made_from(|named| recipe::of_generator(state, named))
 }
 
-/// The recipes of the predictions that a subject is made of, and how they become meters; none of what is not made.
+/// The keys of the predictions that a subject of a touch is made of, and how they become meters; none of what is not made.
 fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
-    match subject {
-        Subject::Measured | Subject::Stored => Ok((Vec::new(), state.settings.shift)),
-        Subject::Predicted(wish) => wished(state, touch, wish).map(|(recipe, shift)| (vec![recipe], shift)),
-        Subject::Mean(wish, count) => {
-            let (first, shift) = wished(state, touch, wish)?;
-            Ok((first.with_seeds(*count), shift))
-        }
+    let recipes = match made_from(state, subject)? {
+        MadeFrom::Measurement | MadeFrom::Picture => Vec::new(),
+        MadeFrom::Prediction(recipe) => vec![recipe],
+        MadeFrom::Mean(recipes) => recipes,
+    };
+    let shift = recipes.first().map_or(state.settings.shift, |recipe| recipe.shift);
+    let keys: Vec<PredictionKey> = recipes.iter().filter_map(|recipe| PredictionKey::of(touch, recipe)).collect();
+    if keys.first().is_some_and(|key| state.library.predicts_color(&key.bundle)) {
+        return Err(Absent::PredictsColor);
     }
+    Ok((keys, shift))
 }
 
 /// The imprint that a subject is of a finger.
@@ -154,8 +155,9 @@ pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<Im
         Subject::Predicted(wish) if *wish == RecipeChange::default() => {
             results::imprint_key(state, ImprintSource::Predicted, finger)
         }
-        Subject::Predicted(wish) => {
-            let (recipe, shift) = wished(state, touch, wish)?;
+        Subject::Predicted(_) => {
+            let (mut recipes, shift) = made_for(state, subject, touch)?;
+            let recipe = recipes.pop().ok_or(Absent::NoSuchGenerator)?;
             Ok(ImprintKey::Predicted(recipe, shift))
         }
         Subject::Mean(..) => {
@@ -214,6 +216,9 @@ pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<
 }
 
 fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
+    if let Some(side) = side_of(subject) {
+        return results::pose_key(state, side).ok()?;
+    }
     let cloud = subject_cloud(state, subject).ok()?;
     Some(PoseKey::of(cloud, results::tool_name(state).ok()?.into(), &recipe::in_force(state, ImprintSource::Predicted)))
 }

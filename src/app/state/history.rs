@@ -23,10 +23,6 @@ impl KeptMask {
         Self { packed: hand.pack(), revision: Some(hand.revision) }
     }
 
-    fn of_earlier_run(hand: &DrawnMask) -> Self {
-        Self { packed: hand.pack(), revision: None }
-    }
-
     fn unpack(&self, doc: &mut Document) -> Option<DrawnMask> {
         let revision = self.revision.unwrap_or_else(|| doc.next_revision());
         // It was packed from a mask, so that it can be read; where it cannot, nothing is put in its place.
@@ -126,18 +122,23 @@ pub struct Gesture {
 }
 
 impl Gesture {
-    /// The way back of a change that was made before the labels of `pair` were read.
-    fn back(pair: &str, name: Cow<'static, str>, change: &Change) -> Self {
+    /// What makes a change of the labels of `pair`. Masks get the revision; without one, of an earlier run, each a new one.
+    pub(in crate::app) fn forth(
+        pair: &str,
+        name: Cow<'static, str>,
+        change: &Change,
+        revision: Option<Revision>,
+    ) -> Self {
         let pair = || pair.to_owned();
         let mut edits = Vec::new();
-        for (place, [before, _]) in &change.masks {
-            let mask = before.as_ref().map(KeptMask::of_earlier_run);
+        for (place, [_, after]) in &change.masks {
+            let mask = after.as_ref().map(|hand| KeptMask { packed: hand.pack(), revision });
             edits.push(Edit::Mask { pair: pair(), place: place.clone(), mask });
         }
-        edits.extend(change.review.map(|[before, _]| Edit::Review { pair: pair(), review: before }));
-        edits.extend(change.note.as_ref().map(|[before, _]| Edit::Note { pair: pair(), note: before.clone() }));
-        for (of, [before, _]) in &change.accepted {
-            edits.push(Edit::Pose { pair: pair(), of: of.clone(), pose: *before });
+        edits.extend(change.review.map(|[_, after]| Edit::Review { pair: pair(), review: after }));
+        edits.extend(change.note.as_ref().map(|[_, after]| Edit::Note { pair: pair(), note: after.clone() }));
+        for (of, [_, after]) in &change.accepted {
+            edits.push(Edit::Pose { pair: pair(), of: of.clone(), pose: *after });
         }
         Self { name, edits }
     }
@@ -203,13 +204,19 @@ impl History {
         self.keep_budget();
     }
 
+    /// Does what a gesture says, and records it.
+    pub(in crate::app) fn make(&mut self, doc: &mut Document, mut gesture: Gesture) {
+        gesture.edits.iter_mut().for_each(|edit| edit.swap(doc));
+        self.record(gesture);
+    }
+
     /// Takes in what was done to a pair, and taken back, before its labels were read.
     pub(crate) fn restore(&mut self, pair: &str, done: &[Past], undone: &[Past]) {
         if self.done.iter().chain(&self.undone).any(|gesture| gesture.pair() == pair) {
             return;
         }
-        let back = |past: &Past| Gesture::back(pair, past.name.clone(), &past.change);
-        let forth = |past: &Past| Gesture::back(pair, past.name.clone(), &past.change.clone().inverse());
+        let forth = |past: &Past| Gesture::forth(pair, past.name.clone(), &past.change, None);
+        let back = |past: &Past| Gesture::forth(pair, past.name.clone(), &past.change.clone().inverse(), None);
         // Older than what was done in this run: the first to go where the budget ends.
         self.done.splice(0..0, done.iter().map(back));
         self.undone.splice(0..0, undone.iter().map(forth));
@@ -280,8 +287,8 @@ mod tests {
     use super::*;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
-    use touch2touch_core::predicted_id::PredictedId;
     use touch2touch_core::rig::{PadId, lab};
+    use touch2touch_work::io::predicted_id::PredictedId;
     use touch2touch_work::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> DrawnMask {
@@ -317,8 +324,11 @@ mod tests {
         assert_eq!(doc.drawn_mask("a", &place), Some(&before), "with its revision: results of it are still good");
         assert_eq!(edit, copy);
         // A mask of an earlier run gets a revision that nothing has.
-        let mut edit =
-            Edit::Mask { pair: "a".into(), place: place.clone(), mask: Some(KeptMask::of_earlier_run(&before)) };
+        let mut edit = Edit::Mask {
+            pair: "a".into(),
+            place: place.clone(),
+            mask: Some(KeptMask { revision: None, ..KeptMask::of(&before) }),
+        };
         edit.swap(&mut doc);
         assert_eq!(doc.drawn_mask("a", &place).unwrap().revision.0, doc.last_revision);
     }

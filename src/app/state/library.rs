@@ -15,7 +15,7 @@ use super::evaluate::TableState;
 use super::labels::Document;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
 use touch2touch_core::rig::{Rig, SensorKind};
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::bundles::{BundleInfo, BundleKind, by_id};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::filter::Filter;
 use touch2touch_work::prediction::made_with;
@@ -171,7 +171,7 @@ impl Library {
 
     /// The bundle with this identity.
     pub fn bundle(&self, id: &str) -> Option<&BundleInfo> {
-        self.bundles.iter().find(|b| &*b.id == id)
+        by_id(&self.bundles, id)
     }
 
     /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind; nothing in

@@ -14,7 +14,7 @@ use super::{
 /// A clean latent, `[batch, channels, height, width]`.
 pub(crate) type Latent = Tensor;
 
-/// How the noise is taken away.
+/// Sampler: the rule by which the noise is taken away.
 #[derive(
     Clone,
     Copy,

@@ -5,14 +5,15 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::diffusion::GenerateConfig;
-use super::postprocess::ShiftMode;
+use super::model_id::current;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::postprocess::ShiftMode;
 
 /// The words' version.
 const VERSION: &str = "v1";
 
-/// What a choice that is not named is. Part of the format: a choice that is new gets a line with what was done without
-/// it, and no line ever changes.
+/// Values of the choices that are not named. Part of the format: a choice that is new gets a line with what was done
+/// without it, and no line ever changes.
 const UNNAMED: &str = r#"{
     "steps": 50, "eta": 0.0, "seed": 42, "sampler": "ddim", "spacing": "trailing", "guidance": 1.0, "shift": "exact_inverse"
 }"#;
@@ -21,7 +22,7 @@ const UNNAMED: &str = r#"{
 /// of one generation, and the shift. Masks drawn on a prediction are filed under it, so it outlives versions of the program:
 /// choices are named, and those at their defaults left out, so that a new one changes no text.
 ///
-/// What an earlier version wrote is read as what it means; what none understands is kept as it is.
+/// A text that an earlier version wrote is read as what it means; one that none understands is kept as it is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub struct PredictedId(Arc<str>);
@@ -67,15 +68,19 @@ impl PredictedId {
 }
 
 impl From<String> for PredictedId {
-    /// What a file says.
+    /// Identity from the text of a file.
     fn from(text: String) -> Self {
         let before_v1 = || {
             let (bundle, choices) = text.split_once(' ')?;
             let (config, shift) = serde_json::from_str::<(GenerateConfig, ShiftMode)>(choices).ok()?;
             let config = GenerateConfig { eta: typed(config.eta), guidance: typed(config.guidance), ..config };
-            Some(Self::new(bundle, &config, shift))
+            Some(Self::new(&current(bundle), &config, shift))
         };
-        before_v1().unwrap_or_else(|| Self::verbatim(text))
+        let by_identity = || {
+            let (bundle, choices) = text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION))?;
+            Some(Self(format!("{} {choices}", current(bundle)).into()))
+        };
+        before_v1().or_else(by_identity).unwrap_or_else(|| Self::verbatim(text))
     }
 }
 
@@ -113,7 +118,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::diffusion::{Sampler, Spacing};
+    use touch2touch_core::diffusion::{Sampler, Spacing};
 
     fn config() -> impl Strategy<Value = GenerateConfig> {
         let sampler = prop_oneof![Just(Sampler::Ddim), Just(Sampler::Ddpm)];
