@@ -60,7 +60,7 @@ impl Errand for Refit {
         let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
             access.services.predict(by.bundle, by.engine, by.config, inputs, cx)
         };
-        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), &predict, cx)?;
+        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), predict, cx)?;
         let saved = access.services.save_statistics(&found)?;
         Ok((found, saved))
     }

@@ -24,7 +24,6 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::recipe::Recipe;
 
 impl Computes for PredictionKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
