@@ -6,6 +6,7 @@ use super::prediction::PredictionKey;
 use super::{Absent, Computes, Job, Lane, Lookup, SharedServices, State};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::ensemble::{Ensemble, ensemble};
+use touch2touch_work::on_pad::OnPad;
 
 impl Computes for EnsembleKey {
     type Value = Ensemble;
@@ -19,7 +20,7 @@ impl Computes for EnsembleKey {
         let touch = self.touch;
         let sample = results.samples.get(&touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| {
-            ensemble(&predictions, &imprints, shift, (&sample, touch.finger))
+            ensemble(&predictions, &imprints, shift, OnPad { sample: &sample, pad: touch.finger })
         }))
     }
 

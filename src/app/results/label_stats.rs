@@ -6,6 +6,7 @@ use super::super::pane::Demand;
 use super::{Computes, DatasetSeq, Demands, Job, Lane, SharedServices, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_work::label_stats::LabelStats;
+use touch2touch_work::repeats::Repeater;
 
 /// Everything that decides what is counted.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -28,7 +29,9 @@ impl Computes for LabelStatsKey {
         let source = state.library.open.as_ref()?.source.clone();
         let (reviews, person) = (state.document.reviews.clone(), self.person.clone());
         let share = f64::from(self.repeats_percent.get()) / 100.0;
-        Some(Job::new(Lane::Compute, "Count the labels", move |_| source.label_stats(&reviews, (&person, share))))
+        Some(Job::new(Lane::Compute, "Count the labels", move |_| {
+            source.label_stats(&reviews, Repeater { person: &person, share })
+        }))
     }
 
     fn bytes(stats: &LabelStats) -> usize {

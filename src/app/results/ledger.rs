@@ -5,6 +5,7 @@ use super::prediction::PredictionKey;
 use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State, TouchKey};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::ledger::{LedgerResult, of_prediction};
+use touch2touch_work::on_pad::OnPad;
 
 /// The depth chain of a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -18,7 +19,7 @@ impl Computes for LedgerKey {
         let prediction = state.results.predictions.get(&recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Depth chain", move |_| {
-            of_prediction(&prediction, shift, false, (&sample, recipe.touch.finger))
+            of_prediction(&prediction, shift, false, OnPad { sample: &sample, pad: recipe.touch.finger })
         }))
     }
 
