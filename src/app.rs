@@ -8,7 +8,7 @@
 //!   and what they do, `state.rs` in its folder what it keeps and how views find it.
 //! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
-//! * [`state::State::wanted`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
+//! * [`state::State::demands`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger, with its keys: menus, palette and shortcut sheet are made
 //!   from it; [`act`] turns its rows into commands.

@@ -4,7 +4,9 @@ mod exchange;
 mod in_3d;
 mod influence;
 mod proposals;
+mod random;
 mod recipes;
+mod verbs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

@@ -30,10 +30,10 @@ pub(super) struct BasinArgs {
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
-    /// Which imprint to align.
+    /// Imprint to align.
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     imprint: ImprintSource,
-    /// What of the start is varied: columns and rows of the grid.
+    /// Coordinates of the start that are varied: columns and rows of the grid.
     #[arg(long, value_enum, default_value_t = PlaneArg::AngleY)]
     plane: PlaneArg,
     #[command(flatten)]
@@ -76,7 +76,7 @@ struct Report {
     mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     mask_notes: Vec<String>,
-    /// What is odd about the files.
+    /// Oddities of the files.
     notes: Vec<Finding>,
     /// The true pose, `grasp_from_object`, where known.
     truth: Option<PlanarPose>,

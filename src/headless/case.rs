@@ -15,7 +15,7 @@ use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::recipe::Recipe;
 
-/// What is done with a case.
+/// Verbs of a case.
 #[derive(Debug, Subcommand)]
 pub(super) enum CaseVerb {
     /// Put a pair into one file: its data, labels, settings, and the results to be had from them.

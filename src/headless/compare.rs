@@ -70,14 +70,14 @@ pub(super) struct CompareArgs {
     json: JsonArgs,
 }
 
-/// What can be said of one imprint against another.
+/// Figures of one imprint against another.
 #[derive(Debug, Serialize)]
 struct Figures {
     psnr_db: Option<f64>,
     ssim: Option<f64>,
     /// Mean absolute difference, meters.
     mae_m: Option<f64>,
-    /// The same where the GelSlim saw, and where the model made it up.
+    /// Mean absolute difference where the GelSlim saw, and where the model made it up.
     seen_mae_m: Option<f64>,
     invented_mae_m: Option<f64>,
 }
@@ -111,7 +111,7 @@ struct Poses {
     b_deg: f64,
     a_error_deg: Option<f64>,
     b_error_deg: Option<f64>,
-    /// How far the two poses are apart.
+    /// Difference of the two poses.
     apart_deg: f64,
     apart_m: f64,
 }
@@ -125,7 +125,7 @@ struct Report {
     fingers: Vec<Finger>,
     /// `None` without camera, tool or contact.
     poses: Option<Poses>,
-    /// What is odd about the files, and why there are no poses.
+    /// Oddities of the files, and reasons why there are no poses.
     notes: Vec<Finding>,
 }
 

@@ -12,10 +12,10 @@ use touch2touch_work::labels::{Labels, PairLabels};
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::recipe::{meters, millimeters};
 
-/// Where masks come from.
+/// Source of contact masks, with its numbers.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct MaskArgs {
-    /// Where the contact masks come from that nobody drew. A mask drawn by hand wins over all of them; `mask` in the JSON
+    /// Source of the contact masks that nobody drew. A mask drawn by hand wins over all of them; `mask` in the JSON
     /// says what was taken. A flat imprint has no contact whatever the source; where the mask UNet finds none in an
     /// imprint that is clearly not flat, depth decides.
     #[arg(long, default_value = MaskSource::default().key(), value_parser = parse_source())]

@@ -31,7 +31,7 @@ pub(super) struct ExportArgs {
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
-    /// Which imprint.
+    /// Imprint to export.
     #[arg(long, value_parser = keyed::<ImprintSource>(), default_value = "measured")]
     imprint: ImprintSource,
     /// The files, with commas between them: `cloud` (PLY; contact, finger and distance to the model for each point),
@@ -67,7 +67,7 @@ struct Report {
     registration: String,
     mask: String,
     files: Vec<PathBuf>,
-    /// What is odd about the files of the pair.
+    /// Oddities of the files of the pair.
     notes: Vec<Finding>,
 }
 

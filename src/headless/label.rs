@@ -87,7 +87,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
     Ok(complete)
 }
 
-/// What masks and poses of a pair are made from.
+/// Inputs that masks and poses of a pair are made from.
 struct Maker<'a> {
     args: &'a LabelArgs,
     dataset: &'a Dataset,

@@ -132,9 +132,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
 /// A pair as `pose` asks for it.
 struct PairInput<'a> {
     name: &'a str,
-    /// Where pictures of it go.
+    /// Path of its pictures, without an ending.
     stem: Option<&'a Path>,
-    /// Where the influence of its pixels goes.
+    /// Path of the file for the influence of its pixels.
     influence: Option<&'a Path>,
     touch: Touch<'a>,
     tool: &'a ToolModel,

@@ -65,7 +65,7 @@ impl ModelArgs {
         Ok(Recipe { generator: Some((bundle.into(), config)), shift, ..recipe })
     }
 
-    /// The same with masks and a registration. A mask model is looked for where one is taken.
+    /// Recipe with masks and a registration. A mask model is looked for where one is taken.
     pub(super) fn posed(
         &self,
         imprint: ImprintSource,

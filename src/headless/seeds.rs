@@ -17,7 +17,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::models::Models;
 use touch2touch_work::recipe::Recipe;
 
-/// How many seeds.
+/// Number of seeds.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct SeedArgs {
     /// Predict with this many seeds, from the seed on: mean, spread per pixel, spread of the decoder's channels, and
@@ -26,7 +26,7 @@ pub(super) struct SeedArgs {
     pub seeds: u16,
 }
 
-/// Where the pictures of the fans go.
+/// Folder for the pictures of the fans.
 #[derive(Debug, Clone, Args)]
 pub(super) struct FanArgs {
     /// With `--seeds`: write a picture of each fan of poses into this folder.
@@ -85,8 +85,8 @@ pub(super) struct PoseFan {
     mean_deg: Option<f64>,
     /// Circular standard deviation.
     std_deg: Option<f64>,
-    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, and of what
-    /// instead (`depth`, `flat`).
+    /// Number of masks (one per seed and one of the mean imprint) that are not of the source that was asked, by what
+    /// they are of instead (`depth`, `flat`).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     mask_notes: BTreeMap<String, usize>,
     /// Farthest to either side of the mean, as differences from it.

@@ -30,7 +30,7 @@ pub(super) struct StatsArgs {
     /// The file to write; use it with `--shift refit --stats FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Which finger's touches: right, left (or as the data set names it), both.
+    /// Finger whose touches are taken: right, left (or as the data set names it), both.
     #[arg(long, default_value = "both")]
     finger: FingerArg,
     /// Take only this many pairs, spread evenly over the data set.

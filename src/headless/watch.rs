@@ -71,7 +71,7 @@ pub(super) struct WatchArgs {
     /// Take up what lies there, and end.
     #[arg(long)]
     once: bool,
-    /// How long a file that cannot be read may stay unchanged before it counts as broken, seconds.
+    /// Time that a file that cannot be read may stay unchanged before it counts as broken, seconds.
     #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
     patience: f64,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub(super) struct WatchArgs {
     common: Common,
 }
 
-/// What a touch was when it was done: with the same numbers and the same recipe it need not be done again.
+/// File of a touch when it was done: with the same numbers and the same recipe it need not be done again.
 #[derive(Debug, Clone, Serialize)]
 struct Source {
     file: String,

@@ -199,7 +199,7 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What runs, with its progress, and a way to stop it.
+/// First of the running jobs, with its progress, and a way to stop it.
 fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tasks = &cx.state.tasks;
     let more = tasks.running.len().saturating_sub(1);
@@ -246,8 +246,8 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
         ui.label(caption(format!("{:.1} ms", frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
         ui.add_space(8.0);
     }
-    let made = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
-    let text = match made {
+    let prediction = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
+    let text = match prediction {
         Some(prediction) => prediction.engine.clone(),
         None => cx.state.settings.runtime.name().to_owned(),
     };
@@ -267,8 +267,8 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.set_max_width(520.0);
             ui.horizontal(|ui| {
                 ui.vertical(|ui| {
-                    let made = cx.state.chosen(cx.state.selection.finger).is_some();
-                    let first = if made {
+                    let predicted = cx.state.chosen(cx.state.selection.finger).is_some();
+                    let first = if predicted {
                         "Simulated touches are open, with a first prediction beside the measurement."
                     } else {
                         "Simulated touches are open; a first prediction is being made."
@@ -289,7 +289,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
     });
 }
 
-/// What a folder dragged over the window would do.
+/// Overlay that says what a folder dragged over the window would do.
 pub(super) fn drop_overlay(cx: &Cx<'_>, ctx: &egui::Context) {
     if ctx.input(|i| i.raw.hovered_files.is_empty()) {
         return;

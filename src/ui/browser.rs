@@ -45,7 +45,7 @@ pub(super) fn review_color(p: &Palette, review: Review) -> Color32 {
 pub(super) struct Memory {
     /// The filter being typed.
     filter: String,
-    /// Whether the filter wants the keyboard.
+    /// True where the filter wants the keyboard.
     pub focus_filter: bool,
     /// The row that the list was last scrolled to; `None` where the list is a new one.
     pub scrolled_to: Option<Option<usize>>,
@@ -216,7 +216,7 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What the list is ordered by where the most uncertain come first, and how many pairs are ranked.
+/// Row with the metric that orders the list where the most uncertain come first, and the number of ranked pairs.
 fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     if cx.state.library.sort != Sort::Uncertain {
         return;
@@ -318,7 +318,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// What is brushed, and how far the scores are.
+/// Brushed pairs, and the progress of the scoring.
 fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     if let Some(brush) = &cx.state.library.brush {
         let button = egui::Button::new(format!("{} brushed ×", brush.len())).selected(true);
@@ -409,8 +409,8 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         }
         let mut right = rect.right() - 18.0;
         if let Some((text, color)) = figure_text(cx, id) {
-            let at = pos2(right, rect.bottom() - 5.0);
-            right = painter.text(at, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
+            let end = pos2(right, rect.bottom() - 5.0);
+            right = painter.text(end, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
         }
         let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
         let text = ui.painter_at(clip);

@@ -179,7 +179,7 @@ pub(super) fn button(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
     response.accessible_name(format!("Export {}", pane.title())).on_hover_text("Save or copy what this pane shows");
 }
 
-/// What can be taken away of a pane.
+/// Menu of the files that a pane offers.
 pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
     ui.set_min_width(190.0);
     if pane.in_figure().is_some() {

@@ -212,7 +212,7 @@ fn preset_name(preset: Preset) -> &'static str {
     }
 }
 
-/// What a preset does with this bundle, for its tooltip.
+/// Tooltip of a preset: what it does with this bundle.
 fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
     let what = match preset {
         Preset::Fast => "For looking through a data set: about the mean of all plausible imprints",
@@ -258,15 +258,15 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let Some(touch) = cx.state.touch_key(finger) else { return };
-    let made: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
+    let keys: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
     ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
-    if made.is_empty() {
+    if keys.is_empty() {
         ui.label(caption("None yet for this touch.", cx.p));
         return;
     }
     let chosen = cx.state.chosen(finger).cloned();
     let shift = cx.state.settings.shift;
-    for recipe in made.iter().rev() {
+    for recipe in keys.iter().rev() {
         let selected = chosen.as_ref() == Some(recipe);
         let psnr = cx
             .state
@@ -275,12 +275,12 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             .get(&VersusKey::measured(recipe.clone(), shift))
             .and_then(|c| c.psnr_db)
             .map_or(String::new(), |v| format!("{v:.1} dB"));
-        let made = cx.state.results.predictions.get(recipe);
-        let seconds = made.map_or(String::new(), |p| match p.kept {
+        let prediction = cx.state.results.predictions.get(recipe);
+        let seconds = prediction.map_or(String::new(), |p| match p.kept {
             true => "kept".to_owned(),
             false => format!("{:.1} s", p.seconds),
         });
-        let took = made.map_or(String::new(), |p| match p.kept {
+        let took = prediction.map_or(String::new(), |p| match p.kept {
             true => format!("Made earlier in {:.1} s and kept on the disk", p.seconds),
             false => format!("Made in {:.2} s", p.seconds),
         });

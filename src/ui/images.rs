@@ -34,7 +34,7 @@ use touch2touch_core::units;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::error::{TaskError, UnitOffer};
 
-/// What is being painted on the images.
+/// Stroke on the images, and outlines of masks.
 #[derive(Default)]
 pub(super) struct Memory {
     /// The stroke that the pointer is drawing: its pane and finger.
@@ -63,7 +63,7 @@ pub(super) fn map_of(state: &State) -> ColorMap {
     }
 }
 
-/// What every millimeter of this sample must be labeled with; empty where lengths are measured.
+/// Remark at every millimeter of this sample; empty where lengths are measured.
 pub(super) fn scale_note(state: &State) -> &'static str {
     match state.sample().ready().map(|s| s.scale) {
         Some(Scale::Assumed) => "assumed scale",
@@ -122,9 +122,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         let active = n > 1.0 && *finger == cx.state.selection.finger;
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt((pane, *finger)));
         child.set_clip_rect(rect.intersect(ui.clip_rect()));
-        let found = finger_image(cx, &mut child, memory, pane, *finger);
+        let drawn = finger_image(cx, &mut child, memory, pane, *finger);
         if histogram.is_none() || active {
-            histogram = found.or(histogram);
+            histogram = drawn.or(histogram);
         }
         if active {
             ui.painter().hline(rect.x_range(), rect.top() + 1.0, (2.0, cx.p.accent));
@@ -178,7 +178,7 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
     }
 }
 
-/// What stands where there is no picture: the one before, dimmed, while the next is on its way; else a sentence.
+/// Placeholder for a picture: the one before, dimmed, while the next is on its way; else a sentence.
 fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), lookup: Lookup<'_, T>, size: [usize; 2]) {
     match lookup {
         Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
@@ -239,7 +239,7 @@ pub(super) fn unit_buttons(cx: &mut Cx<'_>, ui: &mut Ui, offer: &UnitOffer, plac
     }
 }
 
-/// What is missing, and the action that brings it.
+/// Sentence that says what is missing, and the action that brings it.
 pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     // A prediction on its way shows how far it is, where it will appear.
     if absent == Absent::NoPrediction
@@ -323,10 +323,10 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
             hover(cx, finger, link.depth_from_color(px, image.size()));
         }
     }
-    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger)
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger)
         && let Some(link) = Link::of(&cx.state.rig(), finger)
     {
-        let px = link.color_from_depth(at.at_px, image.size());
+        let px = link.color_from_depth(point.at_px, image.size());
         if output.map.contains(px) {
             output.crosshair(px, Color32::WHITE);
         }
@@ -414,18 +414,18 @@ fn depth_pane(
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
     }
-    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger)
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger)
         && !(paintable && output.hovered.is_some())
     {
-        output.crosshair(at.at_px, Color32::WHITE);
+        output.crosshair(point.at_px, Color32::WHITE);
     }
     // The point that was read in 3D stays marked.
     if let Some(picked) =
         cx.state.workbench.picked.filter(|p| p.finger == finger && (p.source == source || pane == Pane::Error))
     {
-        let at = output.map.to_screen(picked.pixel.map(f32::from));
-        output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(3.0, Color32::from_black_alpha(140)));
-        output.painter.circle_stroke(at, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
+        let mark = output.map.to_screen(picked.pixel.map(f32::from));
+        output.painter.circle_stroke(mark, 6.0, eframe::egui::Stroke::new(3.0, Color32::from_black_alpha(140)));
+        output.painter.circle_stroke(mark, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
     }
     if paintable {
         let on_top = output.response.contains_pointer() || output.response.is_pointer_button_down_on();

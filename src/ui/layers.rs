@@ -37,7 +37,7 @@ pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
     }
 }
 
-/// What a reason means, for its tooltip.
+/// Tooltip of a reason.
 fn reason_tip(reason: Reason) -> &'static str {
     match reason {
         Reason::Inlier => "Contact point near the outline: it pulls on the pose",
@@ -86,7 +86,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// Which side the pane is about, and which layer colors the points.
+/// Choice of the side that the pane is about, and of the layer that colors the points.
 fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;

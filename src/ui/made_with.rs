@@ -78,15 +78,16 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: 
     // Names are long, and differ at their ends.
     let left = (room.width() - 12.0 - width(lead) - width(&settings)).max(40.0);
     let shown = format!("{lead}{}{settings}", cut_in_the_middle(model, left, width));
-    let at = room.left_center() + vec2(6.0, 0.0);
-    painter.text(at, Align2::LEFT_CENTER, shown, FontId::proportional(SMALL), color);
+    let start = room.left_center() + vec2(6.0, 0.0);
+    painter.text(start, Align2::LEFT_CENTER, shown, FontId::proportional(SMALL), color);
     let response = ui.interact(room, ui.scope_id().with((pane, "made with")), Sense::hover());
     response.widget_info(|| eframe::egui::WidgetInfo::labeled(eframe::egui::Role::Label, true, &text));
     response.on_hover_text(format!("{text}. {tip}"));
     if again {
-        let at = Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
+        let place =
+            Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
         let button = Button::new(RichText::new("Generate").size(SMALL)).small().min_size(vec2(BUTTON, 16.0));
-        let button = ui.put(at, button).accessible_name(format!("Generate anew, {}", pane.title()));
+        let button = ui.put(place, button).accessible_name(format!("Generate anew, {}", pane.title()));
         let tip = cx.keys().behind("Predicts with the settings in force", Action::Generate);
         if button.on_hover_text(tip).clicked() {
             cx.act(Action::Generate);

@@ -29,7 +29,7 @@ pub(super) struct Memory {
     pair: String,
     /// The text.
     note: String,
-    /// Whether it is being typed.
+    /// True while it is being typed.
     typing: bool,
 }
 
@@ -102,7 +102,7 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// What the tools make of the pixels.
+/// Choice of what the tools make of the pixels.
 fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
@@ -165,7 +165,7 @@ fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// Where a hand may change the mask.
+/// Limits on the pixels that a hand may change.
 fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut new = cx.state.settings.mask.clone();
     let gate = &mut new.gate;
@@ -267,7 +267,7 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// Where the mask of one imprint comes from.
+/// Origin of the mask of one imprint.
 fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
     let text = match cx.state.mask_in_force(source, finger) {
         Ok(mask) => mask.label,
@@ -283,7 +283,7 @@ fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
 
 /// From which probability on the mask model's pixels are contact.
 fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
-    /// Where somebody who chooses himself starts.
+    /// Probability at which somebody starts who chooses it himself.
     const START: f32 = 0.5;
     ui.horizontal(|ui| {
         let mut own = choice.probability.is_some();
@@ -338,7 +338,7 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     effect(cx, ui);
 }
 
-/// What the last change of a mask did to the pose, as soon as that is registered again.
+/// Effect of the last change of a mask on the pose, as soon as that is registered again.
 fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
@@ -472,7 +472,7 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     response.on_hover_text(tip);
 }
 
-/// What lies over the imprints.
+/// Switches of the layers over the imprints.
 fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (settings, selection) = (&cx.state.settings, &cx.state.selection);
     let switches = [

@@ -217,7 +217,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The same figures apart for what the GelSlim saw and for what the model made up.
+/// Figures apart for what the GelSlim saw and for what the model made up.
 fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
     let Some(split) = c.split else { return };
     let number = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| units::fixed(v, digits));
@@ -253,10 +253,10 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let shift = cx.state.settings.shift;
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
     if let Some(recipe) = cx.state.chosen(finger).cloned() {
-        if let Some(found) = cx.state.ledger(finger).shown() {
+        if let Some(chain) = cx.state.ledger(finger).shown() {
             // The channels are of the pane "Depth chain"; here it is the way to meters.
             let way = |stage| !matches!(stage, Stage::Channel(_) | Stage::Resized | Stage::Placed);
-            for record in found.ledger.stages.iter().filter(|r| way(r.stage)) {
+            for record in chain.ledger.stages.iter().filter(|r| way(r.stage)) {
                 let name = match record.stage {
                     Stage::Reduced => "Decoder",
                     Stage::Meters => "Meters",
@@ -276,8 +276,8 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
     {
         let stats = *memory.stats.get("measured", touch, || Stats::of(imprint));
-        let at = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
-        rows.insert(at, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
+        let row = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
+        rows.insert(row, ("Measured", Some(side_color(cx.p, ImprintSource::Measured)), stats, true));
     }
     if rows.is_empty() {
         return;
@@ -285,9 +285,9 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     ui.add_space(4.0);
     ui.label(section(&format!("Ledger, {} finger", cx.state.finger_name(finger)), cx.p))
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
-    if let Some(found) = cx.state.ledger(finger).shown() {
-        let serious = found.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();
-        if let Some(first) = found.ledger.flags.first().filter(|_| serious > 0) {
+    if let Some(chain) = cx.state.ledger(finger).shown() {
+        let serious = chain.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();
+        if let Some(first) = chain.ledger.flags.first().filter(|_| serious > 0) {
             let color = if first.severity == Severity::Wrong { cx.p.wrong } else { cx.p.caution };
             let more = if serious > 1 { format!(" (and {} more)", serious - 1) } else { String::new() };
             let text = RichText::new(format!("{}{more}", first.what)).size(SMALL).color(color);

@@ -60,9 +60,9 @@ fn cells(cx: &Cx<'_>, of: PoseOf) -> [([String; 2], Color32); 3] {
     let pose = |source| cx.state.pose_of(source, of);
     let planar = |source| -> Option<PlanarPose> { Some(pose(source).ready()?.grasp_from_object) };
     let against = |source: ImprintSource| match (pose(source), cx.state.truth()) {
-        (Lookup::Ready(found), Some(truth)) => {
-            let difference = PoseDifference::between(found.grasp_from_object, truth);
-            (text(difference), grade_color(p, Verdict::of(found, Some(truth)).grade))
+        (Lookup::Ready(pose), Some(truth)) => {
+            let difference = PoseDifference::between(pose.grasp_from_object, truth);
+            (text(difference), grade_color(p, Verdict::of(pose, Some(truth)).grade))
         }
         (Lookup::Failed(_), _) => (["failed".to_owned(), String::new()], p.wrong),
         (Lookup::Waiting, _) => (["…".to_owned(), String::new()], p.weak),

@@ -51,7 +51,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// What is compared, and the buttons.
+/// Choice of what is compared, and the buttons.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -141,7 +141,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     });
 }
 
-/// Where the method's name, the number of grasps and each figure stand: as wide as their headings ask for.
+/// Cells of the method's name and of the figures, the number of grasps first: as wide as their headings ask for.
 fn cells(rect: Rect, shown: &[&Column]) -> (Rect, Vec<Rect>) {
     let letters = |text: &str| text.chars().count().max(6) as f32 + 1.0;
     let shares: Vec<f32> = std::iter::once("grasps").chain(shown.iter().map(|c| c.heading)).map(letters).collect();
@@ -166,10 +166,10 @@ fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
     ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
     let grasps = ("grasps", "Grasps that were scored");
     let texts = std::iter::once(grasps).chain(shown.iter().map(|c| (c.heading, c.tip)));
-    for (at, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
+    for (column, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
         let right = pos2(cell.right() - 6.0, cell.center().y);
         ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), cx.p.weak);
-        ui.interact(cell, ui.scope_id().with((group.label(), at)), Sense::hover()).on_hover_text(tip);
+        ui.interact(cell, ui.scope_id().with((group.label(), column)), Sense::hover()).on_hover_text(tip);
     }
 }
 

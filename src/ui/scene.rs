@@ -46,7 +46,7 @@ pub(super) use overlay::{angle_text, error_color, pose_details, pose_time};
 /// Width of the column of buttons, points.
 const BUTTONS: f32 = 28.0;
 
-/// How near the pointer must be to a point to mean it, physical pixels.
+/// Distance of the pointer from a point at which it means it, physical pixels.
 const PICK_PX: f64 = 9.0;
 
 /// The views of both sides, and what the renderer holds of the results; lists are by [`ImprintSource`].
@@ -137,7 +137,7 @@ impl Memory {
         self.drawing.take().is_some()
     }
 
-    /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
+    /// Place of a point of the grasp frame (meters) when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
     }
@@ -210,7 +210,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         memory.moved = Some((pass, source));
     }
     let linked = state.settings.cameras_linked;
-    scene.moving = memory.moved.is_some_and(|(at, by)| pass <= at + 1 && (by == source || linked));
+    scene.moving = memory.moved.is_some_and(|(last_pass, by)| pass <= last_pass + 1 && (by == source || linked));
     if scene.moving {
         // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
@@ -350,11 +350,11 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
         // At rest, or while the view turns, the mark stays where it is.
         cx.shared.hover_claimed = true;
         let marked = cx.state.selection.hover.filter(|_| cx.state.selection.hover_point.is_some());
-        let found = marked.and_then(|hover| {
+        let point = marked.and_then(|hover| {
             let [x, y] = hover.at_px.map(|v| v.round().max(0.0) as usize);
             Some((hover.finger, clouds.finger(hover.finger)?.at_pixel(x, y)?))
         });
-        if let Some((finger, index)) = found {
+        if let Some((finger, index)) = point {
             say(cx, source, finger, index, clouds);
         }
         return;
@@ -379,7 +379,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
     say(cx, source, finger, index, clouds);
 }
 
-/// What the status bar says of a point.
+/// Puts the figures of a point into the status bar.
 fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
     let cloud = clouds.finger(finger);
     let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
@@ -399,13 +399,13 @@ fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clou
     ));
 }
 
-/// How far a point lies from the registered model where distances are shown, meters; `None` of one outside the contact.
+/// Distance of a point from the registered model where distances are shown, meters; `None` of one outside the contact.
 fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
-    let found = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
+    let deviation = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
     let contact = &clouds.finger(finger)?.contact;
     // Distances are of the contact points alone, in their order.
-    let at = contact.get(..index)?.iter().filter(|contact| **contact).count();
-    let off = contact[index].then(|| found.points[finger].as_ref()?.get(at).copied())??;
+    let contact_index = contact.get(..index)?.iter().filter(|contact| **contact).count();
+    let off = contact[index].then(|| deviation.points[finger].as_ref()?.get(contact_index).copied())??;
     Some(f64::from(off)).filter(|off| off.is_finite())
 }
 

@@ -100,8 +100,8 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
     let rows = recipes.len().div_ceil(columns);
     let (area, _) = ui.allocate_exact_size(vec2(width, rows as f32 * (size.y + GAP)), Sense::hover());
     for (i, recipe) in recipes.iter().enumerate() {
-        let at = vec2((i % columns) as f32, (i / columns) as f32) * (size + vec2(GAP, GAP));
-        let rect = Rect::from_min_size(area.min + at, size);
+        let offset = vec2((i % columns) as f32, (i / columns) as f32) * (size + vec2(GAP, GAP));
+        let rect = Rect::from_min_size(area.min + offset, size);
         let response = ui.interact(rect, ui.scope_id().with(("seed", i)), Sense::click());
         response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Seed {}", recipe.seed)));
         let painter = ui.painter_at(rect);
@@ -143,9 +143,9 @@ fn shade(painter: &Painter, rect: Rect, corner: Align2, text: &str) {
         return;
     }
     let galley = painter.layout_no_wrap(text.to_owned(), FontId::proportional(10.0), Color32::from_gray(235));
-    let at = corner.align_size_within_rect(galley.size() + vec2(4.0, 0.0), rect.shrink(2.0));
-    painter.rect_filled(at, 2.0, Color32::from_black_alpha(150));
-    painter.galley(at.min + vec2(2.0, 0.0), galley, Color32::WHITE);
+    let place = corner.align_size_within_rect(galley.size() + vec2(4.0, 0.0), rect.shrink(2.0));
+    painter.rect_filled(place, 2.0, Color32::from_black_alpha(150));
+    painter.galley(place.min + vec2(2.0, 0.0), galley, Color32::WHITE);
 }
 
 /// Mean, spread of the seeds, spread of the decoder's channels.
@@ -201,9 +201,9 @@ fn maps(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], ensemble: &Ense
     }
 }
 
-/// Which color is how many millimeters.
-fn bar(cx: &Cx<'_>, painter: &Painter, at: Pos2, width: f32, colors: ColorMap, range: Range) {
-    let rect = Rect::from_min_size(at, vec2(width, 6.0));
+/// Bar of the colors, with the millimeters that they mean.
+fn bar(cx: &Cx<'_>, painter: &Painter, corner: Pos2, width: f32, colors: ColorMap, range: Range) {
+    let rect = Rect::from_min_size(corner, vec2(width, 6.0));
     gradient(painter, rect, 24, |t| {
         let [r, g, b] = colors.rgb8(t);
         Color32::from_rgb(r, g, b)

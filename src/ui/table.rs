@@ -86,14 +86,14 @@ fn columns(sources: &[SourceScores], width: f32) -> Vec<ScoreColumn<'_>> {
     sources.iter().flat_map(of).collect()
 }
 
-/// Where the names and the numbers stand.
+/// Cells of the names and of the numbers.
 fn cells(rect: Rect, numbers: usize) -> ([Rect; 2], Vec<Rect>) {
     let cell = |left: f32, width: f32| Rect::from_min_size(pos2(left, rect.top()), vec2(width, rect.height()));
     let [pair, tool] = NAMES;
     let start = rect.left() + pair + tool;
     let width = (rect.right() - 20.0 - start) / numbers.max(1) as f32;
     let names = [cell(rect.left(), pair), cell(rect.left() + pair, tool)];
-    (names, (0..numbers).map(|at| cell(start + at as f32 * width, width)).collect())
+    (names, (0..numbers).map(|index| cell(start + index as f32 * width, width)).collect())
 }
 
 fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {

@@ -118,7 +118,7 @@ pub(super) fn pose_text(grasp_from_object: PlanarPose) -> String {
     format!("{}, y {}, z {} mm", units::text_deg(lab), mm(y_m), mm(z_m))
 }
 
-/// What is looked at: imprint, registration, start.
+/// Choice of imprint, registration and start.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
@@ -190,7 +190,7 @@ fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What is drawn on a button of the transport.
+/// Icon on a button of the transport.
 #[derive(Clone, Copy)]
 enum Icon {
     First,
@@ -203,15 +203,15 @@ enum Icon {
 
 impl Icon {
     /// Twelve points across. Drawn, because no font of the program has all of them.
-    fn paint(self, ui: &Ui, at: Pos2, color: Color32) {
+    fn paint(self, ui: &Ui, center: Pos2, color: Color32) {
         let painter = ui.painter();
         let bar = |x: f32, width: f32| {
-            painter.rect_filled(Rect::from_center_size(at + vec2(x, 0.0), vec2(width, 10.0)), 0.0, color);
+            painter.rect_filled(Rect::from_center_size(center + vec2(x, 0.0), vec2(width, 10.0)), 0.0, color);
         };
         // Points to the right for 1, to the left for -1.
         let triangle = |x: f32, side: f32| {
             let corners = [vec2(-4.0 * side, -5.0), vec2(4.0 * side, 0.0), vec2(-4.0 * side, 5.0)];
-            let corners = corners.map(|c| at + vec2(x, 0.0) + c).to_vec();
+            let corners = corners.map(|c| center + vec2(x, 0.0) + c).to_vec();
             painter.add(Shape::convex_polygon(corners, color, Stroke::NONE));
         };
         match self {

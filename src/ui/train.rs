@@ -87,7 +87,7 @@ fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
     ui.add(drag).accessible_name(name).on_hover_text("Ten minutes are about right for twenty masks on two free cores");
 }
 
-/// What would be learned from.
+/// Plan of the training.
 fn plan(cx: &Cx<'_>, ui: &mut Ui) {
     if cx.state.running(TaskKind::Train).is_some() {
         return;
@@ -151,7 +151,7 @@ fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui) {
     });
 }
 
-/// What it is worth on masks that were not trained on.
+/// Scores of the new model on masks that were not trained on.
 fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     ui.add_space(6.0);
     ui.label(section("On pairs that were left out", cx.p));

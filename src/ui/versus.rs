@@ -26,9 +26,9 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::subject::Subject;
 
-/// What the comparison remembers.
+/// Memory of the comparison.
 pub(super) struct Memory {
-    /// Where the line of the wipe stands, as a share of the picture's width.
+    /// Position of the wipe's line, as a share of the picture's width.
     wipe: f32,
     /// The 3D view.
     space: space::Space,
@@ -70,7 +70,7 @@ fn color(p: &Palette, versus: &Versus, letter: Letter) -> Color32 {
     }
 }
 
-/// Whether the key is held that shows B in the place of A.
+/// True while the key is held that shows B in the place of A.
 fn flickers(ui: &Ui) -> bool {
     let held = ui.input(|i| i.key_down(egui::Key::F) && i.modifiers.is_none());
     held && !ui.ctx().egui_wants_keyboard_input()
@@ -108,11 +108,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         for (letter, rect) in parts {
             let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
             child.set_clip_rect(rect.intersect(ui.clip_rect()));
-            let found = match versus.mode {
+            let drawn = match versus.mode {
                 VersusMode::Difference => difference(cx, &mut child, &versus, *finger),
                 _ => picture(cx, &mut child, memory, &versus, letter, *finger, flipped),
             };
-            histogram = found.or(histogram);
+            histogram = drawn.or(histogram);
         }
     }
     let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
@@ -123,7 +123,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     bar::color_bar(cx, &mut child, pane, histogram.as_ref());
 }
 
-/// What is compared, and how; whether the button is held that shows B in the place of A.
+/// Choice of what is compared, and how; true while the button is held that shows B in the place of A.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     let mut held = false;
     ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
@@ -163,7 +163,7 @@ fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> Canvas
     output
 }
 
-/// What stands where there is no picture.
+/// Placeholder for a picture.
 fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
     match lookup {
         Lookup::Failed(err) => failed(cx, ui, err),
@@ -279,19 +279,19 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
         }
     }
     let lookup = cx.state.subjects_compared(&versus.a, &versus.b, finger);
-    let Some(found) = lookup.shown() else {
-        instead(cx, ui, lookup.map(|found| &found.error));
+    let Some(compared) = lookup.shown() else {
+        instead(cx, ui, lookup.map(|compared| &compared.error));
         return None;
     };
     let label = format!("A minus B {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, &label, found.error.size());
+    let output = canvas(cx, ui, &label, compared.error.size());
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let keys = [&versus.a, &versus.b].map(|subject| cx.state.subject_key(subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
     let range = Range::symmetric(cx.shared.views.error_m());
     let key = (VersusKey { a, b }, range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
-        (depth_image(&found.error, ColorMap::Diverging, range), Histogram::of(found.error.as_slice()))
+        (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
     });
     output.paint(picture.texture.id(), Color32::WHITE);
     let histogram = picture.histogram.clone();
@@ -303,7 +303,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     histogram
 }
 
-/// What lies over every picture: GelSlim's window, cross-hair, the values under the pointer.
+/// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
 fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
@@ -312,8 +312,8 @@ fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) 
         readout(cx, output, versus, finger, px);
         hover(cx, finger, px);
     }
-    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger) {
-        output.crosshair(at.at_px, Color32::WHITE);
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger) {
+        output.crosshair(point.at_px, Color32::WHITE);
     }
 }
 

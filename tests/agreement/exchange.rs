@@ -6,7 +6,7 @@ use touch2touch_work::io::exchange::Format;
 use super::*;
 
 #[test]
-fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
+pub(super) fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
     let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
     let names: Vec<String> = Dataset::open(&folder).unwrap().index.pairs.iter().map(|pair| pair.name.clone()).collect();

@@ -10,7 +10,7 @@ use super::*;
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 #[test]
-fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
+pub(super) fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
     let path = folder.to_str().unwrap();

@@ -221,7 +221,7 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
 }
 
 #[test]
-fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
+pub(super) fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
     let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
     let name =

@@ -75,7 +75,7 @@ fn registration() -> impl Strategy<Value = RegistrationChoice> {
     (by, rejection).prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or(by.into()))
 }
 
-fn recipe() -> impl Strategy<Value = Recipe> {
+pub(super) fn recipe() -> impl Strategy<Value = Recipe> {
     let imprint = proptest::sample::select(ImprintSource::iter().collect::<Vec<_>>());
     let engine = proptest::sample::select(vec![EngineChoice::Auto, EngineChoice::Rten, EngineChoice::Ort]);
     let (generator, unet) = (model("generator"), model("mask"));
@@ -117,7 +117,7 @@ proptest! {
 }
 
 /// Puts a recipe in force in the studio.
-fn put(studio: &mut Studio, recipe: &Recipe) {
+pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
     let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = recipe.generator.as_ref().unwrap().1;
     let before = studio.state.settings.clone();
     let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, guidance, ..before.generate };
@@ -184,7 +184,7 @@ fn file_name(state: &State) -> String {
 }
 
 #[test]
-fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
+pub(super) fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
     let mut runner = TestRunner::deterministic();
     let mut draw = || {
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
@@ -228,7 +228,7 @@ fn timeless(mut value: Value) -> Value {
 }
 
 #[test]
-fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() {
+pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() {
     let mut runner = TestRunner::deterministic();
     // Kept scores of the one are not to be found by the other.
     let [home, other] = [0; 2].map(|_| tempfile::tempdir().unwrap());

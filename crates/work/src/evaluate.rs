@@ -34,10 +34,10 @@ use touch2touch_core::sample::Scale;
 
 pub use export::{Report, export, rows};
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Evaluate";
 
-/// What to evaluate, and how.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
     /// Generator bundles: a row each.
@@ -100,17 +100,17 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
     /// The column groups.
     pub groups: Vec<Group>,
-    /// What PSNR and SSIM mean.
+    /// Meaning of PSNR and SSIM.
     pub conventions: &'static str,
-    /// What the columns mean, and what is missing and why.
+    /// Meaning of the columns, and reasons for what is missing.
     pub notes: Vec<String>,
-    /// What is odd about the files, by kind.
+    /// Oddities of the files, by kind.
     pub findings: Vec<Finding>,
-    /// What was left out.
+    /// Grasps and tools that were left out, and why.
     pub skipped: Vec<Skipped>,
-    /// Whether everything asked for was scored: false if stopped early.
+    /// True where everything asked for was scored; false if stopped early.
     pub complete: bool,
-    /// How.
+    /// Settings of the evaluation.
     pub setup: Setup,
     /// The engine of the models and its threads.
     pub runtime: String,

@@ -64,8 +64,8 @@ pub struct Fan {
     pub of_mean_rad: Option<f64>,
     /// The angles around their mean; `None` where there are none.
     pub fan: Option<AngleFan>,
-    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, by finger and
-    /// what they are of instead.
+    /// Number of masks (one per seed and one of the mean imprint) that are not of the source that was asked, by finger
+    /// and what they are of instead.
     pub otherwise: BTreeMap<String, usize>,
 }
 

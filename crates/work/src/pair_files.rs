@@ -35,7 +35,7 @@ pub enum PairFile {
 }
 
 impl PairFile {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn key(self) -> &'static str {
         self.into()
     }
@@ -49,20 +49,20 @@ impl PairFile {
     }
 }
 
-/// What is written of a pair.
+/// Parts that are written of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct PairParts<'a> {
-    /// Its name.
+    /// Name of the pair.
     pub name: &'a str,
-    /// Which imprint it is about.
+    /// Source of the imprint.
     pub source: ImprintSource,
-    /// How it was predicted, as [`super::figure::note`] says it; `None` of a measured one.
+    /// Origin of the prediction, as [`super::figure::note`] says it; `None` of a measured one.
     pub prediction: Option<&'a str>,
-    /// Its sensors.
+    /// Sensors of the pair.
     pub rig: &'a Rig,
     /// The surface points of that imprint.
     pub clouds: &'a Clouds,
-    /// What their contact masks are made of.
+    /// Bases of the contact masks, as [`super::mask::made_of`] says them.
     pub mask: &'a str,
     /// The registration.
     pub registration: RegistrationChoice,
@@ -81,7 +81,7 @@ type Matrix = [[f64; 4]; 4];
 struct PoseFile<'a> {
     pair: &'a str,
     imprint: &'static str,
-    /// How the imprint was predicted; none of a measured one.
+    /// Origin of the prediction; none of a measured imprint.
     #[serde(skip_serializing_if = "Option::is_none")]
     prediction: Option<&'a str>,
     tool: Option<&'a str>,

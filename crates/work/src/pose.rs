@@ -30,7 +30,7 @@ pub struct PoseResult {
     pub num_points: usize,
     /// Why it stopped, in words.
     pub stop: String,
-    /// Whether it stopped because nothing moved any more.
+    /// True where it stopped because nothing moved any more.
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
@@ -39,7 +39,7 @@ pub struct PoseResult {
 }
 
 impl PoseResult {
-    /// The same the other way round; its angle is the number that the lab reports.
+    /// Pose the other way round; its angle is the number that the lab reports.
     pub fn object_from_grasp(&self) -> PlanarPose {
         self.grasp_from_object.inverse()
     }
@@ -82,7 +82,7 @@ pub fn pose(
     })
 }
 
-/// Where starts lead.
+/// Basin map: the poses that many starts lead to.
 ///
 /// # Errors
 /// If the job was told to stop, or no start led anywhere.

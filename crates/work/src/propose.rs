@@ -32,16 +32,16 @@ pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";
 
-/// How far a membrane may lie from where it was in the other pair and still be in contact with the same place of the
-/// tool, meters.
+/// Distance that a membrane may lie at most from where it was in the other pair and still be in contact with the same
+/// place of the tool, meters.
 const CARRY_GATE_M: f64 = 0.0015;
-/// The same from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
+/// Distance likewise from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
 const ACROSS_GATE_M: f64 = 0.003;
 
 /// The greatest distance to the CAD model that a mask can be made of, meters.
 pub const FARTHEST_M: f64 = 0.01;
 
-/// What proposes a mask.
+/// Source of a proposed mask.
 #[derive(
     Clone,
     Copy,
@@ -97,7 +97,7 @@ impl ProposalSource {
         }
     }
 
-    /// What it does, in a line.
+    /// Description in a line.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Automatic => "What the automatic source below says, with its numbers",
@@ -169,9 +169,9 @@ pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Op
 pub struct Proposal {
     /// The contact, as large as the imprint.
     pub mask: Mask,
-    /// Where it comes from.
+    /// Origin of the mask.
     pub provenance: Provenance,
-    /// What to know about it, in words; empty if there is nothing.
+    /// Remark on the mask, in words; empty if there is none.
     pub note: String,
 }
 
@@ -188,8 +188,9 @@ fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
     camera.ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))
 }
 
-/// How far around a pixel a measured imprint is looked at to tell grain from membrane, millimeters. On simulated touches of
-/// unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of 0.82 with the grain.
+/// Radius around a pixel in which a measured imprint is looked at to tell grain from membrane, millimeters. On
+/// simulated touches of unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of
+/// 0.82 with the grain.
 const GRAIN_MM: f64 = 1.7;
 
 /// The imprint as distances to the CAD model are measured from it: what was measured without its grain, a prediction, which
@@ -268,7 +269,7 @@ pub struct Side<'a> {
     pub sample: &'a Sample,
     /// The finger.
     pub pad: PadId,
-    /// Its imprint, meters.
+    /// Imprint of the finger, meters.
     pub imprint: &'a DepthMap,
 }
 

@@ -25,7 +25,7 @@ pub use words::{Words, meters, millimeters, quoted};
 /// The steps from a touch to a pose, in order; the result of each is made from the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
 pub enum Stage {
-    /// What the generator draws.
+    /// Prediction of the generator.
     Prediction,
     /// The imprint in meters, measured or predicted.
     Imprint,
@@ -78,9 +78,9 @@ fn is_yes(value: &bool) -> bool {
 /// A model bundle, as files name it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ModelName {
-    /// Its name.
+    /// Name for people.
     pub name: String,
-    /// Its identity.
+    /// Identity of the bundle.
     pub id: String,
 }
 
@@ -136,7 +136,7 @@ impl<M> Default for Recipe<M> {
 }
 
 impl<M> Recipe<M> {
-    /// The same with other models; `None` where one has no counterpart.
+    /// Recipe with other models; `None` where one has no counterpart.
     pub(crate) fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
         let generator = match self.generator {
             Some((model, config)) => Some((find(model)?, config)),
@@ -150,7 +150,7 @@ impl<M> Recipe<M> {
         Some(Recipe { imprint, generator, shift, mask, mask_model, hand, registration, engine })
     }
 
-    /// The same from another imprint.
+    /// Recipe from another imprint.
     #[must_use]
     pub fn of(&self, imprint: ImprintSource) -> Self
     where
@@ -179,7 +179,7 @@ impl<M> Recipe<M> {
         own.map_or_else(Vec::new, |own| seeds(own, count).into_iter().map(|seed| self.with_seed(seed)).collect())
     }
 
-    /// Whether the mask model is run.
+    /// True where the mask model is run.
     fn takes_mask_model(&self) -> bool {
         matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
     }
@@ -251,7 +251,7 @@ impl Recipe {
     }
 }
 
-/// What to say where a mask model is asked for and there is none.
+/// Error where a mask model is asked for and there is none.
 pub(crate) fn no_mask_model() -> TaskError {
     TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
 }

@@ -21,7 +21,7 @@ pub const PAIRS: usize = 96;
 /// Name of the job in errors.
 const WHAT: &str = "Shift statistics";
 
-/// What is predicted, and how.
+/// Pairs and predictions that statistics are made of.
 #[derive(Clone, Debug)]
 pub struct StatisticsSetup {
     /// The pairs. Any order of them gives the same figures.

@@ -10,14 +10,14 @@ use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 /// Fewest and most seeds of a mean.
 pub const SEEDS: std::ops::RangeInclusive<usize> = 2..=16;
 
-/// What can stand on either side of a comparison: a rule that each pair resolves for itself.
+/// Subject of a comparison, on either side of it: a rule that each pair resolves for itself.
 ///
 /// As text: `measured`, `prediction`, `mean`, `stored`; a prediction and a mean are followed by what differs from the
 /// settings, as in `prediction:bundle=fitted,seed=7,steps=50,shift=raw` or `mean:seeds=4`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Subject {
-    /// What was measured.
+    /// Imprint that was measured.
     Measured,
     /// A prediction.
     Predicted(RecipeChange),
@@ -27,7 +27,8 @@ pub enum Subject {
     Stored,
 }
 
-/// Which prediction: what is `None` is as the settings (of the studio) or the options (of a verb) say.
+/// Changes to a recipe that name a prediction: what is `None` is as the settings (of the studio) or the options (of a
+/// verb) say.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RecipeChange {
     /// The generator, by its bundle's name.
@@ -36,7 +37,7 @@ pub struct RecipeChange {
     pub steps: Option<u32>,
     /// Seed of the noise.
     pub seed: Option<u64>,
-    /// How it becomes meters.
+    /// Mapping to meters.
     pub shift: Option<Mapping>,
 }
 
@@ -93,7 +94,7 @@ impl Mapping {
         }
     }
 
-    /// Its name in text.
+    /// Name in text.
     pub fn key(self) -> &'static str {
         match self {
             Self::Exact => "exact",
@@ -110,7 +111,7 @@ impl Subject {
         Self::Predicted(RecipeChange::default())
     }
 
-    /// Whether something is predicted for it.
+    /// Changes to the recipe, where something is predicted for it.
     pub fn wish(&self) -> Option<&RecipeChange> {
         match self {
             Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
@@ -132,7 +133,7 @@ impl Subject {
         })
     }
 
-    /// What a person reads.
+    /// Name for people.
     pub fn label(&self) -> String {
         let base = match self {
             Self::Measured => return "Measured".into(),

@@ -31,25 +31,25 @@ const WHAT: &str = "Write training data";
 /// Pairs in memory at a time.
 const CHUNK: usize = 64;
 
-/// Where touches come from.
+/// Source of touches.
 #[derive(Clone, Copy, Debug)]
 pub enum TouchSource<'a> {
     /// A data set, with what people said about it.
     Dataset(&'a Dataset, &'a Labels, &'a [PairId]),
     /// The simulator.
     Simulator {
-        /// How many grasps.
+        /// Number of grasps.
         grasps: usize,
-        /// What they are drawn from.
+        /// Mix of tools that they are drawn from.
         mix: Mix,
-        /// What is wrong with them.
+        /// Condition that the touches are simulated under.
         condition: Condition,
         /// Decides all of it.
         seed: u64,
     },
 }
 
-/// How the touches are divided.
+/// Division of the touches.
 #[derive(Clone, Copy, Debug)]
 pub struct ShardSetup {
     /// Pairs in a shard.
@@ -71,7 +71,7 @@ pub struct ContactCounts {
     pub unknown: usize,
 }
 
-/// What was written.
+/// Counts of what was written.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct WrittenShards {
     /// Shards written now.
@@ -208,7 +208,7 @@ struct ShardTouch {
     known: Known,
 }
 
-/// What touches are read from.
+/// Source of touches with what is read once for all of them.
 struct Reader<'a> {
     source: TouchSource<'a>,
     /// Without those marked *skip*.
@@ -252,7 +252,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// How shards are called: shards of several sources lie beside each other.
+    /// Start of the shards' names: shards of several sources lie beside each other.
     fn name(&self) -> String {
         match self.source {
             TouchSource::Dataset(dataset, ..) => names::label(&dataset.title),

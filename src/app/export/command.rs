@@ -8,6 +8,7 @@ use super::super::pane::{Kind, Pane};
 use super::super::settings::state::ColorMap;
 use super::super::state::State;
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
@@ -15,6 +16,19 @@ use touch2touch_work::sweep::Setting;
 
 fn command(verb: &str) -> Words {
     Words::default().word("touch2touch").word(verb)
+}
+
+/// A start as `--start` reads it: degrees and twice millimeters.
+fn start_text(start: PlanarPose) -> String {
+    let degrees = read_as(start.theta_rad, start.theta_rad.to_degrees(), f64::to_radians);
+    let [y_mm, z_mm] = [start.y_m, start.z_m].map(|length_m| read_as(length_m, length_m * 1e3, |mm| mm * 1e-3));
+    format!("{degrees},{y_mm},{z_mm}")
+}
+
+/// A number at or beside `near` that is read as exactly this value, a short one first; `near` where there is none.
+fn read_as(value: f64, near: f64, read: impl Fn(f64) -> f64) -> f64 {
+    let short = (near * 1e9).round() / 1e9;
+    [short, near, near.next_up(), near.next_down()].into_iter().find(|n| read(*n) == value).unwrap_or(near)
 }
 
 impl State {
@@ -54,8 +68,15 @@ impl State {
                 if shown.is_predicted() { words.then(drawn()) } else { words }
             }
             (_, Kind::Scene(side)) => posed(of_pair("export")?.option("--out", "exported"), side),
-            (Pane::TimeMachine | Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
-            (Pane::BasinMap, _) => posed(of_pair("basin")?, side),
+            (Pane::TimeMachine, _) => {
+                let start = self.inspect.start.map(|start| start_text(start.get()));
+                posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
+            }
+            (Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
+            (Pane::BasinMap, _) => {
+                let plane: &'static str = self.inspect.plane.into();
+                posed(of_pair("basin")?, side).option("--plane", plane)
+            }
             (Pane::Metrics | Pane::Poses, _) => {
                 let recipe = self.recipe_shown(ImprintSource::Predicted);
                 of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))

@@ -11,6 +11,7 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::cloud::Clouds;
+use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::{PoseResult, pose};
 use touch2touch_work::tool::NamedTool;
 
@@ -101,6 +102,22 @@ impl State {
     /// # Errors
     /// Why there can be none.
     pub fn pose_key(&self, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
+        match self.unmasked(source) {
+            Some(_) => Err(Absent::NoContact),
+            None => self.pose_key_of_the_rest(source),
+        }
+    }
+
+    /// Why a finger of an imprint has no mask, where none can be made: a pose of the others alone is not that of all.
+    fn unmasked(&self, source: ImprintSource) -> Option<&TaskError> {
+        self.rig().pads().find_map(|finger| match self.mask_in_force(source, finger) {
+            Err(Lookup::Failed(err)) => Some(err),
+            _ => None,
+        })
+    }
+
+    /// [`Self::pose_key`] of the fingers that have masks.
+    fn pose_key_of_the_rest(&self, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
         let tool = self.tool_name();
         let Some(cloud) = self.cloud_key(source)? else {
             return Ok(None);
@@ -115,6 +132,9 @@ impl State {
     pub fn pose(&self, source: ImprintSource) -> Lookup<'_, PoseResult> {
         if let failed @ Lookup::Failed(_) = self.tool() {
             return failed.without();
+        }
+        if let Some(err) = self.unmasked(source) {
+            return Lookup::Failed(err);
         }
         let before = || {
             let latest = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
@@ -137,15 +157,14 @@ impl State {
     /// # Errors
     /// Why there can be none.
     pub(crate) fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
-        let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
-        if let PoseOf::Finger(finger) = of {
-            let part = key.cloud.parts[finger].take();
-            if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-                return Err(Absent::NoFinger);
-            }
-            key.cloud.parts = PerPad::default();
-            key.cloud.parts[finger] = part;
+        let PoseOf::Finger(finger) = of else { return self.pose_key(source) };
+        let Some(mut key) = self.pose_key_of_the_rest(source)? else { return Ok(None) };
+        let part = key.cloud.parts[finger].take();
+        if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
+            return Err(Absent::NoFinger);
         }
+        key.cloud.parts = PerPad::default();
+        key.cloud.parts[finger] = part;
         Ok(Some(key))
     }
 

@@ -266,6 +266,9 @@ impl State {
     }
 
     fn subject_pose_key(&self, subject: &Subject) -> Option<PoseKey> {
+        if let Some(side) = side_of(subject) {
+            return self.pose_key(side).ok()?;
+        }
         let cloud = self.subject_cloud(subject).ok()?;
         Some(PoseKey { cloud, tool: self.tool_name().ok()?.into(), engine: self.settings.pose_engine })
     }

@@ -1,4 +1,4 @@
-//! What `label` is asked.
+//! Arguments of `label`.
 
 use std::path::PathBuf;
 

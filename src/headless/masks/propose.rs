@@ -17,7 +17,7 @@ use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propos
 pub(in super::super) struct ProposeArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// What proposes. `cad_hand` takes the poses that were set by hand and accepted.
+    /// Source of the proposals. `cad_hand` takes the poses that were set by hand and accepted.
     #[arg(long, default_value = ProposalSource::default().key(), value_parser = keyed::<ProposalSource>())]
     source: ProposalSource,
     /// The imprints that masks are proposed for.

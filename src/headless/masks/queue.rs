@@ -23,8 +23,9 @@ use touch2touch_work::queue::{Line, QueueBy, queue};
 pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// What the pairs are ordered by: all together, how far the mask drawn by hand is from the mask model's, how many
-    /// pixels the model is unsure of, the error of the angle, or how far kept predictions with different seeds are apart.
+    /// Metric that the pairs are ordered by: all together, how far the mask drawn by hand is from the mask model's, how
+    /// many pixels the model is unsure of, the error of the angle, or how far kept predictions with different seeds are
+    /// apart.
     #[arg(long, default_value = QueueBy::default().key(), value_parser = keyed::<QueueBy>())]
     by: QueueBy,
     /// Only the first so many.
@@ -55,11 +56,11 @@ pub(in super::super) struct QueueArgs {
     common: Common,
 }
 
-/// What `masks queue` answers.
+/// Answer of `masks queue`.
 #[derive(Serialize)]
 struct Report {
     by: &'static str,
-    /// Whether every pair was looked at.
+    /// True where every pair was looked at.
     complete: bool,
     pairs: Vec<Line>,
 }

@@ -23,7 +23,7 @@ use touch2touch_work::recipe::Recipe;
 pub(in crate::headless) struct PoseArgs {
     #[command(flatten)]
     pub(super) dataset: DatasetArgs,
-    /// Which imprints to align.
+    /// Imprints to align.
     #[arg(long, value_enum, default_value_t = Imprints::Measured)]
     pub(super) imprint: Imprints,
     #[command(flatten)]

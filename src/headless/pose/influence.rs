@@ -15,12 +15,12 @@ use touch2touch_work::io::pt::Tensor;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pose::PoseResult;
 
-/// What a case says of the influence of its pixels.
+/// Influence of a case's pixels on its angle.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Influences {
     /// Holds, by finger, degrees to the square millimeter for every pixel; NaN where none was asked.
     pub(super) file: PathBuf,
-    /// Where the angle hangs on most, the first the most.
+    /// Places that the angle hangs on most, the first the most.
     pub(super) places: Vec<NamedPlace>,
 }
 

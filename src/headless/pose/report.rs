@@ -1,4 +1,4 @@
-//! What `pose` answers: the cases, their metrics, and the table.
+//! Answer of `pose`: the cases, their metrics, and the table.
 
 use std::collections::BTreeMap;
 
@@ -21,7 +21,7 @@ pub(super) struct PoseRow {
     #[serde(rename = "engine")]
     pub(super) registration: String,
     pub(super) imprint: &'static str,
-    /// What the masks are made of: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
+    /// Bases of the masks: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
     /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
     pub(super) mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -34,7 +34,7 @@ pub(super) struct PoseRow {
     /// Time of the registration, milliseconds; 0 without a pose.
     pub(super) ms: f64,
     pub(super) stop: String,
-    /// What a person accepted for this imprint in the studio, where there are labels.
+    /// Pose that a person accepted for this imprint in the studio, where there are labels.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) accepted: Option<Accepted>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -56,7 +56,7 @@ pub(super) struct PoseRow {
 /// An accepted pose in the sense of the other numbers of a [`PoseRow`].
 #[derive(Debug, Clone, Copy, Serialize)]
 pub(super) struct Accepted {
-    /// Whether a person set it, rather than took over what a registration answered.
+    /// True where a person set it, rather than took over what a registration answered.
     pub(super) by_hand: bool,
     pub(super) angle_deg: f64,
     pub(super) error_deg: Option<f64>,
@@ -101,7 +101,7 @@ pub(super) struct Summary {
 pub(super) struct Report {
     pub(super) cases: Vec<PoseRow>,
     pub(super) summary: Summary,
-    /// What is odd about the files and the numbers in them, by kind.
+    /// Oddities of the files and of the numbers in them, by kind.
     pub(super) notes: Vec<Finding>,
 }
 

@@ -1,4 +1,4 @@
-//! Which models are used, and how they are run, as the command line says it.
+//! Models, and how they are run, as the command line says it.
 
 use std::cell::OnceCell;
 use std::path::PathBuf;
@@ -14,7 +14,7 @@ use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::statistics::ShiftStatistics;
 
-/// Which models, and how they are run.
+/// Models, and how they are run.
 #[derive(Debug, Clone, Args)]
 pub struct ModelArgs {
     /// The generator's bundle (default: the shipped one).
@@ -23,7 +23,7 @@ pub struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     pub(super) mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
+    /// Quality: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
     /// change single numbers of it.
     #[arg(long, value_parser = keyed::<Preset>(), default_value = Preset::default().key())]
     pub(super) preset: Preset,
@@ -104,14 +104,14 @@ pub(super) enum SpacingArg {
     Lab,
 }
 
-/// How the decoder's output becomes meters, as the command line says it.
+/// Mapping of the decoder's output to meters, as the command line says it.
 #[derive(Debug, Clone, Args)]
 pub(in crate::headless) struct MappingArgs {
-    /// How the decoder's output becomes meters.
+    /// Mapping of the decoder's output to meters.
     #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
     shift: ShiftArg,
-    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
-    /// response, separated by commas.
+    /// Parts of the fit of a bundle to a rig that are applied with `--shift exact`: `all`, `none`, or some of offset,
+    /// field, gain, response, separated by commas.
     #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
     fit_parts: CorrectionParts,
     /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
@@ -121,7 +121,7 @@ pub(in crate::headless) struct MappingArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
+    /// Depth as the lab's released script saves it: its range is mapped twice.
     Raw,
     /// The paper's mean-and-deviation shift of that.
     Paper,

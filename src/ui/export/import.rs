@@ -47,7 +47,7 @@ fn content(cx: &mut Cx<'_>, ui: &mut egui::Ui, form: &ImportForm) {
     });
 }
 
-/// What would change; whether anything would.
+/// Changes that the import would make; true where there are any.
 fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
     let Some(key) = cx.state.import_plan_key() else { return false };
     let mut line = |text: String, color| {

@@ -84,7 +84,7 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
     });
 }
 
-/// What goes where; whether there is something to write.
+/// Division of the export; true where there is something to write.
 fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
     let Some(key) = cx.state.mask_plan_key() else { return false };
     match cx.state.look(key) {

@@ -11,9 +11,9 @@ use crate::ui::widget::image_canvas::{CanvasMap, CanvasOutput};
 use crate::ui::widget::texture::outline;
 use touch2touch_core::rig::PadId;
 
-/// How much larger than in the picture.
+/// Magnification over the picture.
 const TIMES: f32 = 8.0;
-/// Its side, points.
+/// Side of the lens, points.
 const SIDE: f32 = 152.0;
 /// At least so many pixels are seen across it: where the picture itself is that large, there is no lens.
 const LEAST_PX: f32 = 7.0;
@@ -30,7 +30,7 @@ fn place(area: Rect, pos: Pos2, scale: f32) -> Option<(Rect, f32)> {
     let x = if pos.x + gap + SIDE <= area.right() { pos.x + gap } else { pos.x - gap - SIDE };
     let y = if pos.y - gap - SIDE >= area.top() { pos.y - gap - SIDE } else { pos.y + gap };
     let [x, y] = [(x, area.left(), area.right()), (y, area.top(), area.bottom())]
-        .map(|(at, low, high)| at.clamp(low, (high - SIDE).max(low)));
+        .map(|(place, low, high)| place.clamp(low, (high - SIDE).max(low)));
     Some((Rect::from_min_size(pos2(x, y), vec2(SIDE, SIDE)), magnified))
 }
 

@@ -11,7 +11,7 @@ use crate::ui::widget::image_canvas::CanvasOutput;
 use crate::ui::widget::texture::{dashes, mask_image, outline};
 use touch2touch_core::rig::PadId;
 
-/// Whether a held key takes everything off the imprint, so that the data itself is seen.
+/// True while a key is held that takes everything off the imprint, so that the data itself is seen.
 pub(super) fn is_bared(ui: &Ui) -> bool {
     ui.input(|i| i.key_down(Key::X)) && !ui.ctx().egui_wants_keyboard_input()
 }

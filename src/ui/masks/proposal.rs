@@ -1,4 +1,4 @@
-//! What proposes a mask, and what becomes of the proposal.
+//! Sources of proposed masks, and the proposal.
 
 use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, Ui};
@@ -56,7 +56,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The same for every pair in the list, with how far it is.
+/// Button that proposes for every pair in the list, or the progress of that.
 fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
     if let Some((ticket, task)) = cx.state.running(TaskKind::Propose) {
         let tip = "Stop; the pairs that were done until then keep their masks";
@@ -69,7 +69,7 @@ fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What is proposed, or why nothing is.
+/// Provenance of the proposal, or the reason why there is none.
 fn said(cx: &Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let source = cx.state.worked_on(finger);

@@ -1,4 +1,4 @@
-//! What a 3D pane shows, as data for the renderer.
+//! Content of a 3D pane, as data for the renderer.
 
 use std::sync::Arc;
 
@@ -31,7 +31,7 @@ pub(super) struct SceneCloud {
     pub revision: u64,
     /// Per finger: the membrane and the contact.
     pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
-    /// What the GelSlims see of it: smallest and largest y and z, grasp frame.
+    /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
     pub window: Option<[DVec3; 2]>,
 }
 
@@ -87,17 +87,17 @@ pub(in crate::ui) fn parts(clouds: &Clouds) -> PerPad<[Arc<[DVec3]>; 2]> {
 fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
     let rig = cx.state.rig();
     let size = rig.depth()?.size();
-    let mut found: Option<[DVec3; 2]> = None;
+    let mut bounds: Option<[DVec3; 2]> = None;
     for (pad, cloud) in clouds.fingers.entries() {
         let Some(seen) = rig.seen_mask(pad, size) else { continue };
-        for (p, at) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
-            if seen.get(at[0].into(), at[1].into()) == Some(&true) {
-                let [lo, hi] = found.unwrap_or([*p, *p]);
-                found = Some([lo.min(*p), hi.max(*p)]);
+        for (p, pixel) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
+            if seen.get(pixel[0].into(), pixel[1].into()) == Some(&true) {
+                let [lo, hi] = bounds.unwrap_or([*p, *p]);
+                bounds = Some([lo.min(*p), hi.max(*p)]);
             }
         }
     }
-    found
+    bounds
 }
 
 /// Makes the CAD model for the renderer, where it is another one.
@@ -308,28 +308,28 @@ fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
 /// outlines to compare it with.
 pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(SceneLayer, DAffine3)> {
     let state = cx.state;
-    let mut found = Vec::new();
+    let mut models = Vec::new();
     // The step that is looked at, else what was registered.
     let registered = steps::pose(cx, source).or_else(|| Some(state.pose(source).shown()?.grasp_from_object));
     let held = state.workbench.hand(source).map(|hand| hand.pose);
     match (held.or_else(|| state.by_hand(source)), registered) {
         (Some(pose), registered) => {
-            found.push((SceneLayer::Cad, pose.to_affine()));
-            found.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
+            models.push((SceneLayer::Cad, pose.to_affine()));
+            models.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
         }
         (None, Some(pose)) => {
-            found.push((SceneLayer::Cad, layers::swayed(cx, source, pose, seconds).to_affine()));
+            models.push((SceneLayer::Cad, layers::swayed(cx, source, pose, seconds).to_affine()));
         }
         (None, None) => {}
     }
     let other = state.pose(other_side(source)).ready().filter(|_| state.workbench.both_clouds);
-    found.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
+    models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
     let truth = state.sample().ready().and_then(|sample| sample.grasp_from_object);
-    found.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
+    models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
     let before = state.ghost(source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
     let before = before.filter(|before| registered != Some(*before));
-    found.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
-    found
+    models.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
+    models
 }
 
 /// The model, shaded where the tool is and as outlines where else it could be.

@@ -15,7 +15,7 @@ pub(super) struct SceneGhost {
     key: [CloudKey; 2],
     /// Counts up with every new one.
     pub(super) revision: u64,
-    /// What was dropped and what was added.
+    /// Points that were dropped and points that were added.
     pub(super) points: [(SceneLayer, Arc<[DVec3]>); 2],
 }
 
@@ -47,7 +47,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     *held = Some(SceneGhost { key: [old.clone(), new], revision: memory.revision, points });
 }
 
-/// What the list says of them.
+/// Entries of the list for them.
 pub(super) fn legend_entries(memory: &Memory, source: ImprintSource) -> Vec<(SceneLayer, String)> {
     let points = memory.ghosts[source as usize].iter().flat_map(|ghost| &ghost.points);
     let name = |layer: SceneLayer| if layer == SceneLayer::Dropped { "dropped" } else { "added" };

@@ -131,7 +131,7 @@ pub(super) fn place_text(pose: ManualPose) -> String {
     format!("y {:+.2}  z {:+.2} mm   angle {:+.1}°", units::mm(planar.y_m), units::mm(planar.z_m), angle.to_degrees())
 }
 
-/// What the pose costs, against where it began.
+/// Cost of the pose, against where it began.
 fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
     let Some(hand) = hand else {
         return ("Move the tool by keys or by its handles".into(), cx.p.weak);
@@ -154,7 +154,7 @@ fn costs(now: ManualCost, before: ManualCost) -> String {
     )
 }
 
-/// How far the planar part of a pose is off the truth.
+/// Difference of the planar part of a pose from the truth.
 pub(super) fn off_truth(state: &State, pose: ManualPose) -> Option<PoseDifference> {
     Some(PoseDifference::between(pose.planar, state.truth()?))
 }

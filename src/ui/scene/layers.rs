@@ -78,7 +78,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
 /// Makes the colors of distances, where they are there.
 fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let held = &mut memory.layer_colors[source as usize];
-    let (Some(found), Ok(Some(key))) = (cx.state.deviation(source).ready(), cx.state.pose_key(source)) else {
+    let (Some(deviation), Ok(Some(key))) = (cx.state.deviation(source).ready(), cx.state.pose_key(source)) else {
         *held = None;
         return;
     };
@@ -88,15 +88,15 @@ fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         held.range = range;
         return;
     }
-    let painted = &found.surface;
+    let painted = &deviation.surface;
     let surface =
-        (Arc::new(painted.mesh.clone()), painted.values.as_slice().into(), found.grasp_from_object.to_affine());
+        (Arc::new(painted.mesh.clone()), painted.values.as_slice().into(), deviation.grasp_from_object.to_affine());
     memory.revision += 1;
     *held = Some(LayerColors {
         key,
         revision: memory.revision,
         range,
-        fingers: found.points.as_ref().map(|points| points.map(|d| PointColors::Scalar(d.as_slice().into()))),
+        fingers: deviation.points.as_ref().map(|points| points.map(|d| PointColors::Scalar(d.as_slice().into()))),
         surface: Some(surface),
     });
 }
@@ -143,7 +143,7 @@ pub(in crate::ui) fn outline(world_from_mesh: DAffine3, color: Color32, look: La
     MeshStyle { world_from_mesh, color: rgb(color), look: Look::Outline, edges: Some(edges), ..MeshStyle::default() }
 }
 
-/// How well the registered pose of a side is determined.
+/// Observability of the registered pose of a side.
 fn observability<'a>(cx: &'a Cx<'_>, source: ImprintSource) -> Option<&'a Observability> {
     cx.state.pose(source).shown()?.report.observability.as_ref()
 }

@@ -15,7 +15,7 @@ use crate::ui::widget::line::Line;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
 
-/// What a click does.
+/// Does what a click means with the tool in hand.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
     if !output.response.clicked() || matches!(tool, SceneTool::Pose | SceneTool::Paint) {
@@ -45,9 +45,9 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(12.0);
-    let label = |at: Pos2, text: String, color: Color32| {
+    let label = |place: Pos2, text: String, color: Color32| {
         let galley = painter.layout_no_wrap(text, font.clone(), color);
-        let back = Rect::from_min_size(at + vec2(8.0, -8.0), galley.size());
+        let back = Rect::from_min_size(place + vec2(8.0, -8.0), galley.size());
         painter.rect_filled(back.expand2(vec2(4.0, 2.0)), 3.0, cx.p.canvas.gamma_multiply(0.85));
         painter.galley(back.min, galley, color);
     };
@@ -70,9 +70,9 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
         painter.circle(*place, 4.0, cx.p.accent, Stroke::new(1.0, color));
     }
     if let Some(text) = result(bench.tool, &points)
-        && let Some(Some(at)) = places.get(places.len() / 2)
+        && let Some(Some(middle)) = places.get(places.len() / 2)
     {
-        label(*at, text, color);
+        label(*middle, text, color);
     }
 }
 

@@ -1,4 +1,4 @@
-//! What the time machine adds to a 3D view: the CAD model at the step shown, correspondences, pinned steps.
+//! Additions of the time machine to a 3D view: the CAD model at the step shown, correspondences, pinned steps.
 
 use std::sync::Arc;
 
@@ -129,7 +129,7 @@ fn color_at(p: &Palette, share: f32) -> Color32 {
     Color32::from_rgb(r, g, b)
 }
 
-/// What the colors of the lines mean, and how many there are.
+/// Legend of the lines' colors, with their numbers.
 pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
     let Some(lines) = lines(cx, memory, source) else { return };
     let painter = ui.painter_at(rect);

@@ -18,7 +18,7 @@ use touch2touch_work::verdict::Verdict;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
-/// Whether there is no pose because the mask has too few contact points.
+/// True where there is no pose because the mask has too few contact points.
 fn lacks_contact(state: &State, source: ImprintSource) -> bool {
     match state.pose(source) {
         Lookup::Absent(Absent::NoContact) => true,

@@ -13,7 +13,7 @@ use touch2touch_core::units;
 
 /// Room for the numbers at the left, points.
 const LEFT: f32 = 34.0;
-/// How near the pointer must be to a step to mean it, points.
+/// Distance of the pointer from a step at which it means it, points.
 const NEAR: f32 = 14.0;
 
 /// Both plots over the same steps.
@@ -150,7 +150,7 @@ fn axes(p: &Palette, painter: &Painter, plot: &Plot<'_>) {
     painter.text(end, Align2::RIGHT_BOTTOM, "step; 0 is the applied start", font, p.weak);
 }
 
-/// Where the kernel's width or the points change: costs on both sides of a line are not of one kind.
+/// Lines where the kernel's width or the points change: costs on both sides of a line are not of one kind.
 fn kernels(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize) {
     let font = FontId::proportional(10.0);
     let mut before = None;

@@ -100,9 +100,9 @@ fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
 /// Makes what the renderer needs, where it changed.
 fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
     for (held, letter) in space.clouds.iter_mut().zip([Letter::A, Letter::B]) {
-        let found = cx.state.subject_points(letter.of(versus));
+        let points = cx.state.subject_points(letter.of(versus));
         let same_pair = |key: &CloudKey| key.place().map(|(pair, _)| pair) == cx.state.pair_key();
-        match found {
+        match points {
             Some((key, _)) if held.as_ref().is_some_and(|held| held.key == key) => {}
             Some((key, clouds)) => {
                 space.revision += 1;
@@ -117,7 +117,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
     match (apart, &space.apart) {
         (None, _) => space.apart = None,
         (Some((key, _)), Some((held, ..))) if *held == key => {}
-        (Some((key, found)), _) => {
+        (Some((key, difference)), _) => {
             if let Some(clouds) = cx.state.results.clouds.get(&key.a) {
                 space.revision += 1;
                 let colored = |pad, values: &Vec<f32>| {
@@ -125,7 +125,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
                     Some(Colored { points, values: values.as_slice().into() })
                 };
                 let mut fingers = PerPad::default();
-                for (pad, values) in found.points.entries() {
+                for (pad, values) in difference.points.entries() {
                     fingers[pad] = colored(pad, values);
                 }
                 space.apart = Some((key, space.revision, fingers));
@@ -214,20 +214,20 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
     }
 }
 
-/// What is what, and the bar of the distances.
+/// Legend of the two subjects, and the bar of the distances.
 fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: eframe::egui::Rect) {
     let apart = versus.mode == VersusMode::Apart && !flipped;
     let font = FontId::proportional(SMALL);
-    let mut at = rect.min + vec2(8.0, 8.0);
+    let mut corner = rect.min + vec2(8.0, 8.0);
     let painter = ui.painter_at(rect);
     let mut line = |text: String, color: Color32| {
-        painter.text(pos2(at.x, at.y), Align2::LEFT_TOP, text, font.clone(), color);
-        at.y += 14.0;
+        painter.text(pos2(corner.x, corner.y), Align2::LEFT_TOP, text, font.clone(), color);
+        corner.y += 14.0;
     };
     if apart {
         line("A, colored by its distance to B".into(), cx.p.text);
-        if let Some((_, found)) = cx.state.subjects_apart(&versus.a, &versus.b) {
-            let rms = units::text_mm(found.contact_rms_m);
+        if let Some((_, difference)) = cx.state.subjects_apart(&versus.a, &versus.b) {
+            let rms = units::text_mm(difference.contact_rms_m);
             line(format!("contact points: {rms} (root mean square)"), cx.p.text);
         }
     } else {

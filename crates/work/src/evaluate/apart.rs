@@ -1,5 +1,5 @@
-//! How far kept predictions of a grasp with different seeds are apart. They come and go without the grasp's other figures
-//! changing, so this is looked up whenever these are.
+//! Spread between the kept predictions of a grasp with different seeds. They come and go without the grasp's other
+//! figures changing, so this is looked up whenever these are.
 
 use std::collections::BTreeMap;
 

@@ -40,18 +40,18 @@ const MAX_FILE: u64 = 1 << 30;
 pub(super) struct Entry {
     /// As in the table; what a table's row adds is put in when it is read.
     pub(super) score: GraspScore,
-    /// Whether no pose was found: NaN has no place in the file.
+    /// True where no pose was found: NaN has no place in the file.
     no_pose: bool,
     scale: Scale,
-    /// What the classifier sees, bit for bit, by image.
+    /// Features by the classifier, bit for bit, by image.
     features: Vec<String>,
     /// Least and largest value of each prediction.
     pub(super) spans: Vec<Option<[f32; 2]>>,
     /// The range that the lab's SSIM was computed with.
     pub(super) range: f64,
-    /// Whether the GelSlim picture is clipped, of pictures.
+    /// True where the GelSlim picture is clipped; `None` where there is no picture.
     clipped: Option<bool>,
-    /// What is odd about the files.
+    /// Oddities of the files.
     pub(super) notes: Vec<Problem>,
     /// Why masks are not of the source that was asked, with how many.
     pub(super) otherwise: Vec<(String, usize)>,
@@ -81,7 +81,7 @@ impl Entry {
         }
     }
 
-    /// Whether its SSIM is with this range, or has none of the tool.
+    /// True where its SSIM is with this range, or has none of the tool.
     pub(super) fn is_of_range(&self, range: f64) -> bool {
         self.scale == Scale::Assumed || self.range.to_bits() == range.to_bits()
     }
@@ -120,14 +120,14 @@ impl Entry {
     }
 }
 
-/// What is known of the grasps of an evaluation.
+/// Known figures of the grasps of an evaluation.
 pub(super) struct KeptScores {
     sheets: Arc<Sheets>,
     /// The sheet of each method.
     names: Vec<String>,
     /// The key of each grasp; one without cannot be kept.
     keys: BTreeMap<PairId, String>,
-    /// What was found, by method.
+    /// Figures that were found, by method.
     known: Vec<BTreeMap<PairId, Entry>>,
 }
 
@@ -164,17 +164,17 @@ impl KeptScores {
         Self { sheets: sheets.clone(), names, keys, known }
     }
 
-    /// Whether a method's figures of a grasp are known.
+    /// True where a method's figures of a grasp are known.
     pub(super) fn has(&self, method: usize, id: PairId) -> bool {
         self.known[method].contains_key(&id)
     }
 
-    /// Whether every method's are.
+    /// True where every method's figures of a grasp are known.
     pub(super) fn is_whole(&self, id: PairId) -> bool {
         self.known.iter().all(|known| known.contains_key(&id))
     }
 
-    /// What is known of some grasps by a method, in their order.
+    /// Known figures of some grasps by a method, in their order.
     pub(super) fn of(&self, method: usize, ids: &[PairId]) -> Vec<(PairId, Entry)> {
         ids.iter().filter_map(|id| Some((*id, self.known[method].get(id)?.clone()))).collect()
     }
@@ -227,7 +227,7 @@ fn program() -> &'static str {
     })
 }
 
-/// What the grasps of a tool have in common; `None` where its CAD model cannot be read.
+/// Part of a key that the grasps of a tool have in common; `None` where its CAD model cannot be read.
 fn tool_part(dataset: &Dataset, tool: Option<&str>, files: &Files) -> Option<String> {
     let Some(file) = tool.and_then(|name| dataset.tool_mesh_file(name)) else {
         let name = tool.map(pattern_of);

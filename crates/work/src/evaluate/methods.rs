@@ -30,7 +30,7 @@ use touch2touch_core::turn::Turn;
 /// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
 const LOOKED_AT: u32 = 16;
 
-/// What stands for one row of the table.
+/// Method of one row of the table.
 pub(super) enum Method {
     /// The measured imprints themselves: the upper bound of everything behind them.
     Measured,
@@ -49,7 +49,7 @@ pub(super) struct GeneratorMethod {
     config: GenerateConfig,
 }
 
-/// What a method makes of one touch.
+/// Pictures that a method makes of one touch.
 pub(super) struct Made {
     /// Imprints in meters, raw orientation, by finger.
     pub(super) imprints: PerPad<DepthMap>,
@@ -66,7 +66,7 @@ pub(super) struct Made {
 /// Everything that runs.
 pub(super) struct Models {
     pub(super) methods: Vec<Method>,
-    /// Where the mask model is run.
+    /// Models among which the mask model is run.
     pub(super) masks: models::Models,
     /// What every method has in common; there is no mask model where there are no masks.
     common: Recipe,
@@ -74,7 +74,7 @@ pub(super) struct Models {
     classifier_bundle: Option<Bundle>,
     pub(super) classifier: Option<ToolClassifier>,
     engine: String,
-    /// How many masks were not made of the source that was asked, by row and reason.
+    /// Number of masks that were not made of the source that was asked, by row and reason.
     pub(super) made_otherwise: BTreeMap<(String, String), usize>,
 }
 
@@ -194,7 +194,7 @@ impl Models {
         self.made_otherwise.iter().map(line).collect()
     }
 
-    /// What is missing from the table, and why.
+    /// Notes on what is missing from the table, and why.
     pub(super) fn missing(&self, setup: &Setup, rig: &Rig, scale: Scale) -> Vec<String> {
         let images = match setup.finger {
             None => "images of both fingers".to_owned(),
@@ -264,7 +264,7 @@ impl Method {
         }
     }
 
-    /// What it makes of each touch, or why not; `None` once it was told to stop.
+    /// Pictures of each touch, or why there are none; `None` once it was told to stop.
     pub(super) fn make(
         &mut self,
         cases: &[&LoadedPair],

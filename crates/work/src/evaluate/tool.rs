@@ -48,7 +48,7 @@ struct Pending {
     id: PairId,
     entry: Entry,
     images: Vec<Image>,
-    /// Whether something about it failed, so that it is tried again the next time.
+    /// True where something about it failed, so that it is tried again the next time.
     failed: bool,
 }
 
@@ -89,18 +89,18 @@ struct Masked<'a> {
     felt: Option<Felt>,
     /// Why some masks are not of the source that was asked.
     otherwise: Vec<(String, usize)>,
-    /// How sure the mask model is of the imprints.
+    /// Doubt of the mask model about the imprints.
     doubt: Doubt,
 }
 
 /// The grasps of one tool, by method.
 pub(super) struct Tool<'a> {
     dataset: &'a Dataset,
-    /// What is known of them.
+    /// Known figures of the grasps.
     book: &'a KeptScores,
-    /// Its pattern's name.
+    /// Name of the tool's pattern.
     pattern: Option<String>,
-    /// Whether its CAD model could not be used: what is scored without it is not kept.
+    /// True where its CAD model could not be used: figures that are had without it are not kept.
     broken: bool,
     model: Option<ToolModel>,
     class: Option<usize>,
@@ -426,7 +426,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     })
 }
 
-/// What a method made of a picture, in the assumed meters: stored predictions are gray levels.
+/// Prediction of a method in the assumed meters: stored predictions are gray levels.
 fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
     if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
 }

@@ -146,7 +146,7 @@ pub const MANIFEST: &str = "manifest.json";
 /// Longest manifest that is read, bytes.
 const MAX_MANIFEST: u64 = 4 << 20;
 
-/// What a graph does.
+/// Task of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -188,7 +188,7 @@ pub struct FileEntry {
 /// A bundle with everything wrong about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct BundleError {
-    /// Where it lies.
+    /// Origin of the bundle: a folder, or the program.
     pub origin: Origin,
     /// All that was found, at least one.
     pub problems: Vec<Problem>,
@@ -289,7 +289,7 @@ impl Bundle {
         }
     }
 
-    /// Where it lies.
+    /// Origin of the bundle: a folder, or the program.
     pub fn origin(&self) -> &Origin {
         &self.origin
     }
@@ -305,7 +305,7 @@ impl Bundle {
         &self.hash
     }
 
-    /// What the bundle is and how it is used.
+    /// Specification by kind: the use of the bundle, its inputs and outputs.
     pub fn spec(&self) -> &BundleSpec {
         &self.spec
     }
@@ -419,7 +419,7 @@ impl Problems {
     }
 }
 
-/// Whether `name` is that of a file inside the bundle: neither absolute nor empty, and climbing nowhere.
+/// True where `name` is that of a file inside the bundle: neither absolute nor empty, and climbing nowhere.
 fn stays_inside(name: &str) -> bool {
     let plain = Path::new(name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
     plain && !name.is_empty()

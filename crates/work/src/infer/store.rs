@@ -46,18 +46,18 @@ pub struct Store {
     bytes: Mutex<Option<u64>>,
 }
 
-/// What was found.
+/// Prediction as it was stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
-    /// What it was made from.
+    /// Recipe that it was made from.
     pub recipe: KeptKey,
     /// The decoder's picture.
     pub raw: RawPrediction,
-    /// What it took to make, seconds.
+    /// Time that it took to make, seconds.
     pub seconds: f64,
 }
 
-/// What a store holds.
+/// Size of a store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Usage {
     /// Predictions.
@@ -91,7 +91,7 @@ pub fn user_folder() -> Option<PathBuf> {
 pub struct Inputs(Vec<String>);
 
 impl Inputs {
-    /// Those of the image with the digest `input`.
+    /// Names of the predictions of the image with the digest `input`.
     pub fn of(&self, input: &str) -> impl Iterator<Item = &str> {
         let prefix = format!("{}-", short(input));
         let first = self.0.partition_point(|name| *name < prefix);
@@ -105,7 +105,7 @@ impl Store {
         Self { folder, budget, bytes: Mutex::new(None) }
     }
 
-    /// Where it is.
+    /// Folder of the store.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -135,7 +135,7 @@ impl Store {
         v1.map(|name| self.folder.join(name)).collect()
     }
 
-    /// Which predictions there are, in one look.
+    /// Names of all predictions that there are, in one look.
     pub fn inputs(&self) -> Inputs {
         let mut names: Vec<String> =
             self.files().into_iter().map(|found| found.name).filter(|name| name.ends_with(SUFFIX)).collect();
@@ -193,7 +193,7 @@ impl Store {
         Ok(())
     }
 
-    /// How much there is.
+    /// Number of files and bytes in the store.
     pub fn usage(&self) -> Usage {
         let files = self.files();
         let sheets = files.iter().filter(|f| f.name.ends_with(sheets::SUFFIX)).count();

@@ -17,7 +17,7 @@ use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 
-/// What proposes, with its numbers.
+/// Source of proposals, with its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposeSetup {
     /// The source.
@@ -31,14 +31,14 @@ pub struct ProposeSetup {
     pub carry_from: Option<PairId>,
 }
 
-/// What is proposed for some pads, or why nothing is.
+/// Proposals for some pads, or reasons why there are none.
 pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
 
-/// What is proposed for each of `pads`; `felt` are the imprints of the touch by the recipe of `setup`, and `all` the labels
-/// of its data set.
+/// Proposals for each of `pads`; `felt` are the imprints of the touch by the recipe of `setup`, and `all` the labels of
+/// its data set.
 ///
 /// # Errors
-/// What the source lacks, for all of them.
+/// The reason that holds for all of them: what the source lacks.
 pub fn propose(
     touch: Touch<'_>,
     all: &Labels,

@@ -36,7 +36,7 @@ pub(super) struct Drawn {
     pub(super) imprint: DepthMap,
     /// As large.
     pub(super) mask: Mask,
-    /// Which of its pixels count; all without it.
+    /// Pixels of it that count; all without it.
     pub(super) counted: Option<Mask>,
 }
 

@@ -14,7 +14,7 @@ const MODELS_VARIABLE: &str = "TOUCH2TOUCH_MODELS";
 pub struct Found {
     /// Usable, in the order of the places and then of the folder names; those of one identity and name once.
     pub bundles: Vec<Bundle>,
-    /// What kept the others from being used.
+    /// Faults that kept the others from being used.
     pub problems: Vec<Problem>,
 }
 
