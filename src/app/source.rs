@@ -16,6 +16,7 @@ use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{JournalHistory, Operation, PairLabels, Review, Unsaved};
+use touch2touch_work::repeats::Repeater;
 use touch2touch_work::tool::{UnitSet, set_unit};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
@@ -136,7 +137,7 @@ pub trait DataSource: Send + Sync {
     ///
     /// # Errors
     /// None of the journals: what cannot be read of them is in the result.
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: (&str, f64)) -> Result<LabelStats, TaskError> {
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: Repeater<'_>) -> Result<LabelStats, TaskError> {
         Ok(LabelStats::of_reviews(self.index(), reviews))
     }
 

@@ -20,7 +20,7 @@ use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::recipe::Stage;
-use touch2touch_work::tool::load_tool;
+use touch2touch_work::tool::{LoadedTool, load_tool};
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -96,7 +96,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let sample = dataset.load(id)?;
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
-    let (tool, odd) = load_tool(&dataset, name)?;
+    let LoadedTool { model: tool, notes: odd } = load_tool(&dataset, name)?;
     let models = args.model.models();
     let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?;
     let mut notes = Notes::of(&dataset);

@@ -28,6 +28,7 @@ use touch2touch_work::io::npz;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
+use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::Stage;
 use touch2touch_work::subject::{MadeFrom, Subject};
@@ -183,7 +184,7 @@ fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models
             let mut imprints = PerPad::default();
             for (pad, _) in sample.pads.entries() {
                 if recipe.generating()?.picture(sample, pad)?.is_some() {
-                    let made = seeds_of((sample, pad), recipe, recipes.len(), models, &cx)?;
+                    let made = seeds_of(OnPad { sample, pad }, recipe, recipes.len(), models, &cx)?;
                     imprints[pad] = Some(made.ensemble.spread.mean);
                 }
             }
@@ -204,10 +205,10 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         Some(name) => Some(load_tool(&dataset, name)?),
         None => None,
     };
-    notes.take(&output, tool.as_ref().map_or(&[], |(_, odd)| odd));
+    notes.take(&output, tool.as_ref().map_or(&[], |loaded| &loaded.notes));
     let lacks = TaskError::new("Compare", "no tool is named, so there is no CAD model");
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let tool = tool.as_ref().map(|(tool, _)| tool);
+    let tool = tool.as_ref().map(|loaded| &loaded.model);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
     let models = args.model.models();
     let found = [find(args, &args.a, touch, &models)?, find(args, &args.b, touch, &models)?];

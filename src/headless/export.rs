@@ -81,9 +81,9 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     notes.take(&output, &sample.notes);
     let tool = entry.tool.as_deref().map(|name| load_tool(&dataset, name)).transpose();
     let tool = match tool {
-        Ok(found) => found.map(|(tool, odd)| {
-            notes.take(&output, &odd);
-            tool
+        Ok(found) => found.map(|loaded| {
+            notes.take(&output, &loaded.notes);
+            loaded.model
         }),
         // The cloud needs none.
         Err(err) if args.what == [PairFile::Cloud] => {

@@ -57,7 +57,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         labels.journal_problem(&entry.name).into_iter().for_each(|err| output.note(&format!("note: {err}")));
         // Nothing is written of what cannot be done to its end.
         let mut changes = Changes { now: stored.clone(), made: Vec::new() };
-        change(args, (&dataset, &labels, id), &mut changes)?;
+        change(args, &dataset, &labels, id, &mut changes)?;
         for Edited { deed, change } in changes.made {
             change.apply_to(&mut stored);
             labels.save(&entry.name, &stored, &Operation { person: args.person.clone(), ..deed })?;
@@ -102,7 +102,7 @@ impl<'a> Maker<'a> {
     fn load(args: &'a LabelArgs, dataset: &'a Dataset, pair: PairId) -> anyhow::Result<Self> {
         let entry = &dataset.index.pairs[pair.0 as usize];
         let tool = match &entry.tool {
-            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool),
+            Some(name) => load_tool(dataset, name).map(|loaded| loaded.model),
             None => Err(TaskError::new("Label", format!("{}: no tool is named, so there is no CAD model", entry.name))),
         };
         let (recipe, models) = (recipe(args, dataset)?, args.model.models());
@@ -198,7 +198,7 @@ impl<'a> Maker<'a> {
             carry_from,
         };
         let mut out = PerPad::default();
-        for (pad, made) in propose::propose((self.touch(labels), all), felt, pads, &setup, &self.models)? {
+        for (pad, made) in propose::propose(self.touch(labels), all, felt, pads, &setup, &self.models)? {
             out[pad] = Some(made?);
         }
         Ok(out)
@@ -248,11 +248,7 @@ impl Changes {
 
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
-fn change(
-    args: &LabelArgs,
-    (dataset, all, id): (&Dataset, &Labels, PairId),
-    labels: &mut Changes,
-) -> anyhow::Result<()> {
+fn change(args: &LabelArgs, dataset: &Dataset, all: &Labels, id: PairId, labels: &mut Changes) -> anyhow::Result<()> {
     let mut maker = None;
     let makes = args.adopt || args.from.is_some() || args.propose.is_some();
     if args.remove_mask || makes || !(args.clean.is_empty() && args.draw.is_empty()) {

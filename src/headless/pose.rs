@@ -74,9 +74,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             continue;
         };
         let tool = tools.entry(tool_name.clone()).or_insert_with(|| match load_tool(&dataset, &tool_name) {
-            Ok((tool, odd)) => {
-                notes.take(&output, &odd);
-                Some(tool)
+            Ok(loaded) => {
+                notes.take(&output, &loaded.notes);
+                Some(loaded.model)
             }
             Err(err) => {
                 output.note(&err.to_string());
@@ -171,9 +171,9 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
-        let influence = influence.zip(answer).map(|(stem, found)| {
-            influence::write(stem, (&contact.clouds(sample)?, sample, tool), (imprint, by), found)
-        });
+        let influence = influence
+            .zip(answer)
+            .map(|(stem, found)| influence::write(stem, &contact.clouds(sample)?, sample, tool, (imprint, by), found));
         let influence = influence.transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),

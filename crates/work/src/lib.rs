@@ -46,6 +46,7 @@ pub mod ledger;
 pub mod mask;
 pub mod models;
 pub mod new_bundle;
+pub mod on_pad;
 pub mod pair_files;
 pub mod pairs;
 pub mod pose;

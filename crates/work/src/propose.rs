@@ -15,6 +15,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 use super::error::TaskError;
 use super::labels::{DrawnMask, ImprintSource, MaskPlace, PairLabels, Review};
 use super::mask::MaskRecipe;
+use super::on_pad::OnPad;
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
 use touch2touch_core::dataset::{Index, PairId};
@@ -216,8 +217,9 @@ pub fn automatic(found: ContactMask, recipe: &MaskRecipe, model: &str) -> Propos
 /// # Errors
 /// If sizes differ or the camera's numbers cannot be right.
 pub fn cad_distances(
-    (imprint, of): (&DepthMap, ImprintSource),
-    (sample, pad): (&Sample, PadId),
+    imprint: &DepthMap,
+    of: ImprintSource,
+    OnPad { sample, pad }: OnPad<'_>,
     tool: &ToolModel,
     grasp_from_object: ManualPose,
 ) -> Result<Grid<f64>, TaskError> {
@@ -279,7 +281,8 @@ impl<'a> Side<'a> {
 }
 
 fn carried(
-    (from, mask): (Side<'_>, &Mask),
+    from: Side<'_>,
+    mask: &Mask,
     to: Side<'_>,
     from_to: DAffine3,
     gate_m: f64,
@@ -296,19 +299,29 @@ fn carried(
     Ok(Proposal { mask: found.mask, provenance, note })
 }
 
-/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known. `name` is the other
-/// pair's.
+/// Another pair, which has a mask to carry.
+#[derive(Clone, Copy, Debug)]
+pub struct OtherPair<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// The pair.
+    pub sample: &'a Sample,
+    /// What people said about it.
+    pub labels: &'a PairLabels,
+}
+
+/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known.
 ///
 /// # Errors
 /// If there is no such mask, a pose or a camera is not known, or sizes differ.
-pub fn carried_from_pair(name: &str, from: (&Sample, &PairLabels), to: Side<'_>) -> Result<Proposal, TaskError> {
-    let (sample, labels) = from;
+pub fn carried_from_pair(from: OtherPair<'_>, to: Side<'_>) -> Result<Proposal, TaskError> {
+    let OtherPair { name, sample, labels } = from;
     let measured = sample.pad(to.pad).and_then(PadTouch::depth).map(|depth| &depth.imprint);
     let hand = measured.and_then(|imprint| labels.drawn(&MaskPlace::measured(to.pad), imprint));
     let (Some(imprint), Some(hand)) = (measured, hand) else {
         return Err(TaskError::new(WHAT, format!("nobody painted this finger's mask of {name}")));
     };
-    let from = (Side { sample, pad: to.pad, imprint }, &*hand.mask);
+    let from = Side { sample, pad: to.pad, imprint };
     let pose = |sample: &Sample, whose: &str| {
         let why = || TaskError::new(WHAT, format!("the true pose of {whose} is not known, so its move is not either"));
         sample.grasp_from_object.ok_or_else(why)
@@ -316,16 +329,16 @@ pub fn carried_from_pair(name: &str, from: (&Sample, &PairLabels), to: Side<'_>)
     let (a, b) = (pose(sample, name)?, pose(to.sample, "this pair")?);
     let moved = PlanarPose { theta_rad: b.theta_rad - a.theta_rad, y_m: b.y_m - a.y_m, z_m: b.z_m - a.z_m };
     let provenance = Provenance::Copied { from: format!("the mask of {name}"), moved: Some(moved) };
-    carried(from, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
+    carried(from, &hand.mask, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
 }
 
 /// The other finger's mask of the same grasp. `name` is that finger's.
 ///
 /// # Errors
 /// If a camera is not known, or sizes differ.
-pub fn carried_across(name: &str, from: (Side<'_>, &Mask), to: Side<'_>) -> Result<Proposal, TaskError> {
+pub fn carried_across(name: &str, from: Side<'_>, mask: &Mask, to: Side<'_>) -> Result<Proposal, TaskError> {
     let provenance = Provenance::Copied { from: format!("the {name} finger's mask"), moved: None };
-    carried(from, to, across(), ACROSS_GATE_M, provenance)
+    carried(from, mask, to, across(), ACROSS_GATE_M, provenance)
 }
 
 /// The pair whose masks are carried to another: of the same tool and looked at by somebody, the nearest before it in the data

@@ -9,13 +9,16 @@ use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
 use touch2touch_work::label_stats::LabelStats;
+use touch2touch_work::repeats::Repeater;
 
 impl Computes for LabelStatsKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LabelStats>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (reviews, person) = (state.document.reviews.clone(), self.person.clone());
         let share = f64::from(self.repeats_percent.get()) / 100.0;
-        Some(Job::new(Lane::Compute, "Count the labels", move |_| source.label_stats(&reviews, (&person, share))))
+        Some(Job::new(Lane::Compute, "Count the labels", move |_| {
+            source.label_stats(&reviews, Repeater { person: &person, share })
+        }))
     }
 
     fn arrived(&self, state: &mut State, stats: &Arc<LabelStats>) {

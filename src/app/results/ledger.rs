@@ -8,6 +8,7 @@ use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::ledger::{LedgerResult, of_prediction};
+use touch2touch_work::on_pad::OnPad;
 
 impl Computes for LedgerKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LedgerResult>> {
@@ -15,7 +16,7 @@ impl Computes for LedgerKey {
         let prediction = state.results.predictions.get(&recipe)?.clone();
         let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Depth chain", move |_| {
-            of_prediction(&prediction, shift, false, (&sample, recipe.touch.finger))
+            of_prediction(&prediction, shift, false, OnPad { sample: &sample, pad: recipe.touch.finger })
         }))
     }
 }

@@ -18,7 +18,8 @@ use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::MaskPlace;
-use touch2touch_work::propose::{self, CadAt, Proposal, Side, Takes, hand_pose};
+use touch2touch_work::on_pad::OnPad;
+use touch2touch_work::propose::{self, CadAt, OtherPair, Proposal, Side, Takes, hand_pose};
 
 const WHAT: &str = "Propose a mask";
 
@@ -48,8 +49,8 @@ impl Computes for DistancesKey {
         let tool = ToolKey { dataset: touch.pair.dataset, name: tool.into() };
         let tool = state.results.tools.get(&tool)?.clone();
         Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
-            let touched = (&*sample, touch.finger);
-            let grid = propose::cad_distances((imprint.get()?, side), touched, &tool.model, pose)?;
+            let on = OnPad { sample: &sample, pad: touch.finger };
+            let grid = propose::cad_distances(imprint.get()?, side, on, &tool.model, pose)?;
             Ok(Distances { grid, at })
         }))
     }
@@ -92,7 +93,7 @@ impl Computes for ProposalKey {
                     let labels = labels.map_or_else(|| source.load_labels(&name), Ok)?;
                     let from = loaded.map_or_else(|| source.load(other).map(Arc::new), Ok)?;
                     let to = Side { sample: &sample, pad, imprint: imprint.get()? };
-                    propose::carried_from_pair(&name, (&from, &labels), to)
+                    propose::carried_from_pair(OtherPair { name: &name, sample: &from, labels: &labels }, to)
                 }))
             }
             ProposalInputs::Across(other, version) => {
@@ -102,7 +103,7 @@ impl Computes for ProposalKey {
                 job(Box::new(move || {
                     let from = Side { sample: &sample, pad, imprint: from.get()? };
                     let to = Side { sample: &sample, pad: touch.finger, imprint: imprint.get()? };
-                    propose::carried_across(&name, (from, &mask), to)
+                    propose::carried_across(&name, from, &mask, to)
                 }))
             }
         }

@@ -12,6 +12,7 @@ use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::ensemble::Ensemble;
+use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::pose::PoseResult;
 
 impl Computes for EnsembleKey {
@@ -24,7 +25,12 @@ impl Computes for EnsembleKey {
         let touch = self.touch;
         let sample = results.samples.get(&touch.pair)?.clone();
         Some(Job::new(Lane::Compute, "Spread of the seeds", move |_| {
-            touch2touch_work::ensemble::ensemble(&predictions, &imprints, shift, (&sample, touch.finger))
+            touch2touch_work::ensemble::ensemble(
+                &predictions,
+                &imprints,
+                shift,
+                OnPad { sample: &sample, pad: touch.finger },
+            )
         }))
     }
 }

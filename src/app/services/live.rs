@@ -40,6 +40,7 @@ use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Rev
 use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
 use touch2touch_work::new_bundle::models_folder;
 use touch2touch_work::prediction::Prediction;
+use touch2touch_work::repeats::Repeater;
 use touch2touch_work::tool::tool_file;
 use touch2touch_work::tuning::unfinished_folder;
 
@@ -239,7 +240,7 @@ impl DataSource for LiveSource {
         self.repeats_of(person)?.save(name, labels, deed).map(drop)
     }
 
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: (&str, f64)) -> Result<LabelStats, TaskError> {
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: Repeater<'_>) -> Result<LabelStats, TaskError> {
         Ok(label_stats(&self.dataset, &self.labels, reviews, whose))
     }
 

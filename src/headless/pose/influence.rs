@@ -45,7 +45,9 @@ impl NamedPlace {
 /// pose has none. That it cannot be written is an error.
 pub(super) fn write(
     stem: &Path,
-    (clouds, sample, tool): (&Clouds, &Sample, &ToolModel),
+    clouds: &Clouds,
+    sample: &Sample,
+    tool: &ToolModel,
     (imprint, registration): (ImprintSource, RegistrationChoice),
     found: &PoseResult,
 ) -> anyhow::Result<Result<Influences, TaskError>> {

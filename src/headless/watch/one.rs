@@ -202,7 +202,7 @@ fn tool_model(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result
     }
     let demo = Dataset::demo();
     let has_it = dataset.tool_mesh_file(name).is_some() || demo.tool_mesh(name).ok().flatten().is_none();
-    let (model, _) = load_tool(if has_it { dataset } else { &demo }, name)
+    let loaded = load_tool(if has_it { dataset } else { &demo }, name)
         .map_err(|err| anyhow::anyhow!("{err} Or name a file with --tool."))?;
-    Ok(model)
+    Ok(loaded.model)
 }

@@ -233,11 +233,7 @@ impl Line {
 ///
 /// Only as far as it leads to the labels as they are: where another program changed them, what came before is history,
 /// and nothing that can be undone.
-pub(super) fn fold<'a>(
-    lines: impl Iterator<Item = &'a [u8]>,
-    labels: &PairLabels,
-    rig: &Rig,
-) -> (Vec<Past>, Vec<Past>) {
+pub(super) fn fold<'a>(lines: impl Iterator<Item = &'a [u8]>, labels: &PairLabels, rig: &Rig) -> JournalHistory {
     let (mut done, mut undone): (Vec<Past>, Vec<Past>) = (Vec::new(), Vec::new());
     for line in lines {
         let Some((act, past)) = serde_json::from_slice::<Line>(line).ok().and_then(|line| line.read(rig)) else {
@@ -280,5 +276,5 @@ pub(super) fn fold<'a>(
     });
     let first = undone.len() - kept.count();
     undone.drain(..first);
-    (done, undone)
+    JournalHistory { done, undone, problem: None }
 }

@@ -5,10 +5,11 @@ use super::super::feel::{Felt, Touch};
 use super::super::job::JobCx;
 use super::super::labels::{Labels, MaskPlace};
 use super::super::models::Models;
+use super::super::on_pad::OnPad;
 use super::super::recipe::{Recipe, Stage};
 use super::{
-    CadAt, Proposal, ProposalSource, Side, Takes, WHAT, automatic, cad_distances, carried_across, carried_from_pair,
-    carries_from, grown, hand_pose, near_cad,
+    CadAt, OtherPair, Proposal, ProposalSource, Side, Takes, WHAT, automatic, cad_distances, carried_across,
+    carried_from_pair, carries_from, grown, hand_pose, near_cad,
 };
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
@@ -39,7 +40,8 @@ pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
 /// # Errors
 /// The reason that holds for all of them: what the source lacks.
 pub fn propose(
-    (touch, all): (Touch<'_>, &Labels),
+    touch: Touch<'_>,
+    all: &Labels,
     felt: &Felt,
     pads: &[PadId],
     setup: &ProposeSetup,
@@ -58,7 +60,7 @@ pub fn propose(
     let near = |at: CadPose, pose: ManualPose| {
         let tool = touch.tool.map_err(Clone::clone)?;
         each(&|pad, imprint| {
-            let distances = cad_distances((imprint, setup.recipe.imprint), (sample, pad), tool, pose)?;
+            let distances = cad_distances(imprint, setup.recipe.imprint, OnPad { sample, pad }, tool, pose)?;
             Ok(near_cad(&distances, setup.recipe.mask.cad_distance_m, at))
         })
     };
@@ -100,7 +102,8 @@ pub fn propose(
             let name = &touch.dataset.index.get(from).ok_or_else(|| lacks("there is no such pair"))?.name;
             let other = touch.dataset.load(from).map_err(|err| TaskError::from_error(WHAT, &err))?;
             let other_labels = all.load(name)?;
-            each(&|pad, imprint| carried_from_pair(name, (&other, &other_labels), Side { sample, pad, imprint }))
+            let from = OtherPair { name, sample: &other, labels: &other_labels };
+            each(&|pad, imprint| carried_from_pair(from, Side { sample, pad, imprint }))
         }
         Takes::OtherPad => {
             let (rig, felt) = (&touch.dataset.rig, reach(&setup.recipe, Stage::Mask)?);
@@ -111,7 +114,7 @@ pub fn propose(
                     return Err(lacks("the other finger has no mask"));
                 };
                 let from = Side { sample, pad: other, imprint: there };
-                carried_across(&rig.pad_key(other), (from, &mask.mask), Side { sample, pad, imprint })
+                carried_across(&rig.pad_key(other), from, &mask.mask, Side { sample, pad, imprint })
             })
         }
     }
