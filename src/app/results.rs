@@ -1,4 +1,4 @@
-//! How each result is computed, when it is asked for, and how views look it up: one file for each kind.
+//! The computing of each result, when it is asked for, and how views look it up: one file for each kind.
 //!
 //! The results themselves and their keys lie below, in [`super::state::results`] and [`super::keys`]. All that is read of the
 //! state here is found by its functions, whichever file they are in: `results::pose(state, source)`.
@@ -124,10 +124,10 @@ pub trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
 
-    /// What follows from a result besides its being kept in its cache.
+    /// The consequences of a result besides its being kept in its cache.
     fn arrived(&self, _state: &mut State, _value: &Arc<Self::Value>) {}
 
-    /// What follows from a failure; whether the log says it although a pane shows it in place of the result.
+    /// The consequences of a failure; whether the log says it although a pane shows it in place of the result.
     fn failed(&self, _state: &mut State, _err: &TaskError) -> bool {
         false
     }
@@ -143,7 +143,7 @@ macro_rules! computing {
             } )* }
         }
 
-        /// What follows from the failure of a request; whether the log says it.
+        /// The consequences of the failure of a request; whether the log says it.
         pub(super) fn failed(request: &Request, state: &mut State, err: &TaskError) -> bool {
             match request { $( Request::$variant(key) => key.failed(state, err), )* }
         }
