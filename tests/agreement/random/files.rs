@@ -75,6 +75,19 @@ pub(in crate::agreement) fn a_random_recipe_draws_the_same_pictures_by_button_an
     compared(&counts, 20_000);
 }
 
+#[test]
+pub(in crate::agreement) fn the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let [own, twin] = ["one", "other"].map(|name| lab_folder(&home.path().join(name)));
+    let mut both = Both::open(Place::Path(own.clone()), home.path());
+    let (tool, unit) = ("pattern_36", "m");
+    let named = LibraryCommand::ReadToolAs { tool: tool.into(), unit: unit.parse().unwrap(), replacing: None };
+    both.studio.send(named.into());
+    both.run(&["unit", twin.to_str().unwrap(), "--tool", tool, "--set", unit].map(str::to_owned)).unwrap();
+    let [shown, said] = [own, twin].map(|folder| std::fs::read_to_string(folder.join("tools_stls/unit.txt")).unwrap());
+    assert_eq!((shown.trim(), &shown), (unit, &said));
+}
+
 /// A case without what decides no result: how the studio showed it, and numbers of masks of another source.
 fn decisive(case: &Case) -> Value {
     let mut value = written(case);
