@@ -8,8 +8,7 @@ use super::command::{
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
     UiRequest, ViewCommand, WorkbenchCommand,
 };
-use super::keys::ImprintSource;
-use super::keys::ShiftMode;
+use super::keys::{ImprintSource, ShiftMode};
 use super::pane::Workspace;
 use super::settings::prefer;
 use super::state::export::Output;
@@ -17,9 +16,8 @@ use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
 use super::state::results::Request;
-use super::state::settings::ColorRange;
-use super::state::settings::MaskTool;
 use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
+use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{SceneTool, Section};
 use super::state::{Absent, State};

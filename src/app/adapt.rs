@@ -1,8 +1,7 @@
 //! The room of fitting a generator to one's own pairs.
 
 pub use super::state::adapt::AdaptPairs;
-pub(crate) use super::state::adapt::AdaptState;
-pub(crate) use super::state::adapt::TUNING_STEPS;
+pub(crate) use super::state::adapt::{AdaptState, TUNING_STEPS};
 
 use std::sync::Arc;
 

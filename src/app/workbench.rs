@@ -7,8 +7,7 @@ use glam::DVec3;
 
 use super::effect::Effect;
 use super::inspect::InspectCommand;
-use super::keys::ImprintSource;
-use super::keys::RunKey;
+use super::keys::{ImprintSource, RunKey};
 use super::state::State;
 use super::state::results::Request;
 use super::{inspect, labels, results};

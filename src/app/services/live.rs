@@ -29,11 +29,10 @@ use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan
 use touch2touch_work::follow::Following;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
-use touch2touch_work::io::case_file;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, files, folders};
+use touch2touch_work::io::{atomic, case_file, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::{LabelStats, label_stats};
 use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};

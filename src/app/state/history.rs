@@ -6,8 +6,7 @@ use super::super::keys::Revision;
 use super::labels::{Document, DrawnMask, MaskPlace, Review};
 use touch2touch_core::label::PackedMask;
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::labels::{Change, Past};
+use touch2touch_work::labels::{Change, ImprintOf, Past};
 
 /// A corrected mask in few bytes.
 #[derive(Clone, Debug, PartialEq)]

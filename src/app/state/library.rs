@@ -8,8 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::keys::{DatasetSeq, PairKey};
-use super::super::keys::{MaskRecipe, PredictionKey};
+use super::super::keys::{DatasetSeq, MaskRecipe, PairKey, PredictionKey};
 use super::super::source::DataSource;
 use super::evaluate::TableState;
 use super::labels::Document;

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
 use super::super::jobs::Lane;
-use super::super::keys::DatasetSeq;
-use super::super::keys::PredictionKey;
+use super::super::keys::{DatasetSeq, PredictionKey};
 use super::super::state::results::Request;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
