@@ -13,8 +13,6 @@ mod whole;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{demand, results};
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{
@@ -23,8 +21,10 @@ use touch2touch::app::command::{
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Level;
+use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 

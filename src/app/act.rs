@@ -1,4 +1,4 @@
-//! What the rows of actions say: the command that an [`Action`] is now.
+//! The words of the rows of actions: the command that an [`Action`] is now.
 
 use strum::IntoEnumIterator;
 
@@ -8,8 +8,7 @@ use super::command::{
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
     UiRequest, ViewCommand, WorkbenchCommand,
 };
-use super::keys::ImprintSource;
-use super::keys::ShiftMode;
+use super::keys::{ImprintSource, ShiftMode};
 use super::pane::Workspace;
 use super::settings::prefer;
 use super::state::export::Output;
@@ -17,9 +16,8 @@ use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
 use super::state::results::Request;
-use super::state::settings::ColorRange;
-use super::state::settings::MaskTool;
 use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
+use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{SceneTool, Section};
 use super::state::{Absent, State};
@@ -71,22 +69,22 @@ fn ui(request: UiRequest) -> Option<Command> {
     does(ViewCommand::Ui(request))
 }
 
-/// Where a data set is open.
+/// The command, where a data set is open.
 fn opened(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.library.open.is_some(), command)
 }
 
-/// Where the list has pairs.
+/// The command, where the list has pairs.
 fn listed(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(!state.library.order.is_empty(), command)
 }
 
-/// Where a pair is selected.
+/// The command, where a pair is selected.
 fn of_pair(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.entry().is_some(), command)
 }
 
-/// Where the labels of the selected pair can be changed.
+/// The command, where the labels of the selected pair can be changed.
 fn editable(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.document.is_editable(state.pair_name()), command)
 }
@@ -120,7 +118,7 @@ fn follow(state: &State) -> Option<Command> {
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 
-/// Whether the mask of the active finger was corrected.
+/// True where the mask of the active finger was corrected.
 fn is_corrected(state: &State) -> bool {
     let finger = state.selection.finger;
     results::drawn_mask(state, results::worked_on(state, finger), finger).is_some()
@@ -163,12 +161,12 @@ fn accept_shown(state: &State) -> Option<Command> {
     editable(state, WorkbenchCommand::AcceptHand).filter(|_| state.workbench.hand.is_some())
 }
 
-/// Whether the measured imprints of all pairs can be scored now.
+/// True where the measured imprints of all pairs can be scored now.
 fn can_rank(state: &State) -> bool {
     results::scores_key(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
 
-/// Whether the pose tool is in hand and there is a tool to be moved.
+/// True where the pose tool is in hand and there is a tool to be moved.
 fn in_hand(state: &State) -> bool {
     state.workbench.tool == SceneTool::Pose && results::tool(state).ready().is_some()
 }
@@ -183,7 +181,7 @@ fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
     when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
-/// What Escape gives up in the 3D panes: the pose in hand, then a measurement, then the point read.
+/// The command of Escape in the 3D panes: it gives up the pose in hand, then a measurement, then the point read.
 fn escape(state: &State) -> Option<WorkbenchCommand> {
     let bench = &state.workbench;
     if bench.hand.is_some() {

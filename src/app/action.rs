@@ -24,7 +24,7 @@ pub enum Group {
     Mask,
     /// Registration.
     Pose,
-    /// What is shown and how.
+    /// The view: what is shown, and how.
     View,
     /// Help.
     Help,
@@ -44,7 +44,7 @@ impl Group {
         }
     }
 
-    /// Its actions, in the order of the table.
+    /// The actions, in the order of the table.
     pub fn actions(self) -> impl Iterator<Item = Action> {
         Action::iter().filter(move |action| action.group() == self)
     }
@@ -373,7 +373,7 @@ macro_rules! define {
                 match self { $( Self::$name => $label, )* }
             }
 
-            /// What it does.
+            /// The effect, in words.
             pub fn tooltip(self) -> &'static str {
                 match self { $( Self::$name => $tooltip, )* }
             }
@@ -383,7 +383,7 @@ macro_rules! define {
                 match self { $( Self::$name => Group::$group, )* }
             }
 
-            /// Its shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
+            /// The shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
             pub fn defaults(self) -> &'static [Shortcut] {
                 match self { $( Self::$name => const { &[$($shortcut),*] }, )* }
             }
@@ -395,7 +395,7 @@ use Key as K;
 actions!(define);
 
 impl Action {
-    /// Whether it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
+    /// True where it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
     pub(crate) fn is_nudge(self) -> bool {
         matches!(
             self,

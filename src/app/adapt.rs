@@ -1,8 +1,7 @@
 //! The room of fitting a generator to one's own pairs.
 
 pub use super::state::adapt::AdaptPairs;
-pub(crate) use super::state::adapt::AdaptState;
-pub(crate) use super::state::adapt::TUNING_STEPS;
+pub(crate) use super::state::adapt::{AdaptState, TUNING_STEPS};
 
 use std::sync::Arc;
 
@@ -24,12 +23,12 @@ use touch2touch_work::labels::Review;
 use touch2touch_work::recipe::Recipe;
 use touch2touch_work::tuning::Tuning;
 
-/// What can happen to the fit.
+/// A command to the fit.
 #[derive(Clone, Copy, Debug)]
 pub enum AdaptCommand {
-    /// Which pairs are fitted.
+    /// The pairs that are fitted.
     Choose(AdaptPairs),
-    /// Whether the networks themselves are tuned as well.
+    /// True where the networks themselves are tuned as well.
     Tune(bool),
     /// With how many steps.
     Steps(u32),
@@ -75,7 +74,7 @@ pub enum Fit {
     New {
         /// The data.
         source: Arc<dyn DataSource>,
-        /// What to what.
+        /// The two scores, before and after.
         setup: Box<AdaptSetup>,
     },
     /// As it was done before and refused: only writes it.
@@ -141,7 +140,7 @@ pub(crate) fn pairs(state: &State) -> Box<dyn Iterator<Item = PairId> + '_> {
     }
 }
 
-/// What is fitted: the chosen generator, or what that was fitted from.
+/// The generator that is fitted: the chosen one, or the one that it was fitted from.
 fn to_be_fitted(state: &State) -> Option<&BundleInfo> {
     let chosen = recipe::bundle(state, BundleKind::Generator).ok()?;
     match chosen.fit() {
@@ -150,12 +149,12 @@ fn to_be_fitted(state: &State) -> Option<&BundleInfo> {
     }
 }
 
-/// Whether there is something to fit, and pairs to fit it to.
+/// True where there is something to fit, and pairs to fit it to.
 pub(crate) fn can_adapt(state: &State) -> bool {
     to_be_fitted(state).is_some() && pairs(state).next().is_some()
 }
 
-/// What a fit started now would do; `None` without data, pairs or a depth generator.
+/// The setup of a fit started now; `None` without data, pairs or a depth generator.
 pub fn setup(state: &State) -> Option<AdaptSetup> {
     let bundle = to_be_fitted(state)?.clone();
     can_adapt(state).then(|| AdaptSetup {
@@ -173,7 +172,7 @@ pub fn setup(state: &State) -> Option<AdaptSetup> {
     })
 }
 
-/// How the tuning goes, or how the last one went.
+/// The curves of the tuning, or of the last one.
 pub(crate) fn tuning_curves(state: &State) -> &[Curve] {
     match (state.tasks.of_kind(TaskKind::Fit), &state.adapt.result) {
         (Some((_, task)), _) => &task.progress.curves,
@@ -190,7 +189,7 @@ pub fn held_back(state: &State) -> Option<&HeldBack> {
     of_pair().find(|held| held.pad == state.selection.finger).or_else(|| of_pair().next()).or_else(|| all.first())
 }
 
-/// Whether that is what predicts now.
+/// True where the last fit is what predicts now.
 pub(crate) fn uses_fit(state: &State) -> bool {
     let now = recipe::bundle(state, BundleKind::Generator).ok().map(|bundle| &bundle.id);
     fitted(state).is_some_and(|fitted| Some(&fitted.id) == now)

@@ -9,8 +9,7 @@ use super::keys::{DatasetSeq, Preview, Revision};
 use super::source::Followed;
 use super::state::State;
 use super::state::labels::Merged;
-use super::state::results::Computed;
-use super::state::results::Request;
+use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
 use super::{evaluate, export, follow, labels, library, results, settings, tasks, workbench};
@@ -18,7 +17,7 @@ use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
 
-/// What the runtime answers.
+/// An answer of the runtime.
 #[derive(Clone, Debug)]
 pub enum Answer {
     /// A touch arrived in the followed folder.
@@ -27,7 +26,7 @@ pub enum Answer {
     Bundles(Vec<BundleInfo>, Vec<TaskError>),
     /// The settings file was read.
     SettingsLoaded(Box<Settings>, Option<TaskError>),
-    /// What the runtime was asked for because it is shown.
+    /// The demands that were handed to the runtime.
     Demanded(Vec<Request>),
     /// A result that a pane asked for, of an opening.
     Computed(DatasetSeq, Computed),
@@ -35,7 +34,7 @@ pub enum Answer {
     Previewed(Ticket, Arc<Preview>),
     /// A job is under way.
     Progressed(Ticket, Progress),
-    /// What a person started is done.
+    /// An errand is done.
     Ended(Ticket, Ended),
     /// The system was asked to show a place.
     Revealed,
@@ -133,7 +132,7 @@ fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effec
     }
 }
 
-/// What the rooms do about a result that is there now.
+/// The rooms' reaction to a result that is there now.
 fn react(state: &mut State, request: &Request) {
     match request {
         Request::Sample(key) if state.is_selected(*key) => {

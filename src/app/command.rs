@@ -65,6 +65,6 @@ commands! {
     Settings(SettingsCommand),
     /// To running jobs and the log.
     Tasks(TasksCommand),
-    /// What the runtime answers.
+    /// An answer of the runtime.
     Answer(Answer),
 }

@@ -1,4 +1,4 @@
-//! What the visible panes need, is not there, and can be computed from what is there.
+//! The demands of the visible panes: results that are not there and can be computed from what is there.
 //!
 //! Each result says in its own file when it is asked for; here stands what is more urgent than what.
 
@@ -12,7 +12,7 @@ use super::state::results::Request;
 /// Neighbors loaded ahead on each side of the selection.
 pub(crate) const PREFETCH: usize = 4;
 
-/// What the visible panes need, is not there, and can be computed from what is there; most urgent first.
+/// The demands of the visible panes: results that are not there and can be computed from what is there; most urgent first.
 ///
 /// Pure: the same state wants the same. A result that is computed makes the next one possible.
 pub fn demands(state: &State) -> Vec<Request> {
@@ -93,7 +93,7 @@ fn selection(wants: &mut Demands<'_>) {
     }
 }
 
-/// What the workbench shows of an imprint whose cloud is needed anyway.
+/// Asks for what the workbench shows of an imprint whose cloud is needed anyway.
 fn workbench(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
     if results::tool(state).ready().is_none() || results::cloud(state, source).ready().is_none() {

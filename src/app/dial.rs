@@ -19,16 +19,16 @@ use touch2touch_work::pairs;
 use touch2touch_work::recipe::Recipe;
 use touch2touch_work::sweep::{self, Dial, Setting, Sweep, SweepSetup};
 
-/// What can happen to the dial.
+/// A command to the dial.
 #[derive(Clone, Copy, Debug)]
 pub enum DialCommand {
-    /// Which one is turned.
+    /// The dial that is turned.
     Choose(Dial),
     /// From where to where, in the dial's unit, in how many values.
     Range([f64; 2], usize),
     /// Over which pairs.
     Over(DialPairs),
-    /// Whether the predictions are posed as well, or only what was measured.
+    /// True where the predictions are posed as well; else only what was measured.
     Predictions(bool),
     /// Turns it.
     Start,
@@ -114,7 +114,7 @@ pub(crate) fn pairs(state: &State) -> Vec<PairId> {
     }
 }
 
-/// What a dial turned now would do.
+/// The sweep that a dial turned now would do.
 ///
 /// # Errors
 /// Why it cannot be turned, in words.
@@ -140,14 +140,14 @@ pub(crate) fn setup(state: &State) -> Result<SweepSetup, String> {
     Ok(SweepSetup { values, pairs, recipe })
 }
 
-/// Whether a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.
+/// True where a value of the last turn is what is in force now; `at`: whether it was when the dial was turned.
 pub(crate) fn is_dialed(state: &State, value: Setting, at: bool) -> bool {
     let now = recipe(state);
     let then = state.dial.result.as_ref().map(|result| &result.in_force);
     value.put(&now).as_ref() == Ok(&now) || (at && then == Some(&now))
 }
 
-/// Whether something other than the dial was changed since it was turned.
+/// True where something other than the dial was changed since it was turned.
 pub(crate) fn is_outdated(state: &State) -> bool {
     let Some(result) = &state.dial.result else { return false };
     let value = result.series.first().and_then(|series| series.points.first()?.value);

@@ -17,15 +17,15 @@ use touch2touch_work::evaluate::{self, Evaluation, Setup};
 use touch2touch_work::job::{JobCx, Progress};
 use touch2touch_work::queue::measured_only;
 
-/// How often what was scored so far is looked up while all pairs are scored.
+/// The grasps after which the scores so far are looked up while all pairs are scored.
 const LOOKS: u64 = 24;
 
-/// What can happen to the results table.
+/// A command to the results table.
 #[derive(Clone, Debug)]
 pub enum EvaluateCommand {
     /// Gives a generator a row, or none.
     Choose(Arc<str>, bool),
-    /// How many grasps of each tool.
+    /// The number of grasps of each tool.
     Grasps(Option<usize>),
     /// Shows what was published, or not.
     Published(bool),

@@ -35,7 +35,7 @@ use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::case_file;
 use touch2touch_work::job::JobCx;
 
-/// What can happen to what is taken away.
+/// A command to what is taken away.
 #[derive(Clone, Debug)]
 pub enum ExportCommand {
     /// Opens or closes the form of a figure.
@@ -48,7 +48,7 @@ pub enum ExportCommand {
     SetMasks(ExportChoice),
     /// Says what an import of masks from a folder or file would change; `None` asks no more.
     AskImport(Option<PathBuf>),
-    /// Whether it replaces what was painted by hand as well.
+    /// True where it replaces what was painted by hand as well.
     ImportOverHand(bool),
     /// Does it.
     Import,
@@ -98,7 +98,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
     }
 }
 
-/// Where a case was opened: shows its pair as it was shown when it was made, and has it predicted again.
+/// Shows the pair of a case that was opened as it was shown when it was made, and has it predicted again.
 pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     state.export.predict = false;
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };

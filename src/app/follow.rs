@@ -9,7 +9,7 @@ use super::state::tasks::Ticket;
 use super::{library, predict};
 use touch2touch_work::error::TaskError;
 
-/// What can happen to following.
+/// A command to the following of a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FollowCommand {
     /// Follows the folder that is open, or stops: what arrives is shown and predicted.

@@ -11,7 +11,7 @@ use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::error::TaskError;
 
-/// What a person does with the time machine and the basin map.
+/// A command to the time machine and the basin map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectCommand {
     /// Looks at the other imprint.
@@ -39,11 +39,11 @@ pub enum InspectCommand {
     Pin,
     /// Lets a kept step go.
     Unpin(usize),
-    /// Whether correspondences are drawn.
+    /// True where correspondences are drawn.
     Lines(bool),
     /// The plane of the basin map.
     Plane(Plane),
-    /// What colors the basin map.
+    /// The coloring of the basin map.
     Color(BasinColor),
     /// Gives up the basin map that is being computed.
     StopBasin,

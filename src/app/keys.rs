@@ -77,7 +77,7 @@ pub struct TouchKey {
     pub finger: PadId,
 }
 
-/// What a range mapping does, for its tooltip.
+/// The tooltip of a range mapping.
 pub(crate) fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => {

@@ -31,7 +31,7 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::label_edit::{self, Edited, LabelEdit, TakenUp};
 use touch2touch_work::labels::{Act, Operation};
 
-/// What can happen to the document.
+/// A command to the document.
 #[derive(Clone, Debug)]
 pub enum LabelsCommand {
     /// Pointer down on an image, raw bubble pixels. `erase` swaps brush and eraser for this stroke.
@@ -42,7 +42,7 @@ pub enum LabelsCommand {
         source: ImprintSource,
         /// Position.
         at_px: [f32; 2],
-        /// Whether to remove instead of the tool's own effect.
+        /// True to remove in place of the tool's own effect.
         erase: bool,
     },
     /// Pointer down on a 3D view.
@@ -83,7 +83,7 @@ pub enum LabelsCommand {
     Unsaved(UnsavedCommand),
 }
 
-/// How a drawing in a 3D view begins.
+/// The beginning of a drawing in a 3D view.
 #[derive(Clone, Debug)]
 pub struct StrokeIn3d {
     /// The finger drawn on: whose point the pointer meant.
@@ -96,7 +96,7 @@ pub struct StrokeIn3d {
     pub at_px: [f32; 2],
     /// The point at whose depth the brush has its size, meters, grasp frame.
     pub size_at: DVec3,
-    /// Whether to remove instead of the tool's own effect.
+    /// True to remove in place of the tool's own effect.
     pub erase: bool,
 }
 
@@ -137,7 +137,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
     }
 }
 
-/// Whether the selected pair may be edited; says why not.
+/// True where the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     if state.entry().is_none() {
         return false;
@@ -558,7 +558,7 @@ pub(crate) fn brush_px(state: &State, sight: &Sight, size_at: DVec3) -> f32 {
     sight.px_per_m(size_at).map_or(0.0, |scale| (radius_m * scale) as f32)
 }
 
-/// Where the pixels of a finger's imprint lie in a 3D picture.
+/// The places of the pixels of a finger's imprint in a 3D picture.
 fn seen(state: &State, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<VisiblePixels, TaskError> {
     let sample =
         results::sample(state).ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;

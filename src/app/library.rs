@@ -16,8 +16,7 @@ use super::source::DataSource;
 use super::state::State;
 use super::state::evaluate::ScoreChoice;
 use super::state::labels::{Document, Review};
-use super::state::results::Request;
-use super::state::results::Results;
+use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
@@ -31,7 +30,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::tool::UnitSet;
 
-/// What can happen to the data set and its list.
+/// A command to the data set and its list.
 #[derive(Clone, Debug)]
 pub enum LibraryCommand {
     /// Opens a place; what is open stays until the new one is read.
@@ -46,7 +45,7 @@ pub enum LibraryCommand {
         tool: String,
         /// The unit.
         unit: ToolUnit,
-        /// What the file beside it says now, as the person was told.
+        /// The unit that the file beside it says now, as the person was told.
         replacing: Option<String>,
     },
     /// Narrows the list.
@@ -196,7 +195,7 @@ pub struct ReadTool {
     source: Arc<dyn DataSource>,
     tool: String,
     unit: ToolUnit,
-    /// What the file beside it says now, as the person was told.
+    /// The unit that the file beside it says now, as the person was told.
     replacing: Option<String>,
 }
 
@@ -283,7 +282,7 @@ fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<
     }
 }
 
-/// Where nothing is ranked yet, that is begun.
+/// Begins the ranking where nothing is ranked yet.
 fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
     let sorted = std::mem::replace(&mut state.library.sort, Sort::Uncertain) == Sort::Uncertain;
     state.reorder();
@@ -333,7 +332,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     labels::end_repeats(state);
 }
 
-/// What is odd about the files of the selected pair, once it is loaded; each pair once.
+/// Says the oddities of the files of the selected pair, once it is loaded; each pair once.
 pub(super) fn say_notes(state: &mut State) {
     let Some((key, sample)) = state.pair_key().and_then(|key| Some((key, state.results.samples.get(&key)?.clone())))
     else {

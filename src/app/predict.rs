@@ -19,7 +19,7 @@ use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 
-/// What can happen to predictions.
+/// A command to predictions.
 #[derive(Clone, Debug)]
 pub enum PredictCommand {
     /// Generates for the selected pair with the settings.
@@ -57,7 +57,7 @@ fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
     same_seed(state, effects);
 }
 
-/// The same with the seed as it is.
+/// Starts the predictions with the seed as it is.
 pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
     if let Err(absent) = results::can_generate(state) {
         return state.log.error(&refusal(absent));

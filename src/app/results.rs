@@ -1,4 +1,4 @@
-//! How each result is computed, when it is asked for, and how views look it up: one file for each kind.
+//! The computing of each result, when it is asked for, and how views look it up: one file for each kind.
 //!
 //! The results themselves and their keys lie below, in [`super::state::results`] and [`super::keys`]. All that is read of the
 //! state here is found by its functions, whichever file they are in: `results::pose(state, source)`.
@@ -64,8 +64,7 @@ pub use deviation::deviation;
 pub(crate) use deviation::want_deviation;
 pub use import_plan::import_plan_key;
 pub(crate) use import_plan::{import_setup, want_import_plan};
-pub(crate) use imprint::want_imprint;
-pub(crate) use imprint::{Imprint, gone, imprint_input};
+pub(crate) use imprint::{Imprint, gone, imprint_input, want_imprint};
 pub use imprint::{imprint, predicted_color};
 pub(crate) use influence::want_influence;
 pub use influence::{influence, shown_influence};
@@ -80,11 +79,9 @@ pub use ledger::ledger;
 pub(crate) use ledger::want_ledger;
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
 pub(crate) use manual::{shown_imprint, sides_apart};
-pub use mask::MaskInForce;
-pub(crate) use mask::mask_pixels;
-pub use mask::{allowed, drawn_mask, mask_in_force, mask_places};
+pub use mask::{MaskInForce, allowed, drawn_mask, mask_in_force, mask_places};
 pub(crate) use mask::{
-    automatic_mask, automatic_provenance, drawn_mask_on, gate_is_known, mask_place, mask_recipe, want_mask,
+    automatic_mask, automatic_provenance, drawn_mask_on, gate_is_known, mask_pixels, mask_place, mask_recipe, want_mask,
 };
 pub use mask_plan::mask_plan_key;
 pub(crate) use mask_plan::want_mask_plan;
@@ -94,11 +91,9 @@ pub(crate) use on_screen::{
     shows_steps,
 };
 pub use outdated::{Outdated, Why, outdated};
-pub(crate) use pose::{Registered, registered};
+pub(crate) use pose::{Registered, registered, want_pose, want_pose_table};
 pub use pose::{pose, pose_key, pose_of, provisional_pose};
-pub(crate) use pose::{want_pose, want_pose_table};
-pub(crate) use prediction::hold;
-pub(crate) use prediction::{keep_prediction, want_other_finger, want_stored};
+pub(crate) use prediction::{hold, keep_prediction, want_other_finger, want_stored};
 pub(crate) use prefetch::{prefetch, want_predictions_ahead};
 pub use preview::{Onlooker, PreviewRequest, preview, preview_wish};
 pub(crate) use proposal::want_proposal;
@@ -124,10 +119,10 @@ pub trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
 
-    /// What follows from a result besides its being kept in its cache.
+    /// The consequences of a result besides its being kept in its cache.
     fn arrived(&self, _state: &mut State, _value: &Arc<Self::Value>) {}
 
-    /// What follows from a failure; whether the log says it although a pane shows it in place of the result.
+    /// The consequences of a failure; whether the log says it although a pane shows it in place of the result.
     fn failed(&self, _state: &mut State, _err: &TaskError) -> bool {
         false
     }
@@ -143,7 +138,7 @@ macro_rules! computing {
             } )* }
         }
 
-        /// What follows from the failure of a request; whether the log says it.
+        /// The consequences of the failure of a request; whether the log says it.
         pub(super) fn failed(request: &Request, state: &mut State, err: &TaskError) -> bool {
             match request { $( Request::$variant(key) => key.failed(state, err), )* }
         }

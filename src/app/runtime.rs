@@ -16,8 +16,7 @@ use super::apply::apply;
 use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
 use super::effect::Effect;
 use super::jobs::Lane;
-use super::keys::TouchKey;
-use super::keys::{DatasetSeq, Preview};
+use super::keys::{DatasetSeq, Preview, TouchKey};
 use super::results::preview::PreviewRequest;
 use super::services::SharedServices;
 use super::state::State;
@@ -67,7 +66,7 @@ pub struct Runtime {
     progress: Arc<std::sync::Mutex<BTreeMap<Ticket, Progress>>>,
     /// Pictures on the way, only the latest of each touch.
     previews: Arc<std::sync::Mutex<LatestPreviews>>,
-    /// What of them would be looked at.
+    /// The part of them that would be looked at.
     preview_wish: Arc<std::sync::Mutex<PreviewRequest>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
@@ -178,7 +177,7 @@ impl Runtime {
         }
     }
 
-    /// How long until [`Runtime::tick`] has to be called although nothing happens; `None` = not at all.
+    /// The time until [`Runtime::tick`] has to be called although nothing happens; `None` = not at all.
     pub fn next_tick(&self) -> Option<Duration> {
         Some(self.retry_at?.saturating_duration_since(Instant::now()))
     }

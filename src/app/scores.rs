@@ -14,16 +14,16 @@ use touch2touch_work::queue::Queue;
 pub struct ScoreTable {
     /// The measured imprints first, where they are scored; each has scores.
     pub sources: Vec<SourceScores>,
-    /// Which pairs are worth a look first.
+    /// The queue of pairs that are worth a look first.
     pub queue: Queue,
 }
 
 /// The scores of the pairs by one source.
 #[derive(Debug)]
 pub struct SourceScores {
-    /// Its name.
+    /// The name.
     pub name: Arc<str>,
-    /// Whether these are the measured imprints themselves.
+    /// True where these are the measured imprints themselves.
     pub upper_bound: bool,
     /// Pairs that were scored.
     pub scored: usize,
@@ -34,7 +34,7 @@ pub struct SourceScores {
     metrics: BTreeMap<Metric, [f64; 2]>,
 }
 
-/// How a value stands among those of all pairs.
+/// The standing of a value among those of all pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Grade {
     /// Among the better seven tenths.
@@ -56,7 +56,7 @@ impl SourceScores {
         self.metrics.keys().copied()
     }
 
-    /// Whether some pair has a metric.
+    /// True where some pair has a metric.
     pub fn has(&self, metric: Metric) -> bool {
         self.metrics.contains_key(&metric)
     }
@@ -66,7 +66,7 @@ impl SourceScores {
         self.grasps.get(pair.0 as usize)?.as_ref()?.metric(metric)
     }
 
-    /// How a value of a metric stands among those of all pairs.
+    /// The standing of a value of a metric among those of all pairs.
     pub(crate) fn standing(&self, metric: Metric, value: f64) -> Grade {
         let bad = metric.badness(value);
         match self.metrics.get(&metric) {

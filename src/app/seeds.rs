@@ -5,14 +5,14 @@ pub use super::state::seeds::{COUNT, Seeds};
 use super::results;
 use super::state::State;
 
-/// What can be done with seeds.
+/// A command to the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeedsCommand {
-    /// How many; limited to [`COUNT`].
+    /// The number, limited to [`COUNT`].
     Count(usize),
     /// Makes those that are missing for the pair on screen, or stops.
     Run(bool),
-    /// Whether they are made for every pair that is shown.
+    /// True where they are made for every pair that is shown.
     EveryPair(bool),
 }
 

@@ -1,4 +1,4 @@
-//! What the model needs from files and models, as two small traits, so that tests can put their own behind it.
+//! [`Services`]: files and models as the lanes use them; tests put their own behind it.
 //!
 //! The studio and the command line use [`DataSource`] and [`Services`] as [`live`] implements them over `io` and `infer`.
 
@@ -26,7 +26,7 @@ use touch2touch_work::labels::Recovered;
 use touch2touch_work::models::{GenerateInput, Models};
 use touch2touch_work::prediction::Prediction;
 
-/// What opening a data set yields.
+/// The yield of opening a data set.
 #[derive(Clone)]
 pub struct Opened {
     /// The data.
@@ -70,7 +70,7 @@ pub trait Services: Send + Sync {
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError>;
 
-    /// What was made of a touch before and is kept on the disk, oldest first, with the recipes that `bundles` and
+    /// The predictions of a touch that are kept on the disk, oldest first, with the keys that `bundles` and
     /// `runtime` give it now. Never fails: what cannot be read is not there.
     fn stored(
         &self,
@@ -83,8 +83,8 @@ pub trait Services: Send + Sync {
         Vec::new()
     }
 
-    /// Runs the mask model on an imprint in meters, as [`Models::mask`]; the mask says what it is made of in the end. Called on the same lane as
-    /// [`Self::predict`].
+    /// Runs the mask model on an imprint in meters, as [`Models::mask`]; the mask says what it is made of in the end.
+    /// Called on the same lane as [`Self::predict`].
     ///
     /// # Errors
     /// If the model cannot be loaded or run.
@@ -102,22 +102,22 @@ pub trait Services: Send + Sync {
         &MODELS
     }
 
-    /// Where models are kept that were made here.
+    /// The folder of models that were made here.
     fn models_folder(&self) -> Option<&Path> {
         None
     }
 
-    /// Where tuning that was stopped is kept.
+    /// The folder of tuning that was stopped.
     fn unfinished_folder(&self) -> Option<&Path> {
         None
     }
 
-    /// How long a pair stays on screen before it is predicted without being asked for.
+    /// The time that a pair stays on screen before it is predicted without being asked for.
     fn patience(&self) -> Duration {
         Duration::ZERO
     }
 
-    /// How long labels that could not be written wait until they are tried again.
+    /// The time that labels that could not be written wait until they are tried again.
     fn retry_after(&self) -> Duration {
         Duration::from_secs(5)
     }

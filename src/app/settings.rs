@@ -19,7 +19,7 @@ use super::keys::ImprintSource;
 use super::results;
 use super::state::State;
 
-/// What can happen to the preferences.
+/// A command to the preferences.
 #[derive(Clone, Debug)]
 pub enum SettingsCommand {
     /// Takes over what a person changed ([`prefer`]).
@@ -28,7 +28,7 @@ pub enum SettingsCommand {
     RangeFromShown,
     /// The arrangement of the panes of a workspace, in the window's format.
     SetLayout(Workspace, String),
-    /// What is on screen as the window is closed.
+    /// The screen as the window is closed.
     Remember(Last),
     /// All preferences back to their defaults; recent places stay.
     ResetSettings,

@@ -23,13 +23,13 @@ use touch2touch_work::tool::{UnitSet, set_unit};
 pub trait DataSource: Send + Sync {
     /// The name on screen.
     fn title(&self) -> &str;
-    /// Its folder; `None` for the demo.
+    /// The folder; `None` for the demo.
     fn root(&self) -> Option<&Path>;
-    /// The same as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
+    /// The data set as the command line sees it, for work on all of its pairs; `None` where there is no such thing.
     fn as_dataset(&self) -> Option<&Dataset> {
         None
     }
-    /// The same for the job `what`.
+    /// The data set as the command line sees it, for the job `what`.
     ///
     /// # Errors
     /// If there is no such thing.
@@ -47,7 +47,7 @@ pub trait DataSource: Send + Sync {
     }
     /// All pairs.
     fn index(&self) -> &Index;
-    /// What is wrong with it, apart from what opened.
+    /// The problems of its other files.
     fn problems(&self) -> &[Problem];
 
     /// Reads one pair.
@@ -89,7 +89,7 @@ pub trait DataSource: Send + Sync {
     /// If there are some and they cannot be read: then they must not be written either.
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError>;
 
-    /// What was done to them before, and what was taken back of it.
+    /// The changes that were made of them before, and those that were taken back.
     fn past(&self, _name: &str, _labels: &PairLabels) -> JournalHistory {
         JournalHistory::default()
     }
@@ -132,7 +132,7 @@ pub trait DataSource: Send + Sync {
         Err(TaskError::new("Save the repeat", "this source keeps none"))
     }
 
-    /// How far the labeling is, what it took, and what comes back to a person; see
+    /// The progress of the labeling, what it took, and what comes back to a person; see
     /// [`touch2touch_work::label_stats::label_stats`].
     ///
     /// # Errors
@@ -141,7 +141,7 @@ pub trait DataSource: Send + Sync {
         Ok(LabelStats::of_reviews(self.index(), reviews))
     }
 
-    /// What an export of masks would write where. `changed` is newer than what is stored.
+    /// The plan of an export of masks. `changed` is newer than what is stored.
     ///
     /// # Errors
     /// If the masks cannot be divided.
@@ -160,16 +160,16 @@ pub trait DataSource: Send + Sync {
     ) -> Result<String, TaskError>;
 }
 
-/// What happened in a followed folder.
+/// A touch that arrived in a followed folder.
 #[derive(Clone)]
 pub struct Followed {
     /// The data set with all pairs so far: those known before keep their ids.
     pub source: Arc<dyn DataSource>,
     /// The touch.
     pub pair: PairId,
-    /// Whether it was there before, and only its bubble came later.
+    /// True where it was there before, and only its bubble came later.
     pub completed: bool,
-    /// Its tensors, or why they cannot be read.
+    /// The tensors, or why they cannot be read.
     pub sample: Result<Arc<Sample>, TaskError>,
 }
 

@@ -46,19 +46,19 @@ use workbench::Workbench;
 pub struct State {
     /// The open data set and its list.
     pub library: Library,
-    /// What is looked at.
+    /// The selection: everything that is looked at.
     pub selection: Selection,
-    /// What of a registration is looked at.
+    /// The part of a registration that is looked at.
     pub inspect: Inspect,
-    /// What a person made.
+    /// The document: everything that a person made.
     pub document: Document,
-    /// What can be undone.
+    /// The history of changes that can be undone.
     pub history: History,
-    /// What was computed.
+    /// The results: everything that was computed.
     pub results: Results,
     /// The results table of the data set.
     pub table: TableState,
-    /// What is chosen of the next figure.
+    /// The choices of the next figure and of what else is taken away.
     pub export: ExportState,
     /// The dial that is turned over pairs.
     pub dial: DialState,
@@ -66,17 +66,17 @@ pub struct State {
     pub adapt: AdaptState,
     /// The training of the mask model.
     pub train: TrainState,
-    /// What the 3D panes do and show besides.
+    /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,
-    /// What a person chose about seeds.
+    /// The choices of a person about seeds.
     pub seeds: Seeds,
-    /// What a person prefers; while a case is open, what it was saved with.
+    /// The preferences; while a case is open, those it was saved with.
     pub settings: Settings,
     /// The person's own preferences, while a case is open that has others.
     pub own: Option<Box<Settings>>,
-    /// What runs.
+    /// The tasks: everything that runs.
     pub tasks: Tasks,
-    /// What happened.
+    /// The event, in words.
     pub log: Log,
 }
 
@@ -123,17 +123,17 @@ impl State {
         Some(self.pair_key()?.finger(finger))
     }
 
-    /// Whether a pair is the one on screen.
+    /// True where a pair is the one on screen.
     pub(super) fn is_selected(&self, key: PairKey) -> bool {
         self.pair_key() == Some(key)
     }
 
-    /// Whether a pane on screen needs something.
+    /// True where a pane on screen needs something.
     pub(super) fn needs(&self, need: Demand) -> bool {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
     }
 
-    /// Whether a pane on screen shows something of the selected pair.
+    /// True where a pane on screen shows something of the selected pair.
     pub(super) fn shows_pair(&self) -> bool {
         self.selection.panes.iter().any(|pane| pane.is_of_pair())
     }
@@ -214,7 +214,7 @@ impl<'a, T: ?Sized> Lookup<'a, T> {
         }
     }
 
-    /// What is in its place, when there is no value.
+    /// The reason in its place, when there is no value.
     pub fn without<U: ?Sized>(self) -> Lookup<'a, U> {
         match self {
             Self::Ready(_) | Self::Stale(_) | Self::Waiting => Lookup::Waiting,
@@ -309,7 +309,7 @@ pub enum Absent {
 }
 
 impl Absent {
-    /// What is missing, as a sentence.
+    /// The sentence that says what is missing.
     pub fn text(self) -> &'static str {
         match self {
             Self::NothingOpen => "No data set is open. Drop a folder here, or open the demo.",

@@ -11,7 +11,7 @@ use super::state::State;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::{JobCx, Progress};
 
-/// What can happen to jobs and log.
+/// A command to jobs and log.
 #[derive(Clone, Debug)]
 pub enum TasksCommand {
     /// Tells a job to stop.

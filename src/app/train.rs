@@ -21,7 +21,7 @@ use touch2touch_work::job::{Curve, JobCx};
 use touch2touch_work::labels::Labels;
 use touch2touch_work::train::{self, TrainSetup, Trained};
 
-/// What can happen to the training.
+/// A command to the training.
 #[derive(Clone, Copy, Debug)]
 pub enum TrainCommand {
     /// Changes what is asked for.
@@ -55,7 +55,7 @@ fn take_up(state: &mut State, effects: &mut Vec<Effect>) {
 /// Trains a mask model, and keeps the new one where the program keeps models.
 pub struct Train {
     source: Arc<dyn DataSource>,
-    /// What was said about pairs, as far as it may not be on the disk yet.
+    /// The labels of pairs, as far as they may not be on the disk yet.
     changed: BTreeMap<String, PairLabels>,
     setup: TrainSetup,
 }
@@ -102,7 +102,7 @@ impl Errand for Train {
     }
 }
 
-/// What a training started now would do; `None` without data or a mask model. Where the new bundle lies is not the
+/// The setup of a training started now; `None` without data or a mask model. Where the new bundle lies is not the
 /// state's to say.
 pub(crate) fn setup(state: &State) -> Option<TrainSetup> {
     state.library.open.as_ref()?;
@@ -118,7 +118,7 @@ pub(crate) fn setup(state: &State) -> Option<TrainSetup> {
     })
 }
 
-/// How the training goes, or how the last one went.
+/// The curves of the training, or of the last one.
 pub(crate) fn curves(state: &State) -> &[Curve] {
     match (state.tasks.of_kind(TaskKind::Train), &state.train.result) {
         (Some((_, task)), _) => &task.progress.curves,
@@ -132,7 +132,7 @@ pub fn trained(state: &State) -> Option<&BundleInfo> {
     state.library.bundle(state.train.bundle.as_deref()?)
 }
 
-/// Whether that makes the automatic masks now.
+/// True where the trained bundle makes the automatic masks now.
 pub fn uses_trained(state: &State) -> bool {
     let now = recipe::bundle(state, BundleKind::Mask).ok().map(|bundle| &bundle.id);
     trained(state).is_some_and(|trained| Some(&trained.id) == now)

@@ -13,7 +13,7 @@ use super::pane::{Pane, Workspace};
 use super::state::State;
 use touch2touch_core::rig::PadId;
 
-/// What can happen to what is on screen.
+/// A command to what is on screen.
 #[derive(Clone, Debug)]
 pub enum ViewCommand {
     /// Makes a finger the active one.

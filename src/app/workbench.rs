@@ -7,8 +7,7 @@ use glam::DVec3;
 
 use super::effect::Effect;
 use super::inspect::InspectCommand;
-use super::keys::ImprintSource;
-use super::keys::RunKey;
+use super::keys::{ImprintSource, RunKey};
 use super::state::State;
 use super::state::results::Request;
 use super::{inspect, labels, results};
@@ -18,20 +17,20 @@ use touch2touch_work::error::TaskError;
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;
 
-/// What can happen to the workbench.
+/// A command to the workbench.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WorkbenchCommand {
-    /// What colors the contact points.
+    /// The coloring of the contact points.
     SetLayer(Layer),
-    /// Whether the tool is moved along its weakest direction.
+    /// True where the tool is moved along its weakest direction.
     SetAnimateWeakest(bool),
-    /// Whether each 3D pane shows the clouds of both imprints.
+    /// True where each 3D pane shows the clouds of both imprints.
     SetBothClouds(bool),
-    /// What cuts the 3D views open; nothing does without one.
+    /// The plane that cuts the 3D views open; none does without one.
     SetSection(Option<Section>),
-    /// What a click does.
+    /// The effect of a click.
     SetTool(SceneTool),
-    /// Whether the tool can leave the plane; closing it brings the tool back into the plane.
+    /// True where the tool can leave the plane; closing it brings the tool back into the plane.
     SetSixDof(bool),
     /// The side that the pointer is over.
     SetSide(ImprintSource),
@@ -113,7 +112,7 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
     }
 }
 
-/// What a pose costs with the contact points of an imprint; `None` while cloud or model are not there.
+/// The cost of a pose with the contact points of an imprint; `None` while cloud or model are not there.
 fn cost_of(state: &State, source: ImprintSource, pose: ManualPose) -> Option<ManualCost> {
     let clouds = results::cloud(state, source).ready()?;
     let tool = &results::tool(state).ready()?.model;

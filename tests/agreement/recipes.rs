@@ -2,9 +2,6 @@
 //! else, and a random one gives the same numbers in the studio and by the verbs.
 
 use std::path::Path;
-use touch2touch::app::evaluate::EvaluateCommand;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{export, recipe, results};
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -12,9 +9,12 @@ use proptest::test_runner::TestRunner;
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::Pane;
+use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Lookup, State};
+use touch2touch::app::{export, recipe, results};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::{Registration, RegistrationChoice, Rejection};

@@ -2,8 +2,6 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{recipe, results};
 
 use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::effect::Ended;
@@ -11,9 +9,11 @@ use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::Preview;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::predict::Generate;
-use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
+use touch2touch::app::settings::{GenerateSettings, ProposalSource};
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Ticket;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
@@ -33,6 +33,20 @@ const LEFT: PadId = lab::LEFT;
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
     let picture = PreviewPicture { step, of: recipe.config.steps, depth: DepthMap::filled(4, 3, 0.001) };
     Arc::new(Preview { recipe: recipe.clone(), picture })
+}
+
+#[test]
+fn a_proposal_at_the_registered_pose_of_a_prediction_that_nobody_made_ends() {
+    let mut bench = Bench::open_simulated();
+    bench.send(panes(&[Pane::Masks, Pane::Predicted]));
+    bench.send(prefer(|s| s.mask.proposal = ProposalSource::CadRegistered));
+    bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
+    bench.send(ViewCommand::Propose(true));
+    bench.settle();
+    // Which imprint is worked on, and so which pose is needed, must not hang on what is predicted for that pose.
+    assert!(results::proposes(&bench.state) && results::chosen(&bench.state, RIGHT).is_none());
+    assert_eq!(results::worked_on(&bench.state, RIGHT), ImprintSource::Measured);
+    assert!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().is_none());
 }
 
 #[test]

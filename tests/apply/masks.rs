@@ -1,13 +1,13 @@
 //! Correcting masks: strokes, clean-ups, undo, saving.
 
 use std::sync::atomic::Ordering;
-use touch2touch::app::results;
-use touch2touch::app::settings::prefer;
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
+use touch2touch::app::results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Mask;

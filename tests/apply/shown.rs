@@ -1,15 +1,15 @@
 //! A prediction on screen is that of the settings in force, or says that it is not.
 
 use std::sync::Arc;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{recipe, results};
 
 use proptest::prelude::*;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
 use touch2touch::app::results::Why;
 use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_work::infer::engine::EngineChoice;

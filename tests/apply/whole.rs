@@ -2,18 +2,18 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{demand, results};
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, Registration};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
 use touch2touch::app::state::results::Request;
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Entry;
+use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::lab;
 

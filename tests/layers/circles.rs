@@ -3,7 +3,7 @@
 //! A module is a file with the folder of its name. In each layer, and again in each folder, the modules that lie side
 //! by side must not need each other in a circle: one could be neither read nor changed without the others. One needs
 //! another where any of its files (tests left out) names an item of it, however deep and by whatever path: `crate::`,
-//! `super::`, a name that the parent imported or re-exports, or one of several in braces.
+//! `super::`, a name that the parent imported or re-exports, one of several in braces, or a name in an imported module.
 //!
 //! A parent and what lies in its own folder are one feature: the parent puts its children together and re-exports them,
 //! and the children use its types. What they take from the parent itself is no arrow here; what they take through it from

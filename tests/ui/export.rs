@@ -1,8 +1,6 @@
 //! What is taken away: figures and pictures, each in few clicks.
 
 use std::path::Path;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::{export, results};
 
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
@@ -12,8 +10,10 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, Theme, Workspace};
 use touch2touch::app::state::State;
+use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::images;

@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use touch2touch::app::results;
-use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -12,6 +10,8 @@ use touch2touch::app::action::Action;
 use touch2touch::app::command::{Pane, PredictCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
+use touch2touch::app::results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, lab};

@@ -1,4 +1,4 @@
-//! What is written when it is asked for: figures, pairs, cases.
+//! The contents of what is taken away: figures, pairs, cases.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -26,20 +26,20 @@ use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{ModelName, Recipe};
 use touch2touch_work::tool::NamedTool;
 
-/// How the studio showed a case.
+/// The view of the studio on a case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct CaseView {
     /// The preferences, with the arrangement of the panes.
     pub settings: Settings,
-    /// Where 3D views look from, in the window's own format.
+    /// The camera of 3D views, in the window's own format.
     pub camera: String,
     /// The active finger.
     pub finger: PadId,
-    /// Whether all fingers were shown.
+    /// True where all fingers were shown.
     pub both_fingers: bool,
 }
 
-/// What is written of the selected pair for other programs, gathered for a job.
+/// The export of the selected pair for other programs, gathered for a job.
 #[derive(Clone, Debug)]
 pub struct PairExport {
     name: String,
@@ -81,7 +81,7 @@ impl PairExport {
 /// A pair of a figure with the predictions that it needs.
 pub(crate) type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
 
-/// What of the open case cannot be made again on this machine, in sentences.
+/// The parts of the open case that cannot be made again on this machine, in sentences.
 pub fn case_lacks(state: &State) -> Vec<String> {
     let case = state.library.open.as_ref().and_then(|open| open.source.case());
     // Which models are here is not known at once.
@@ -99,7 +99,7 @@ pub fn case_lacks(state: &State) -> Vec<String> {
     imprints.into_iter().chain(masks).collect()
 }
 
-/// What the form describes, before anything is drawn.
+/// The setup of the figure that the form describes, before anything is drawn.
 pub(crate) fn figure_setup(state: &State) -> FigureSetup {
     let form = &state.export.form;
     let pairs = match form.first {
@@ -155,7 +155,7 @@ pub(crate) fn figure_recipes(state: &State, setup: &FigureSetup) -> Recipes {
     setup.pairs.iter().map(of).collect()
 }
 
-/// What the contact masks of a cloud are made of, as the verbs say it.
+/// The sources of the contact masks of a cloud, as the verbs say them.
 fn masks_made_of(state: &State, cloud: &CloudKey) -> String {
     let source = state.settings.mask.choice.source.key();
     let keys = cloud.parts.iter().flatten().filter_map(|(imprint, version)| match version.as_ref()? {
@@ -168,7 +168,7 @@ fn masks_made_of(state: &State, cloud: &CloudKey) -> String {
     made_of(keys.collect(), source)
 }
 
-/// What can be written of the selected pair; `None` while its cloud is not there.
+/// The export of the selected pair; `None` while its cloud is not there.
 pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
     let cloud = results::cloud_key(state, source).ok()??;
     let pose = results::pose_key(state, source).ok().flatten().and_then(|key| state.results.poses.get(&key)).cloned();
@@ -192,7 +192,7 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
     })
 }
 
-/// What goes into a case of the selected pair; `camera` is where 3D views look from, as the window says it.
+/// The contents of a case of the selected pair; `camera` is where 3D views look from, as the window says it.
 pub(crate) fn case_setup(state: &State, camera: &str) -> Option<CaseSetup> {
     let pair = state.selection.pair?;
     let chosen = results::chosen(state, state.selection.finger)
@@ -214,7 +214,7 @@ pub(crate) fn case_setup(state: &State, camera: &str) -> Option<CaseSetup> {
     })
 }
 
-/// Whether a figure of the open pairs can be drawn.
+/// True where a figure of the open pairs can be drawn.
 pub(crate) fn can_draw(state: &State) -> bool {
     let open = state.library.open.as_ref();
     open.is_some_and(|open| open.source.as_dataset().is_some()) && state.entry().is_some()

@@ -58,7 +58,7 @@ impl Key for ToolKey {
 pub struct LabelsKey {
     /// The pair.
     pub pair: PairKey,
-    /// Whether those of a second time are meant.
+    /// True where the labels of a second time are meant.
     pub repeat: bool,
 }
 
@@ -70,7 +70,7 @@ impl Key for LabelsKey {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Read {
     pub(crate) labels: PairLabels,
-    /// What was done before.
+    /// The gestures of earlier runs.
     pub(crate) told: JournalHistory,
 }
 
@@ -80,11 +80,11 @@ pub struct LabelStatsKey {
     pub(crate) dataset: DatasetSeq,
     /// Pairs that the data set has by now.
     pub(crate) pairs: usize,
-    /// How often review states were written since.
+    /// The number of times that review states were written.
     pub(crate) marks: u64,
     /// Whose repeats.
     pub(crate) person: String,
-    /// How many pairs come back, percent.
+    /// The share of the pairs that come back, percent.
     pub(crate) repeats_percent: Bits,
 }
 
@@ -102,9 +102,9 @@ pub struct ScoresKey {
     pub(crate) dataset: DatasetSeq,
     /// Pairs that the data set has by now.
     pub(crate) pairs: usize,
-    /// How they are scored, as text.
+    /// The setup of the scoring, as text.
     pub(crate) setup: String,
-    /// How often scores were computed since.
+    /// The number of times that scores were computed.
     pub(crate) round: u64,
 }
 
@@ -121,7 +121,7 @@ impl Key for ScoresKey {
 pub struct MaskPlanKey {
     /// The data set.
     pub dataset: DatasetSeq,
-    /// What is asked for.
+    /// The choices.
     pub choice: ExportChoice,
     /// The last change of the document.
     pub revision: Revision,
@@ -140,7 +140,7 @@ impl Key for MaskPlanKey {
 pub struct ImportPlanKey {
     /// The data set.
     pub dataset: DatasetSeq,
-    /// What is asked about.
+    /// The import that is asked about.
     pub form: ImportForm,
     /// The last change of the document.
     pub revision: Revision,
@@ -159,9 +159,9 @@ impl Key for ImportPlanKey {
 pub struct ImportForm {
     /// The folder or file.
     pub from: PathBuf,
-    /// Whether what was painted by hand is replaced as well.
+    /// True where what was painted by hand is replaced as well.
     pub over_drawn: bool,
-    /// Which asking it is: files may be others than at the one before.
+    /// The number of the asking: files may be others than at the one before.
     pub(in crate::app) asked: u64,
 }
 
@@ -170,7 +170,7 @@ pub struct ImportForm {
 pub struct TrainPlanKey {
     /// The data set.
     pub dataset: DatasetSeq,
-    /// How it is divided.
+    /// The division into pairs to learn from and pairs that are left out.
     pub choice: TrainChoice,
     /// The last change of the document.
     pub revision: Revision,

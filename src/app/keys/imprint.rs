@@ -31,7 +31,7 @@ impl ImprintKey {
         }
     }
 
-    /// What masks drawn on it are told by; `None` where nobody can have drawn on it.
+    /// The name by which masks drawn on it are told; `None` where nobody can have drawn on it.
     pub fn of(&self) -> Option<ImprintOf> {
         match self {
             Self::Measured(_) => Some(ImprintOf::Measured),
@@ -80,7 +80,7 @@ pub struct EnsembleKey {
     pub touch: TouchKey,
     /// At least one; they differ in their seeds.
     pub recipes: Vec<PredictionKey>,
-    /// How they become meters.
+    /// The mapping to meters.
     pub shift: ShiftMode,
 }
 
@@ -104,7 +104,7 @@ impl Key for PictureKey {
     }
 }
 
-/// What the GelSlim image of a touch leaves open.
+/// The ambiguity of the GelSlim image of a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct AmbiguityKey(pub TouchKey);
 

@@ -30,7 +30,7 @@ pub struct Inspection {
     pub result: Arc<PoseResult>,
     /// The contact points that were offered, meters, grasp frame.
     pub points: Vec<DVec3>,
-    /// What the points are compared with.
+    /// The counterparts that the points are compared with.
     pub counterparts: Counterparts,
     /// Per start the positions of its steps in the trace.
     runs: Vec<Vec<usize>>,
@@ -91,7 +91,7 @@ impl Inspection {
         self.steps(run).next().map(|s| s.grasp_from_object)
     }
 
-    /// What happens after a step, in words: the reason to stop at the last one.
+    /// The continuation after a step, in words: the reason to stop at the last one.
     pub fn what_next(&self, run: usize, at: usize) -> String {
         let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
             return "no step was recorded".into();

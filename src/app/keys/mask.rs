@@ -37,7 +37,7 @@ pub enum MaskVersion {
 pub struct AutomaticMask {
     /// The pixels in contact.
     pub mask: Arc<Mask>,
-    /// What it is made of in the end.
+    /// The basis that it is made of in the end.
     pub basis: MaskBasis,
     /// As [`ContactMask::unsure`].
     pub unsure: Option<f64>,

@@ -96,9 +96,9 @@ impl PoseBits {
 /// A registration with everything recorded: every step, and what became of every point.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RunKey {
-    /// What is registered, and how.
+    /// The pose that the registration makes.
     pub pose: PoseKey,
-    /// Where it starts (`grasp_from_object`); `None` = where the registration starts by itself.
+    /// The pose that it starts at (`grasp_from_object`); `None` = where the registration starts by itself.
     pub start: Option<PoseBits>,
 }
 
@@ -156,9 +156,9 @@ impl Key for InfluenceKey {
 /// A basin map.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct BasinKey {
-    /// What is registered, and how.
+    /// The pose that the registration makes.
     pub pose: PoseKey,
-    /// Which starts are tried.
+    /// The plane of the starts that are tried.
     pub plane: Plane,
 }
 

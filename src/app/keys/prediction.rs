@@ -88,8 +88,8 @@ impl Key for ComparedKey {
 /// A prediction as it looks on the way.
 #[derive(Clone, Debug)]
 pub struct Preview {
-    /// What is being made.
+    /// The key of what is being made.
     pub recipe: PredictionKey,
-    /// How it looks.
+    /// The picture.
     pub picture: PreviewPicture,
 }

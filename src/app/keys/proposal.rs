@@ -6,19 +6,19 @@ use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_work::propose::Proposal;
 
-/// Where the CAD model lies.
+/// The place where the CAD model lies.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum CadPlace {
     /// At the true pose.
     Truth,
     /// At a registered one.
     Registered(Box<PoseKey>),
-    /// Where a hand holds it: the bits of its six numbers.
+    /// The place where a hand holds it: the bits of its six numbers.
     Hand([u64; 6]),
 }
 
 impl CadPlace {
-    /// Where a hand holds it.
+    /// The place where a hand holds it.
     pub(crate) fn hand(pose: ManualPose) -> Self {
         let ManualPose { planar, x_m, pitch_rad, yaw_rad } = pose;
         Self::Hand([planar.theta_rad, planar.y_m, planar.z_m, x_m, pitch_rad, yaw_rad].map(f64::to_bits))
@@ -30,7 +30,7 @@ impl CadPlace {
 pub struct DistancesKey {
     /// The imprint.
     pub imprint: ImprintKey,
-    /// Where the model lies.
+    /// The place where the model lies.
     pub at: CadPlace,
 }
 
@@ -47,18 +47,18 @@ impl Key for DistancesKey {
 pub struct Distances {
     /// Meters, negative inside; see [`propose::cad_distances`].
     pub grid: Grid<f64>,
-    /// Where the model was.
+    /// The pose of the model.
     pub at: CadPose,
 }
 
-/// What a proposal is made of.
+/// The inputs of a proposal.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum ProposalInputs {
     /// An automatic mask.
     Automatic(MaskRecipe),
-    /// What is within a distance of the CAD model.
+    /// The pixels within a distance of the CAD model.
     Cad(CadPlace, Bits),
-    /// What was painted, by the revision of the mask.
+    /// The strokes, by the revision of the mask.
     Grow(Revision),
     /// The mask of another pair, by its revision where it is known.
     Carry(PairKey, Option<Revision>),
@@ -71,7 +71,7 @@ pub enum ProposalInputs {
 pub struct ProposalKey {
     /// The imprint.
     pub imprint: ImprintKey,
-    /// What it is made of.
+    /// The inputs.
     pub of: ProposalInputs,
 }
 

@@ -28,7 +28,7 @@ impl Key for VersusKey {
     }
 }
 
-/// How far the points of one cloud lie from another.
+/// The distances of the points of one cloud from another.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct CloudDifferenceKey {
     /// The cloud whose points are measured.

@@ -90,14 +90,14 @@ fn reread(state: &mut State, names: &[String]) {
     }
 }
 
-/// Whether masks can be proposed for the listed pairs.
+/// True where masks can be proposed for the listed pairs.
 pub(crate) fn can_propose_all(state: &State) -> bool {
     let predicts = results::worked_on(state, state.selection.finger) == ImprintSource::Predicted;
     let has_model = !predicts || recipe::bundle(state, BundleKind::Generator).is_ok();
     !state.library.order.is_empty() && has_model && state.tasks.of_kind(TaskKind::Propose).is_none()
 }
 
-/// What proposing masks for the listed pairs does.
+/// The setup of proposing masks for the listed pairs.
 fn batch_setup(state: &State) -> BatchSetup {
     let imprint = results::worked_on(state, state.selection.finger);
     let mask = &state.settings.mask;

@@ -16,7 +16,7 @@ use touch2touch_work::pose::PoseResult;
 pub struct Ghost<'a> {
     /// The finger whose mask was changed.
     pub finger: PadId,
-    /// Which change of the document it is of.
+    /// The change of the document that it is of.
     pub revision: Revision,
     /// The mask before.
     pub mask: &'a Arc<Mask>,
@@ -26,7 +26,7 @@ pub struct Ghost<'a> {
     pub clouds: Option<(&'a CloudKey, &'a Arc<Clouds>)>,
 }
 
-/// What the last change of a mask of an imprint of the selected pair started from, until the next stroke; `None` where
+/// The start of the last change of a mask of an imprint of the selected pair, until the next stroke; `None` where
 /// there was none, or ghosts are switched off.
 pub fn ghost(state: &State, source: ImprintSource) -> Option<Ghost<'_>> {
     let changed = state.document.changed.as_ref()?;

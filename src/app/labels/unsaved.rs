@@ -12,7 +12,7 @@ use crate::app::state::view::UiRequest;
 use touch2touch_work::error::TaskErrorKind;
 use touch2touch_work::labels::{Operation, Unsaved};
 
-/// What can happen to labels that are not on the disk.
+/// A command to labels that are not on the disk.
 #[derive(Clone, Debug)]
 pub enum UnsavedCommand {
     /// The window is to be closed: at once where all is saved, else once it is or the person says.

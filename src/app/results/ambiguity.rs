@@ -1,4 +1,4 @@
-//! What a GelSlim image leaves open.
+//! The ambiguity of a GelSlim image: what it leaves open.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{AmbiguityKey, TouchKey};
@@ -19,7 +19,7 @@ impl Computes for AmbiguityKey {
     }
 }
 
-/// What the GelSlim image of one finger leaves open, once it is known.
+/// The ambiguity of the GelSlim image of one finger, once it is known.
 pub fn ambiguity(state: &State, finger: PadId) -> Option<Ambiguity> {
     **state.results.ambiguities.get(&AmbiguityKey(state.touch_key(finger)?))?
 }

@@ -83,8 +83,8 @@ pub(crate) fn cloud_key(state: &State, source: ImprintSource) -> Result<Option<C
     if parts.is_empty() { Err(reason) } else { Ok(Some(CloudKey { parts })) }
 }
 
-/// The cloud of imprints with the masks drawn on them, else the automatic ones; `Err` holds the masks that are missing for it, none while an
-/// imprint is.
+/// The cloud of imprints with the masks drawn on them, else the automatic ones; `Err` holds the masks that are missing for
+/// it, none while an imprint is.
 pub(crate) fn automatic_cloud(
     state: &State,
     imprints: impl Iterator<Item = (PadId, ImprintKey)>,
@@ -117,7 +117,7 @@ pub fn cloud(state: &State, source: ImprintSource) -> Lookup<'_, Clouds> {
     state.look_or(cloud_key(state, source), before).or_failed(unread).value()
 }
 
-/// What was shown last of an imprint of the selected pair.
+/// The keys of what was shown last of an imprint of the selected pair.
 pub(crate) fn latest(state: &State, source: ImprintSource) -> Option<&Latest> {
     state.results.latest.get(&(state.pair_key()?, source))
 }

@@ -18,7 +18,7 @@ impl Computes for DeviationKey {
     }
 }
 
-/// How far the contact points of an imprint lie from the model at its registered pose.
+/// The distances of the contact points of an imprint from the model at its registered pose.
 pub fn deviation(state: &State, source: ImprintSource) -> Lookup<'_, Deviation> {
     let key = results::pose_key(state, source).map(|key| key.map(DeviationKey));
     state.look_or(key, || None).value()

@@ -1,4 +1,4 @@
-//! What an import of masks would change.
+//! The plan of an import of masks: what it would change.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImportPlanKey, Revision};
@@ -37,7 +37,7 @@ pub(crate) fn want_import_plan(wants: &mut Demands<'_>) {
     }
 }
 
-/// What is imported as the form says, while it is open.
+/// The setup of the import that the form describes, while it is open.
 pub(crate) fn import_setup(state: &State) -> Option<ImportSetup> {
     let form = state.export.importing.as_ref()?;
     let (from, over_drawn, person) = (form.from.clone(), form.over_drawn, state.settings.known_labeler());

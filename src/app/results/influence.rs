@@ -1,4 +1,4 @@
-//! Which pixels a registered angle hangs on.
+//! The influence of each pixel on a registered angle.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ pub(crate) fn influence_key(state: &State, source: ImprintSource) -> Option<Infl
     Some(InfluenceKey(results::pose_key(state, source).ok()??))
 }
 
-/// Which pixels the registered angle of an imprint hangs on; meanwhile those that it hung on before.
+/// The influence of the pixels on the registered angle of an imprint; meanwhile that on the one before.
 pub fn influence(state: &State, source: ImprintSource) -> Lookup<'_, Arc<Influence>> {
     let pose = results::pose(state, source);
     if matches!(pose, Lookup::Failed(_) | Lookup::Absent(_)) {

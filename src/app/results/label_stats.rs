@@ -1,4 +1,4 @@
-//! How far the labeling of the open data set is, and what it took.
+//! The progress of the labeling of the open data set, and what it took.
 
 use std::sync::Arc;
 
@@ -39,7 +39,7 @@ fn label_stats_key(state: &State) -> Option<LabelStatsKey> {
     })
 }
 
-/// What the mask tools say about the data set.
+/// Asks for the counts that the mask tools say of the data set.
 pub(crate) fn want_label_stats(wants: &mut Demands<'_>) {
     if wants.state.needs(Demand::LabelStats)
         && let Some(key) = label_stats_key(wants.state)

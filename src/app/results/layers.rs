@@ -26,7 +26,7 @@ impl Computes for LayersKey {
     }
 }
 
-/// What the layers show of an imprint.
+/// The layers of an imprint.
 pub fn layers(state: &State, source: ImprintSource) -> Lookup<'_, LayerResult> {
     let key = results::pose_key(state, source).map(|key| key.map(LayersKey));
     let run = key.clone().ok().flatten().and_then(|key| state.failure(key.run()));

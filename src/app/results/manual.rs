@@ -33,20 +33,20 @@ pub fn by_hand(state: &State, source: ImprintSource) -> Option<ManualPose> {
     hand_pose(None, accepted(state, source))
 }
 
-/// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
+/// The pose at which the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
 pub fn shown_pose(state: &State, source: ImprintSource) -> Option<ManualPose> {
     let held = state.workbench.hand(source).map(|hand| hand.pose);
     held.or_else(|| by_hand(state, source))
         .or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object.into()))
 }
 
-/// Where setting a pose by hand begins.
+/// The pose at which setting one by hand begins.
 pub fn manual_begins(state: &State, source: ImprintSource) -> ManualPose {
     let accepted = accepted(state, source).map(|a| a.pose);
     accepted.or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object.into())).unwrap_or_default()
 }
 
-/// How far the registered poses of measurement and prediction are apart, where both are there.
+/// The difference between the registered poses of measurement and prediction, where both are there.
 pub(crate) fn sides_apart(state: &State) -> Option<PoseDifference> {
     let pose = |source| Some(results::pose(state, source).ready()?.grasp_from_object);
     Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))

@@ -75,9 +75,9 @@ impl Computes for MaskKey {
 pub struct MaskInForce<'a> {
     /// The pixels, as large as the imprint.
     pub mask: &'a Arc<Mask>,
-    /// What decides whether it has to be drawn again.
+    /// The version that decides whether it has to be drawn again.
     pub version: MaskVersion,
-    /// Where it comes from, for the screen.
+    /// The provenance, for the screen.
     pub label: String,
 }
 
@@ -121,12 +121,12 @@ pub(crate) fn automatic_mask(state: &State, source: ImprintSource, finger: PadId
     state.look_or(mask_key(state, source, finger).map(Some), || None).map(|found| &found.mask)
 }
 
-/// Where a mask that is drawn on one finger's imprint belongs; `None` while there is no such imprint.
+/// The place of a mask that is drawn on one finger's imprint; `None` while there is no such imprint.
 pub(crate) fn mask_place(state: &State, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
     Some(MaskPlace { pad: finger, of: results::imprint_key(state, source, finger).ok()?.of()? })
 }
 
-/// What can be drawn on of what is on screen.
+/// The places of masks that can be drawn on, of all that is on screen.
 pub fn mask_places(state: &State) -> Vec<MaskPlace> {
     let places = |finger| ImprintSource::iter().filter_map(move |source| mask_place(state, source, finger));
     state.fingers().into_iter().flat_map(places).collect()
@@ -148,7 +148,7 @@ pub fn drawn_mask(state: &State, source: ImprintSource, finger: PadId) -> Option
 /// The mask in force on one finger's imprint: the corrected one, else the automatic one.
 ///
 /// # Errors
-/// What is there instead.
+/// The look-up that stands in its place.
 pub fn mask_in_force(
     state: &State,
     source: ImprintSource,
@@ -176,7 +176,7 @@ fn gate_key(state: &State, source: ImprintSource, finger: PadId) -> Option<MaskK
     Some(MaskKey { imprint: results::imprint_key(state, source, finger).ok()?, recipe })
 }
 
-/// Whether what the gate needs to know of the CAD model is there.
+/// True where everything that the gate needs to know of the CAD model is there.
 pub(crate) fn gate_is_known(state: &State, source: ImprintSource, finger: PadId) -> bool {
     gate_key(state, source, finger).is_none_or(|key| state.results.masks.get(&key).is_some())
 }
@@ -201,7 +201,7 @@ pub fn allowed(state: &State, source: ImprintSource, finger: PadId) -> Result<Op
     Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
 }
 
-/// Where the pixels of an automatic mask come from.
+/// The provenance of the pixels of an automatic mask.
 pub(crate) fn automatic_provenance(
     state: &State,
     source: ImprintSource,

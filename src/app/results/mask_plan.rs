@@ -1,4 +1,4 @@
-//! What an export of masks would write where.
+//! The plan of an export of masks: what it would write where.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{MaskPlanKey, Revision};

@@ -1,4 +1,4 @@
-//! What the panes on screen show, as far as it decides what is computed.
+//! The needs of the panes on screen, as far as they decide what is computed.
 
 use super::super::keys::{ImprintSource, PredictionKey};
 use super::super::pane::Demand;
@@ -8,7 +8,7 @@ use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::propose::{CadAt, Takes};
 
-/// Whether the cloud of an imprint is needed for the 3D views and what lies beside them (with its pose), and
+/// The need of the cloud of an imprint: true where the 3D views and what lies beside them need it (with its pose), and
 /// whether it is needed at all.
 pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) {
     let other = source.other();
@@ -20,19 +20,19 @@ pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) 
     (scene, scene || inspected)
 }
 
-/// Whether a proposal is shown over the masks.
+/// True where a proposal is shown over the masks.
 pub fn proposes(state: &State) -> bool {
     state.selection.proposing && state.needs(Demand::Masks)
 }
 
-/// Whether the proposal needs the pose of an imprint.
+/// True where the proposal needs the pose of an imprint.
 pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
     proposes(state)
         && state.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
         && results::worked_on(state, state.selection.finger) == source
 }
 
-/// Whether the influence of the pixels is shown over an imprint.
+/// True where the influence of the pixels is shown over an imprint.
 pub(crate) fn shows_influence(state: &State, source: ImprintSource) -> bool {
     state.selection.influence && state.needs(Demand::Imprint(source))
 }
@@ -56,18 +56,18 @@ pub(crate) fn seeds_of(state: &State) -> Option<PredictionKey> {
     state.rig().pads().find_map(|pad| recipe::prediction(state, state.touch_key(pad)?))
 }
 
-/// Whether the seeds that are missing are made, while their pane is on screen.
+/// True where the seeds that are missing are made, while their pane is on screen.
 pub(crate) fn seeds_asked(state: &State) -> bool {
     state.seeds.every || (state.seeds.asked.is_some() && state.seeds.asked == seeds_of(state))
 }
 
-/// Whether something on screen shows a step of an imprint's registration.
+/// True where something on screen shows a step of an imprint's registration.
 pub(crate) fn shows_steps(state: &State, source: ImprintSource) -> bool {
     let lines = state.workbench.layer == Layer::Correspondences && state.needs(Demand::Scene(source));
     state.inspect.source == source && (lines || state.needs(Demand::Steps))
 }
 
-/// Whether something on screen shows the layers of an imprint.
+/// True where something on screen shows the layers of an imprint.
 pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
     let bench = &state.workbench;
     let in_scene = state.needs(Demand::Scene(source))
@@ -76,7 +76,7 @@ pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
     in_scene || (state.needs(Demand::Layers) && bench.side == source)
 }
 
-/// Whether a 3D view shows the distances between an imprint and the model.
+/// True where a 3D view shows the distances between an imprint and the model.
 pub(crate) fn shows_deviation(state: &State, source: ImprintSource) -> bool {
     state.workbench.layer == Layer::Distance && state.needs(Demand::Scene(source))
 }

@@ -7,7 +7,7 @@ use touch2touch_core::rig::PadId;
 /// A prediction on screen that the settings in force would not make.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Outdated {
-    /// How it was made: `model · 2 steps · seed 42`.
+    /// The words for its making: `model · 2 steps · seed 42`.
     pub made_with: String,
     /// Why it is shown all the same.
     pub why: Why,
@@ -20,20 +20,20 @@ pub enum Why {
     Picked,
     /// The open case holds it, and its model is not here.
     Held,
-    /// What the settings ask for is on its way.
+    /// The prediction that the settings ask for is on its way.
     OnItsWay,
-    /// What the settings ask for was not made.
+    /// The prediction that the settings ask for was not made.
     NotMade,
 }
 
 impl Why {
-    /// Whether it is meant to be shown.
+    /// True where it is meant to be shown.
     pub(crate) fn is_meant(self) -> bool {
         matches!(self, Self::Picked | Self::Held)
     }
 }
 
-/// What is said of the prediction shown for a finger where the settings in force would make another one.
+/// The notice about the prediction shown for a finger where the settings in force would make another one.
 pub fn outdated(state: &State, finger: PadId) -> Option<Outdated> {
     let touch = state.touch_key(finger)?;
     let shown = results::shown(state, touch)?;

@@ -18,7 +18,7 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::tool::NamedTool;
 
-/// What is registered: the inputs of every job about a pose.
+/// The inputs of every job about a pose: what is registered.
 pub(crate) struct Registered {
     pub(crate) clouds: Arc<Clouds>,
     pub(crate) tool: Arc<NamedTool>,
@@ -34,7 +34,7 @@ fn registering(state: &State, key: &PoseKey, ask: Ask<'static>) -> Option<Job<Po
     }))
 }
 
-/// What is registered; `None` if it is not there.
+/// The inputs of a registration; `None` if they are not there.
 pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
     let (pair, _) = key.cloud.place()?;
     let tool = ToolKey { dataset: pair.dataset, name: key.tool.clone() };

@@ -9,9 +9,8 @@ use strum::IntoEnumIterator as _;
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{Key, Keyed, MetersKey, PredictionKey, SeedKey, ShiftMode, StoredKey, TouchKey};
 use super::super::results;
-use super::super::results::Computes;
-use super::super::results::Demands;
 use super::super::results::preview::Onlooker;
+use super::super::results::{Computes, Demands};
 use super::super::services::{Services, SharedServices};
 use super::super::source::DataSource;
 use super::super::state::State;
@@ -69,7 +68,7 @@ impl Computes for StoredKey {
         }))
     }
 
-    /// Where the settings name none of them, the one used last is shown, unless something is already.
+    /// Shows the one used last where the settings name none of them, unless something is shown already.
     fn arrived(&self, state: &mut State, found: &Arc<Keyed>) {
         state.results.looked_up.insert(self.0);
         let nothing = results::shown(state, self.0).is_none();
@@ -135,7 +134,7 @@ pub(crate) fn generate(
     Ok(keys.into_iter().zip(made.into_iter().map(Arc::new)).collect())
 }
 
-/// What was made of a touch before this start of the program.
+/// Asks for the predictions of a touch that were made before this start of the program.
 pub(crate) fn want_stored(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
     let state = wants.state;
     if results::can_start(state, finger) {

@@ -13,9 +13,9 @@ use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::prediction::Prediction;
 
-/// What a prediction may cost to be made without being asked for, seconds.
+/// The highest cost of a prediction that is made without being asked for, seconds.
 pub(crate) const CHEAP_S: f64 = 1.0;
-/// How often it is looked whether the pair is still on screen, before its prediction begins.
+/// The time between two looks whether the pair is still on screen, before its prediction begins.
 const LOOK: Duration = Duration::from_millis(10);
 
 impl Computes for PrefetchKey {

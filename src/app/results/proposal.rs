@@ -120,7 +120,7 @@ pub(crate) fn carries_from(state: &State) -> Option<PairKey> {
 /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.
 ///
 /// # Errors
-/// What is missing.
+/// Something that is missing, by name.
 pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Result<Option<ProposalKey>, Absent> {
     let imprint = results::imprint_key(state, source, finger)?;
     let within = Bits::from(state.settings.mask.choice.cad_distance_m);

@@ -33,17 +33,17 @@ pub fn sample(state: &State) -> Lookup<'_, Sample> {
     }
 }
 
-/// What one finger felt.
+/// The touch of one finger.
 pub fn touch(state: &State, finger: PadId) -> Lookup<'_, PadTouch> {
     sample(state).and_then(Absent::NoFinger, |sample| sample.pad(finger))
 }
 
-/// What one GelSlim felt.
+/// The touch of one GelSlim.
 pub fn gelslim(state: &State, finger: PadId) -> Lookup<'_, ColorTouch> {
     touch(state, finger).and_then(Absent::NoGelSlim, |touch| touch.color())
 }
 
-/// What one Soft Bubble felt.
+/// The touch of one Soft Bubble.
 pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
     touch(state, finger).and_then(Absent::NoBubble, |touch| touch.depth())
 }

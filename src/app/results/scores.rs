@@ -32,7 +32,7 @@ impl Computes for ScoresKey {
     }
 }
 
-/// How all pairs of the open data set are scored: as the results table does it, without leaving grasps out.
+/// The setup by which all pairs of the open data set are scored: that of the results table, without leaving grasps out.
 pub(crate) fn setup_of_all(state: &State) -> Option<Setup> {
     Some(Setup { grasps_per_tool: None, ..evaluation_setup(state)? })
 }
@@ -69,7 +69,7 @@ pub fn evaluated(state: &State) -> impl Iterator<Item = (&BundleInfo, bool)> {
         .map(|b| (b, !state.table.left_out.contains(&b.id)))
 }
 
-/// What an evaluation started now would do; `None` without data or with nothing to score.
+/// The setup of an evaluation started now; `None` without data or with nothing to score.
 pub(crate) fn evaluation_setup(state: &State) -> Option<Setup> {
     state.library.open.as_ref()?;
     let bundles: Vec<_> = evaluated(state).filter(|(_, chosen)| *chosen).map(|(b, _)| b.origin.clone()).collect();

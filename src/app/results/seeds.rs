@@ -52,7 +52,7 @@ pub fn seed_recipes(state: &State, finger: PadId) -> Result<Vec<PredictionKey>, 
     Ok(first.with_seeds(state.seeds.count))
 }
 
-/// Whether seeds are being made for what is on screen: they were asked for, and some are missing.
+/// True where seeds are being made for what is on screen: they were asked for, and some are missing.
 pub fn seeds_running(state: &State) -> bool {
     let missing = |finger: &PadId| {
         let made = |recipe: &PredictionKey| state.results.predictions.contains(recipe);
@@ -131,7 +131,7 @@ pub fn ensemble(state: &State, finger: PadId) -> Lookup<'_, Ensemble> {
     state.look_or(Ok(Some(key)), before).value()
 }
 
-/// What the pane of the seeds shows and is not there, most urgent first.
+/// Asks for what the pane of the seeds shows and is not there, most urgent first.
 pub(crate) fn want_seeds(wants: &mut Demands<'_>) {
     let state = wants.state;
     if !state.needs(Demand::Seeds) || results::sample(state).ready().is_none() {

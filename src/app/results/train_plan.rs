@@ -1,4 +1,4 @@
-//! What a training of the mask model would learn from.
+//! The plan of a training of the mask model: what it would learn from.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{Revision, TrainPlanKey};

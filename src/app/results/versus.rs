@@ -120,7 +120,7 @@ fn side_of(subject: &Subject) -> Option<ImprintSource> {
     }
 }
 
-/// What a subject is made from by the settings.
+/// The recipes that a subject is made from by the settings.
 ///
 /// # Errors
 /// Why it cannot be made.
@@ -228,7 +228,7 @@ pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseR
     state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
 }
 
-/// How far the points of one subject lie from those of another, where that is there, with its recipe.
+/// The distances of the points of one subject from those of another, where they are there, with their key.
 pub fn subjects_apart<'a>(
     state: &'a State,
     a: &Subject,
@@ -239,7 +239,7 @@ pub fn subjects_apart<'a>(
     Some((key, found))
 }
 
-/// What the pane of the comparison shows and is not there.
+/// Asks for what the pane of the comparison shows and is not there.
 pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     let state = wants.state;
     if !state.needs(Demand::Versus) || results::sample(state).ready().is_none() {

@@ -29,11 +29,10 @@ use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan
 use touch2touch_work::follow::Following;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
-use touch2touch_work::io::case_file;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, files, folders};
+use touch2touch_work::io::{atomic, case_file, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::{LabelStats, label_stats};
 use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
@@ -48,18 +47,18 @@ use touch2touch_work::tuning::unfinished_folder;
 const PATIENCE: Duration = Duration::from_millis(150);
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
-/// Where a settings file that cannot be used is put.
+/// The place to which a settings file is put that cannot be used.
 const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
 /// The program's services. Models stay loaded between calls.
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
-    /// Where fitted models are kept.
+    /// The folder of fitted models.
     models_folder: Option<PathBuf>,
-    /// Where tuning that was stopped is kept.
+    /// The folder of tuning that was stopped.
     unfinished: Option<PathBuf>,
-    /// Where labels wait that could not be saved.
+    /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
     models: Models,
 }
@@ -127,7 +126,7 @@ pub struct LiveSource {
     /// Second masks, by person.
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     case: Option<(PairId, Case, Held)>,
-    /// Where labels wait that could not be saved.
+    /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
     recovered: Recovered,
 }
@@ -138,7 +137,7 @@ impl LiveSource {
         &self.dataset
     }
 
-    /// What a person drew a second time: the same each time, so that only differences are written.
+    /// The second drawings of each person: one value for all, so that only differences are written.
     fn repeats_of(&self, person: &str) -> Result<Labels, TaskError> {
         let mut known = self.repeats.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(labels) = known.get(person) {

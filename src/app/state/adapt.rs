@@ -1,4 +1,4 @@
-//! What the fit is asked for, and its last answer.
+//! The form of the fit, and its last answer.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -11,15 +11,15 @@ pub(in crate::app) const FOLDS: usize = 3;
 /// Steps of tuning that can be asked for.
 pub(crate) const TUNING_STEPS: RangeInclusive<u32> = 30..=5000;
 
-/// Which pairs are fitted.
+/// The pairs that are fitted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
 pub enum AdaptPairs {
     /// All of the data set.
     #[default]
     All,
-    /// Those marked done.
+    /// The pairs marked done.
     Done,
-    /// Those in the list as it is filtered.
+    /// The pairs in the list as it is filtered.
     Listed,
 }
 
@@ -37,15 +37,15 @@ impl AdaptPairs {
 /// The fit and how it is asked for.
 #[derive(Clone, Debug)]
 pub struct AdaptState {
-    /// Which pairs.
+    /// The pairs.
     pub pairs: AdaptPairs,
-    /// Whether the networks themselves are tuned after the closed form.
+    /// True where the networks themselves are tuned after the closed form.
     pub tune: bool,
     /// With how many steps: 50 take about a minute on two free cores, for each part and for all.
     pub steps: u32,
     /// The last fit to the open data set.
     pub result: Option<Arc<Adapted>>,
-    /// Its bundle.
+    /// The bundle of the result.
     pub bundle: Option<Arc<str>>,
 }
 

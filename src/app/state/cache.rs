@@ -40,7 +40,7 @@ impl<K: Ord + Clone, V> Cache<K, V> {
         self.entries.iter().map(|(key, entry)| (key, &entry.value))
     }
 
-    /// Whether `key` has a value.
+    /// True where `key` has a value.
     pub fn contains(&self, key: &K) -> bool {
         self.entries.contains_key(key)
     }
@@ -84,7 +84,7 @@ impl<K: Ord + Clone, V> Cache<K, V> {
         self.entries.len()
     }
 
-    /// Whether nothing is held.
+    /// True where nothing is held.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }

@@ -1,4 +1,4 @@
-//! What the dial is asked for, and its last answer.
+//! The form of the dial, and its last answer.
 
 use std::sync::Arc;
 
@@ -11,12 +11,12 @@ pub enum DialPairs {
     Spread(usize),
     /// All of it.
     All,
-    /// Those in the list as it is filtered.
+    /// The pairs in the list as it is filtered.
     Listed,
 }
 
 impl DialPairs {
-    /// What is offered.
+    /// The choices that are offered.
     pub const OFFERED: [Self; 5] = [Self::Spread(12), Self::Spread(24), Self::Spread(60), Self::All, Self::Listed];
 
     /// The name on screen.
@@ -32,7 +32,7 @@ impl DialPairs {
 /// The dial and how it is turned.
 #[derive(Clone, Debug)]
 pub struct DialState {
-    /// Which one.
+    /// The dial.
     pub dial: Dial,
     /// From where to where, in its unit.
     pub range: [f64; 2],
@@ -40,9 +40,9 @@ pub struct DialState {
     pub count: usize,
     /// Over which pairs.
     pub pairs: DialPairs,
-    /// Whether predictions are posed as well.
+    /// True where predictions are posed as well.
     pub predictions: bool,
-    /// What the last turn over the open data set did.
+    /// The result of the last turn over the open data set.
     pub result: Option<Arc<Sweep>>,
 }
 

@@ -1,4 +1,4 @@
-//! What the Evaluate workspace asks for, and its last answer.
+//! The form of the results table, and its last answer.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -19,19 +19,19 @@ pub struct TableState {
     pub left_out: BTreeSet<Arc<str>>,
     /// At most so many grasps of each tool.
     pub grasps_per_tool: Option<usize>,
-    /// Whether published metrics are shown as well.
+    /// True where published metrics are shown as well.
     pub published: bool,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
     /// The scores that are kept of the open data set.
     pub scores: Arc<ScoreTable>,
-    /// How often scores were computed: what is kept is looked up again then.
+    /// The number of times that scores were computed: those kept are looked up again then.
     pub(in crate::app) round: u64,
     /// Grasps of the evaluation under way at which that is done next.
     pub(in crate::app) next_look: u64,
     /// The score that the list is ordered by, as it was chosen.
     pub chosen: ScoreChoice,
-    /// What uncertainty is, where the list is ordered by that.
+    /// The measure of uncertainty, where the list is ordered by that.
     pub uncertain_by: QueueBy,
 }
 
@@ -51,14 +51,14 @@ impl Default for TableState {
     }
 }
 
-/// Which score the list is ordered, colored and filtered by.
+/// The score that the list is ordered, colored and filtered by.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ScoreChoice {
     /// The source, by name; `None` for the first generator.
     pub source: Option<Arc<str>>,
     /// The metric; `None` for the first that is there: the angle, if any is known.
     pub metric: Option<Metric>,
-    /// Whether the best come first.
+    /// True where the best come first.
     pub best_first: bool,
 }
 
@@ -78,7 +78,7 @@ impl TableState {
         source.value(pair, metric)
     }
 
-    /// Whether a pair meets a condition; one that was not scored does not.
+    /// True where a pair meets a condition; one that was not scored does not.
     pub(in crate::app) fn meets(&self, pair: PairId, condition: &Condition) -> bool {
         let source = match condition.source.as_str() {
             "" => self.by().map(|(source, _)| source),

@@ -1,4 +1,4 @@
-//! What is chosen of a figure before it is drawn, and what it then is of.
+//! The choices of a figure before it is drawn, and of what else is taken away.
 
 use super::super::keys::{ImportForm, ImprintSource};
 use super::super::pane::Pane;
@@ -11,12 +11,12 @@ pub(crate) const MOST_PAIRS: usize = 50;
 /// Scales that are offered.
 pub(crate) const SCALES: [u8; 4] = [1, 2, 4, 8];
 
-/// What a person chose about the next figure. Not kept between runs of the program.
+/// The choices of a person about the next figure. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureForm {
-    /// How many pairs of the list, from the first; `None` = the selected pair alone.
+    /// The number of pairs of the list, from the first; `None` = the selected pair alone.
     pub first: Option<usize>,
-    /// Whether all fingers get a row, or only the active one.
+    /// True where all fingers get a row; else only the active one.
     pub both_fingers: bool,
     /// The columns.
     pub panes: Vec<FigurePane>,
@@ -58,19 +58,19 @@ impl FigureForm {
 /// The room's state.
 #[derive(Clone, Debug, Default)]
 pub struct ExportState {
-    /// Whether the form is open.
+    /// True where the form is open.
     pub asking: bool,
-    /// What it says.
+    /// The contents of the form.
     pub form: FigureForm,
-    /// Whether the form of an export of masks is open.
+    /// True where the form of an export of masks is open.
     pub asking_masks: bool,
-    /// What it says.
+    /// The contents of the form.
     pub masks: ExportChoice,
     /// The import of masks that is asked about.
     pub importing: Option<ImportForm>,
-    /// How many imports were asked about.
+    /// The number of imports that were asked about.
     pub(in crate::app) imports: u64,
-    /// Whether the prediction of a case that was opened is still to be made.
+    /// True where the prediction of a case that was opened is still to be made.
     pub predict: bool,
 }
 
@@ -97,7 +97,7 @@ pub enum Output {
 }
 
 impl Output {
-    /// What is asked for, as the title of a dialog.
+    /// The request, as the title of a dialog.
     pub fn title(self) -> &'static str {
         match self {
             Self::Figure => "Save the figure (.png or .svg)",

@@ -6,8 +6,7 @@ use super::super::keys::Revision;
 use super::labels::{Document, DrawnMask, MaskPlace, Review};
 use touch2touch_core::label::PackedMask;
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::labels::{Change, Past};
+use touch2touch_work::labels::{Change, ImprintOf, Past};
 
 /// A corrected mask in few bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +36,7 @@ pub enum Edit {
     Mask {
         /// The pair's name.
         pair: String,
-        /// What the mask is of.
+        /// The place of the mask.
         place: MaskPlace,
         /// The mask.
         mask: Option<KeptMask>,
@@ -94,7 +93,7 @@ impl Edit {
         }
     }
 
-    /// What the mask is of, if it concerns one.
+    /// The place of the mask, if it concerns one.
     pub fn place(&self) -> Option<&MaskPlace> {
         match self {
             Self::Mask { place, .. } => Some(place),
@@ -112,17 +111,18 @@ impl Edit {
     }
 }
 
-/// What one gesture changed.
+/// The changes of one gesture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gesture {
-    /// What it did, e.g. `brush stroke`: shown when it is undone.
+    /// The name of what it did, e.g. `brush stroke`: shown when it is undone.
     pub name: Cow<'static, str>,
-    /// Its changes in the order they were made. All concern the same pair.
+    /// The changes in the order they were made. All concern the same pair.
     pub edits: Vec<Edit>,
 }
 
 impl Gesture {
-    /// What makes a change of the labels of `pair`. Masks get the revision; without one, of an earlier run, each a new one.
+    /// The gesture that makes a change of the labels of `pair`. Masks get the revision; without one, of an earlier run,
+    /// each a new one.
     pub(in crate::app) fn forth(
         pair: &str,
         name: Cow<'static, str>,
@@ -148,12 +148,12 @@ impl Gesture {
         self.edits.first().map_or("", Edit::pair)
     }
 
-    /// Whether everything it changes is on screen.
+    /// True where everything it changes is on screen.
     fn is_on_screen(&self, pair: &str, shown: &[MaskPlace]) -> bool {
         self.edits.iter().all(|e| e.pair() == pair && e.place().is_none_or(|place| shown.contains(place)))
     }
 
-    /// Whether undoing one before the other would matter.
+    /// True where undoing one before the other would matter.
     fn overlaps(&self, other: &Gesture) -> bool {
         self.edits.iter().any(|a| {
             other.edits.iter().any(|b| {
@@ -248,17 +248,17 @@ impl History {
         self.done.last()
     }
 
-    /// What can be taken back, the oldest first.
+    /// The gestures that can be taken back, the oldest first.
     pub fn done(&self) -> &[Gesture] {
         &self.done
     }
 
-    /// What undo would take back.
+    /// The name of what undo would take back.
     pub fn next_undo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
         Self::position(&self.done, pair, shown).map(|at| &self.done[at])
     }
 
-    /// What redo would do.
+    /// The name of what redo would do.
     pub(crate) fn next_redo(&self, pair: &str, shown: &[MaskPlace]) -> Option<&Gesture> {
         Self::position(&self.undone, pair, shown).map(|at| &self.undone[at])
     }

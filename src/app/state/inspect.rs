@@ -7,26 +7,26 @@ use touch2touch_core::align::TraceStep;
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 
-/// What of a registration is looked at. Not kept between runs of the program.
+/// The part of a registration that is looked at. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Inspect {
     /// The imprint whose registration it is.
     pub source: ImprintSource,
     /// The start of the run, `grasp_from_object`; `None` = the registration's own starts.
     pub start: Option<PoseBits>,
-    /// Which start of the report; `None` = the winner.
+    /// The start of the report; `None` = the winner.
     pub run: Option<usize>,
-    /// Which step of the run; `None` = its last.
+    /// The step of the run; `None` = its last.
     pub at: Option<usize>,
-    /// Whether the steps go by by themselves.
+    /// True where the steps go by by themselves.
     pub playing: bool,
     /// Steps kept for comparison.
     pub pins: [Option<Pin>; 2],
-    /// Whether correspondences are drawn in the 3D view.
+    /// True where correspondences are drawn in the 3D view.
     pub lines: bool,
     /// The plane of the basin map.
     pub plane: Plane,
-    /// What colors the basin map.
+    /// The coloring of the basin map.
     pub color: BasinColor,
 }
 
@@ -46,7 +46,7 @@ impl Default for Inspect {
     }
 }
 
-/// What colors a basin map.
+/// The coloring of a basin map.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
 pub enum BasinColor {
     /// Square root of the cost at the end.
@@ -54,7 +54,7 @@ pub enum BasinColor {
     Cost,
     /// Angle between end and truth.
     Error,
-    /// Which place the run ended at.
+    /// The place that the run ended at.
     Winner,
 }
 
@@ -80,7 +80,7 @@ pub struct Pin {
     pub registration: RegistrationChoice,
     /// The start it belongs to.
     pub run: usize,
-    /// Its position in the run.
+    /// The position in the run.
     pub at: usize,
     /// The pose, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
@@ -104,7 +104,7 @@ pub struct Inspected<'a> {
 }
 
 impl Inspected<'_> {
-    /// Whether it is the last step of its run.
+    /// True where it is the last step of its run.
     pub fn is_last(&self) -> bool {
         self.at + 1 >= self.inspection.num_steps(self.run)
     }

@@ -13,7 +13,7 @@ use touch2touch_work::label_stats::LabelStats;
 pub use touch2touch_work::labels::{DrawnMask, MaskPlace, PairLabels, Review};
 use touch2touch_work::propose::Proposal;
 
-/// What happened when the stored labels of a pair were read.
+/// The outcome of reading the stored labels of a pair.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stored {
     /// They were read, or there are none.
@@ -39,25 +39,25 @@ pub struct Document {
     pub(in crate::app) repeated: BTreeSet<String>,
     /// Pairs done since one came back.
     pub(in crate::app) since_repeat: usize,
-    /// How often review states were written: what is counted of them is counted again then.
+    /// The number of times that review states were written: they are counted again then.
     pub(in crate::app) marks: u64,
-    /// Whether one was changed since.
+    /// True where a review state was changed since.
     pub(in crate::app) marked: bool,
-    /// What was counted last.
+    /// The counts of last time.
     pub stats: Option<Arc<LabelStats>>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
-    /// Those of them whose last writing failed, and why.
+    /// The pairs whose last writing failed, and why.
     pub failed: BTreeMap<String, TaskError>,
     /// Pairs whose last change is in another folder than that of the data set.
     pub elsewhere: BTreeSet<String>,
-    /// What is asked about them.
+    /// The question that is asked about them.
     pub question: Option<Question>,
     /// The last request to write each of them.
     pub(in crate::app) asked: BTreeMap<String, Revision>,
     /// The stroke being drawn.
     pub stroke: Option<Stroke>,
-    /// What the last change of a mask started from.
+    /// The start of the last change of a mask.
     pub changed: Option<Changed>,
     /// The last revision given out.
     pub(in crate::app) last_revision: u64,
@@ -79,11 +79,11 @@ pub struct Changed {
     pub pair: String,
     /// The imprint.
     pub source: ImprintSource,
-    /// What was done.
+    /// The deed.
     pub name: Cow<'static, str>,
     /// The finger.
     pub finger: PadId,
-    /// Which change of the document it is.
+    /// The change of the document.
     pub revision: Revision,
     /// The mask before, where there was one.
     pub mask: Option<Arc<Mask>>,
@@ -94,9 +94,9 @@ pub struct Changed {
 /// Labels that somebody else changed while they were being changed here.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Merged {
-    /// What was to be written.
+    /// The labels that were to be written.
     pub given: PairLabels,
-    /// What lies on the disk now: both.
+    /// The labels on the disk now: both.
     pub now: PairLabels,
 }
 
@@ -105,23 +105,23 @@ pub struct Merged {
 pub struct Stroke {
     /// The pair's name.
     pub pair: String,
-    /// What it is drawn on.
+    /// The place of the mask that it is drawn on.
     pub place: MaskPlace,
     /// The imprint it is drawn on.
     pub source: ImprintSource,
-    /// What is drawn.
+    /// The drawing.
     pub drawing: Drawing,
     /// The pixels that may change; `None` = all.
     pub(in crate::app) allowed: Option<Mask>,
-    /// What is let through of a proposal.
+    /// The proposal that is let through.
     pub(in crate::app) proposed: Option<Arc<Proposal>>,
-    /// Where its pixels lie in the 3D picture that it is drawn on.
+    /// The places of its pixels in the 3D picture that it is drawn on.
     pub(in crate::app) seen: Option<VisiblePixels>,
     /// The pose before the stroke, as [`Changed::before`].
     pub(in crate::app) pose: Option<PoseKey>,
     /// The hand mask before the stroke; `None` if there was none.
     pub(in crate::app) before: Option<DrawnMask>,
-    /// What is drawn on: the mask in force before the stroke.
+    /// The mask in force before the stroke, which is drawn on.
     pub(in crate::app) start: DrawnMask,
     /// The pixels that were touched.
     pub(in crate::app) touched: Mask,
@@ -149,9 +149,9 @@ impl Stroke {
 pub struct Repeating {
     /// Who draws it.
     pub person: String,
-    /// Its review state.
+    /// The review state.
     pub(in crate::app) review: Review,
-    /// Its note.
+    /// The note.
     pub(in crate::app) note: String,
 }
 
@@ -162,7 +162,7 @@ impl Document {
         own.filter_map(|name| Some((name.clone(), self.finished(name)?))).collect()
     }
 
-    /// What is known about a pair, without the stroke that is still being drawn: it may be given up.
+    /// The labels of a pair without the stroke that is still being drawn: it may be given up.
     pub(in crate::app) fn finished(&self, name: &str) -> Option<PairLabels> {
         let mut labels = self.labels.get(name)?.clone();
         if let Some(stroke) = self.stroke.as_ref().filter(|stroke| stroke.pair == name) {
@@ -185,7 +185,7 @@ impl Document {
         self.notes.remove(name);
     }
 
-    /// What is known about a pair, if anything.
+    /// The labels of a pair, if there are any.
     pub fn pair(&self, name: &str) -> Option<&PairLabels> {
         self.labels.get(name)
     }
@@ -205,7 +205,7 @@ impl Document {
         self.notes.get(name).map_or("", String::as_str)
     }
 
-    /// Whether the stored labels were read, so that the pair may be edited.
+    /// True where the stored labels were read, so that the pair may be edited.
     pub fn is_editable(&self, name: &str) -> bool {
         self.stored.get(name) == Some(&Stored::Loaded)
     }

@@ -8,8 +8,7 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::keys::{DatasetSeq, PairKey};
-use super::super::keys::{MaskRecipe, PredictionKey};
+use super::super::keys::{DatasetSeq, MaskRecipe, PairKey, PredictionKey};
 use super::super::source::DataSource;
 use super::evaluate::TableState;
 use super::labels::Document;
@@ -20,7 +19,7 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::filter::Filter;
 use touch2touch_work::prediction::made_with;
 
-/// What can be opened.
+/// A place that can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Place {
@@ -77,7 +76,7 @@ impl Sort {
 pub struct OpenDataset {
     /// This opening.
     pub seq: DatasetSeq,
-    /// What was opened.
+    /// The place.
     pub place: Place,
     /// The data.
     pub source: Arc<dyn DataSource>,
@@ -117,15 +116,15 @@ pub struct Follow {
 /// The open data set and its list.
 #[derive(Clone, Debug, Default)]
 pub struct Library {
-    /// What is open.
+    /// The open data set.
     pub open: Option<OpenDataset>,
-    /// What is being opened.
+    /// The place that is being opened.
     pub opening: Option<Place>,
     /// Why the last opening failed, until the next one.
     pub failure: Option<TaskError>,
     /// The number of the last opening.
     pub last_seq: DatasetSeq,
-    /// What was seen of the folder while it is followed; `None` while it is not.
+    /// The arrivals in the folder while it is followed; `None` while it is not.
     pub follow: Option<Follow>,
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
     /// `has:note` are pairs with one; `angle>5` is a condition on a score.
@@ -142,14 +141,14 @@ pub struct Library {
     pub rows: Range<usize>,
     /// The bundles found.
     pub bundles: Vec<BundleInfo>,
-    /// What is wrong with bundles that were refused.
+    /// The problems of bundles that were refused.
     pub bundle_problems: Vec<TaskError>,
     /// The generator that the open case was made with, by identity and name, where this machine does not have it.
     pub lacking: Option<(Arc<str>, String)>,
 }
 
 impl Library {
-    /// Whether a data set is the one that is open: what is of an earlier opening comes too late.
+    /// True where a data set is the one that is open: what is of an earlier opening comes too late.
     pub(in crate::app) fn is_open(&self, seq: DatasetSeq) -> bool {
         self.open.as_ref().is_some_and(|open| open.seq == seq)
     }
@@ -243,7 +242,7 @@ impl Library {
         self.lacking.as_ref().is_some_and(|(id, _)| **id == *bundle)
     }
 
-    /// How a prediction was made, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
+    /// The making of a prediction, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
     pub fn made_with(&self, recipe: &PredictionKey) -> String {
         made_with(self.model_name(&recipe.bundle), &recipe.config)
     }

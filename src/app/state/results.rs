@@ -26,7 +26,7 @@ macro_rules! table {
         Sample(PairKey) in samples, 192 * MIB;
         /// The labels stored for a pair: they go to the document.
         Labels(LabelsKey);
-        /// How far the labeling is, and what it took.
+        /// The progress of the labeling, and what it took.
         LabelStats(LabelStatsKey) in label_stats, 8 * MIB;
         /// The CAD model of a tool and what the registration derives from it.
         Tool(ToolKey) in tools, 128 * MIB;
@@ -50,23 +50,23 @@ macro_rules! table {
         Compared(ComparedKey);
         /// Any two imprints of a touch against each other.
         Versus(VersusKey) in versus, 64 * MIB;
-        /// How far the points of one cloud lie from another.
+        /// The distances of the points of one cloud from another.
         Apart(CloudDifferenceKey) in apart, 16 * MIB;
         /// The depth chain of a prediction, stage by stage.
         Ledger(LedgerKey) in ledgers, 24 * MIB;
-        /// What a GelSlim image leaves open.
+        /// The ambiguity of a GelSlim image: what it leaves open.
         Ambiguity(AmbiguityKey) in ambiguities, MIB;
         /// An automatic mask.
         Mask(MaskKey) in masks, 32 * MIB;
-        /// What an export of masks would write where.
+        /// The plan of an export of masks: what it would write where.
         MaskPlan(MaskPlanKey) in mask_plans, MIB;
-        /// What an import of masks would change.
+        /// The plan of an import of masks: what it would change.
         ImportPlan(ImportPlanKey) in import_plans, MIB;
         /// The distances of an imprint's points from the CAD model.
         Distances(DistancesKey) in distances, 32 * MIB;
         /// A mask that is proposed.
         Proposal(ProposalKey) in proposals, 16 * MIB;
-        /// What a training of the mask model would learn from.
+        /// The plan of a training of the mask model: what it would learn from.
         TrainPlan(TrainPlanKey) in train_plans, MIB;
         /// A cloud.
         Cloud(CloudKey) in clouds, 128 * MIB;
@@ -80,11 +80,11 @@ macro_rules! table {
         Layers(LayersKey) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
         Deviation(DeviationKey) in deviations, 64 * MIB;
-        /// Which pixels a registered angle hangs on.
+        /// The influence of each pixel on a registered angle.
         Influence(InfluenceKey) in influences, 16 * MIB;
         /// The steps of a recorded registration, made ready to be looked through.
         Inspection(InspectionKey) in inspections, 64 * MIB;
-        /// Where starts lead.
+        /// The ends that starts lead to.
         Basin(BasinKey) in basins, 32 * MIB;
         /// The scores that are kept of all pairs.
         Scores(ScoresKey) in scores, 64 * MIB;
@@ -107,13 +107,13 @@ pub(crate) trait Cached: Key + Into<Request> {
 pub struct Latest {
     /// The cloud.
     pub cloud: Option<CloudKey>,
-    /// Its pose.
+    /// The pose.
     pub pose: Option<PoseKey>,
     /// The recorded registration.
     pub inspection: Option<InspectionKey>,
     /// The basin map.
     pub basin: Option<BasinKey>,
-    /// What its angle hangs on.
+    /// The influence on its angle.
     pub influence: Option<InfluenceKey>,
 }
 
@@ -133,15 +133,15 @@ macro_rules! results {
             $( $( #[doc = $doc] pub $cache: Cache<$key, <$key as Key>::Value>, )? )*
             /// Results of which the log said what is odd about them.
             pub noted: BTreeSet<Request>,
-            /// What is on its way to each touch.
+            /// The previews of what is on its way to each touch.
             pub previews: BTreeMap<TouchKey, Arc<Preview>>,
             /// Touches whose predictions from before were looked for on the disk.
             pub looked_up: BTreeSet<TouchKey>,
-            /// What is shown of them where the settings do not say it.
+            /// The predictions shown where the settings do not say it.
             pub shown: Shown,
             /// All predictions made for each touch, oldest first.
             pub made: BTreeMap<TouchKey, Vec<PredictionKey>>,
-            /// What was shown last of each pair and imprint.
+            /// The keys of what was shown last of each pair and imprint.
             pub latest: BTreeMap<(PairKey, ImprintSource), Latest>,
         }
 
@@ -170,7 +170,7 @@ macro_rules! results {
         }
 
         impl Computed {
-            /// What was asked for.
+            /// The request that it answers.
             pub fn request(&self) -> Request {
                 match self { $( Self::$variant(key, _) => Request::$variant(key.clone()), )* }
             }
@@ -207,7 +207,7 @@ impl Results {
         self.shown.retain(kept);
     }
 
-    /// What a prediction made as this one would be cost on this machine, seconds: the median of those of the open data
+    /// The cost of a prediction made as this one would be on this machine, seconds: the median of those of the open data
     /// set; `None` if there are none.
     pub fn cost_of(&self, recipe: &PredictionKey) -> Option<f64> {
         let same = |made: &PredictionKey| {

@@ -4,14 +4,14 @@ use super::super::keys::PredictionKey;
 
 pub use touch2touch_work::subject::SEEDS as COUNT;
 
-/// What a person chose about seeds.
+/// The choices of a person about seeds.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Seeds {
-    /// How many.
+    /// The number.
     pub count: usize,
-    /// Whether they are made for every pair that is shown with their pane.
+    /// True where they are made for every pair that is shown with their pane.
     pub every: bool,
-    /// What they were asked for: the recipe of the first of them. Another pair or another setting asks anew.
+    /// The key of the first of them when they were asked for. Another pair or another setting asks anew.
     pub asked: Option<PredictionKey>,
 }
 

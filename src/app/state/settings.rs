@@ -1,4 +1,4 @@
-//! What a person prefers. Kept between runs; never part of undo.
+//! The preferences of a person. Kept between runs; never part of undo.
 
 pub mod scene;
 pub mod versus;
@@ -29,7 +29,7 @@ use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
 pub(crate) const SETTINGS_VERSION: u32 = 1;
-/// How many recent places are kept.
+/// The number of recent places that are kept.
 pub(crate) const MAX_RECENT: usize = 12;
 /// Brush radii that can be chosen, pixels.
 pub(crate) const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
@@ -56,7 +56,7 @@ pub struct Settings {
     /// The color map of imprints.
     #[serde(alias = "colour_map")]
     pub color_map: ColorMap,
-    /// How predictions become meters.
+    /// The mapping of predictions to meters.
     pub shift: ShiftMode,
     /// The last statistics made for a refit shift, to be chosen again.
     pub refit: Option<RefitShift>,
@@ -69,31 +69,31 @@ pub struct Settings {
     pub registration: RegistrationChoice,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
-    /// What the predictions kept on the disk may take, MiB; 0 keeps none.
+    /// The budget of the predictions kept on the disk, MiB; 0 keeps none.
     pub cache_mib: u32,
     /// Who labels; empty: whom the system says.
     pub person: String,
-    /// How many of the pairs that the person marked done come back unannounced, percent; 0 switches that off.
+    /// The share of the pairs that the person marked done that come back unannounced, percent; 0 switches that off.
     pub repeats_percent: f32,
-    /// Whether the 3D views of prediction and measurement move together.
+    /// True where the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
-    /// How the 3D views look.
+    /// The look of the 3D views.
     pub scene: SceneLook,
-    /// What is compared with what, per workspace.
+    /// The comparison of each workspace.
     pub versus: std::collections::BTreeMap<Workspace, Versus>,
-    /// Whether the mask is drawn over imprints.
+    /// True where the mask is drawn over imprints.
     pub mask_visible: bool,
-    /// Whether only the outline of the mask is drawn.
+    /// True where only the outline of the mask is drawn.
     pub mask_outline: bool,
-    /// How strongly the mask covers, 0..1.
+    /// The opacity of the mask, 0..1.
     pub mask_opacity: f32,
-    /// Whether the GelSlim's window is drawn on bubble images.
+    /// True where the GelSlim's window is drawn on bubble images.
     pub footprint_visible: bool,
-    /// Whether mask, points and pose before the last change of a mask stay visible until the next.
+    /// True where mask, points and pose before the last change of a mask stay visible until the next.
     pub ghosts: bool,
-    /// Whether the hint of the first start was dismissed.
+    /// True where the hint of the first start was dismissed.
     pub hint_dismissed: bool,
-    /// What was opened before, newest first.
+    /// The places that were opened before, newest first.
     pub recent: Vec<Place>,
     /// The arrangement of the panes per workspace, in the window's own format (validated by it).
     pub layouts: std::collections::BTreeMap<String, String>,
@@ -103,11 +103,11 @@ pub struct Settings {
     pub keys: Bindings,
     /// Folders with further model bundles.
     pub bundle_folders: Vec<PathBuf>,
-    /// What was on screen when the window was closed.
+    /// The screen when the window was closed.
     pub last: Last,
 }
 
-/// What was on screen when the window was closed: shown again when the same place is opened next.
+/// The screen when the window was closed: shown again when the same place is opened next.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Last {
@@ -117,7 +117,7 @@ pub struct Last {
     pub pair: String,
     /// The number of the active finger.
     pub finger: usize,
-    /// Whether both fingers were shown.
+    /// True where both fingers were shown.
     pub both_fingers: bool,
     /// The cameras of the 3D views, in the window's own format; empty = fitted.
     pub cameras: [String; 2],
@@ -162,7 +162,7 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// What is compared with what, in the workspace in front.
+    /// The comparison in the workspace in front.
     pub fn versus_mut(&mut self) -> &mut Versus {
         self.versus.entry(self.workspace).or_default()
     }
@@ -216,12 +216,12 @@ impl Settings {
         Some(self.labeler()).filter(|name| !name.is_empty())
     }
 
-    /// What is compared with what in the workspace in front.
+    /// The comparison in the workspace in front.
     pub fn compared(&self) -> Versus {
         self.versus.get(&self.workspace).cloned().unwrap_or_default()
     }
 
-    /// How figures look, in the colors of the panes.
+    /// The look of figures, in the colors of the panes.
     pub(in crate::app) fn figure_look(
         &self,
         panes: Vec<FigurePane>,
@@ -265,7 +265,7 @@ pub struct ColorRange {
     pub min_m: f32,
     /// Depth of the last color, meters.
     pub max_m: f32,
-    /// Whether the range stays when another sample is shown. Unlocked, each new selection sets it.
+    /// True where the range stays when another sample is shown. Unlocked, each new selection sets it.
     pub locked: bool,
 }
 
@@ -277,7 +277,7 @@ impl Default for ColorRange {
 }
 
 impl ColorRange {
-    /// Whether colors can be looked up with it.
+    /// True where colors can be looked up with it.
     pub(crate) fn is_valid(self) -> bool {
         self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
     }
@@ -310,13 +310,13 @@ impl ColorMap {
 pub struct GenerateSettings {
     /// The bundle's name; `None` takes the first generator found.
     pub bundle: Option<String>,
-    /// How the steps are chosen; `None` takes the numbers below.
+    /// The choice of the steps; `None` takes the numbers below.
     pub preset: Option<Preset>,
     /// Denoising steps.
     pub steps: u32,
     /// Seed of the noise.
     pub seed: u64,
-    /// Whether generating again keeps the seed.
+    /// True where generating again keeps the seed.
     pub seed_locked: bool,
     /// The sampler.
     pub sampler: Sampler,
@@ -328,9 +328,9 @@ pub struct GenerateSettings {
     pub guidance: f64,
     /// A picture on the way after so many steps, and after the first; 0 = none.
     pub preview_every: u32,
-    /// Whether both fingers are generated (the pose needs both), or only the one selected.
+    /// True where both fingers are generated (the pose needs both); else only the one selected.
     pub both_fingers: bool,
-    /// Whether the pair on screen is predicted without being asked, where that costs little.
+    /// True where the pair on screen is predicted without being asked, where that costs little.
     pub by_itself: bool,
 }
 
@@ -385,7 +385,7 @@ impl GenerateSettings {
         }
     }
 
-    /// The same with the numbers that `preset` or the bundle stand for, so that they can be changed one by one.
+    /// The choices with the numbers that `preset` or the bundle stand for, so that they can be changed one by one.
     #[must_use]
     pub fn spelt_out(&self, bundle: Option<&BundleInfo>) -> Self {
         let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
@@ -399,7 +399,7 @@ impl GenerateSettings {
         }
     }
 
-    /// Whether the numbers that a preset stands for are the same.
+    /// True where the numbers that a preset stands for are the same.
     pub(crate) fn same_numbers(&self, other: &Self) -> bool {
         let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
         numbers(self) == numbers(other)
@@ -414,23 +414,23 @@ pub struct MaskSettings {
     pub tool: MaskTool,
     /// The tool before it.
     pub last_tool: MaskTool,
-    /// What the tools make of pixels; the eraser frees them.
+    /// The paint of the tools; the eraser frees pixels.
     pub paint: Paint,
     /// Radius of brush and eraser, image pixels.
     pub radius_px: f32,
     /// By how much the depth may differ that the wand takes, meters.
     pub wand_m: f32,
-    /// Which points a drawing in 3D reaches.
+    /// The points that a drawing in 3D reaches.
     pub layers: Layers,
     /// Size of the clean-ups that have one, millimeters.
     pub clean_mm: f32,
-    /// Where a hand may change a mask.
+    /// The gate that says where a hand may change a mask.
     pub gate: Gate,
-    /// What proposes masks.
+    /// The source of proposals.
     pub proposal: ProposalSource,
-    /// Whether accepting a proposal replaces what was painted by hand as well.
+    /// True where accepting a proposal replaces what was painted by hand as well.
     pub over_drawn: bool,
-    /// What is in force where no mask was drawn by hand.
+    /// The choice of the masks that nobody drew.
     #[serde(flatten)]
     pub choice: MaskChoice,
     /// The mask bundle's name; `None` takes the first found.
@@ -457,7 +457,7 @@ impl Default for MaskSettings {
 }
 
 impl MaskSettings {
-    /// What the tool in hand draws with, and what it makes of the pixels; `None` where it draws nothing.
+    /// The drawing tool in hand and what it makes of the pixels; `None` where it draws nothing.
     pub fn drawing(&self) -> Option<(DrawTool, Paint)> {
         let paint = if self.tool == MaskTool::Eraser { Paint::Free } else { self.paint };
         Some((self.tool.row(self).draws?, paint))
@@ -489,7 +489,7 @@ impl MaskSettings {
     }
 }
 
-/// What the pointer does on a mask.
+/// A tool: what the pointer does on a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum MaskTool {
@@ -516,9 +516,9 @@ pub struct ToolRow {
     pub name: &'static str,
     /// The action that takes the tool in hand.
     pub action: Action,
-    /// What it draws with; `None` = nothing.
+    /// The tool that it draws with; `None` = none.
     pub draws: Option<DrawTool>,
-    /// How it is used; empty for a tool with a number, which stands in its place.
+    /// The words for its use; empty for a tool with a number, which stands in their place.
     pub hint: &'static str,
 }
 

@@ -4,8 +4,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
 use super::super::jobs::Lane;
-use super::super::keys::DatasetSeq;
-use super::super::keys::PredictionKey;
+use super::super::keys::{DatasetSeq, PredictionKey};
 use super::super::state::results::Request;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
@@ -16,18 +15,18 @@ pub struct Ticket(pub u64);
 
 macro_rules! kinds {
     ($( #[doc = $doc:literal] $kind:ident, $name:literal, $lane:ident; )*) => {
-        /// What a person can start. On [`Lane::Batch`] there is one of a kind at a time, and nobody waits for its end any
-        /// more once another data set is open.
+        /// A kind of job that a person can start. On [`Lane::Batch`] there is one of a kind at a time, and nobody waits for
+        /// its end any more once another data set is open.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter)]
         pub enum TaskKind { $( #[doc = $doc] $kind, )* }
 
         impl TaskKind {
-            /// What it does, for errors.
+            /// The work that it does, for errors.
             pub fn name(self) -> &'static str {
                 match self { $( Self::$kind => $name, )* }
             }
 
-            /// Where it runs.
+            /// The lane that it runs on.
             pub(crate) fn lane(self) -> Lane {
                 match self { $( Self::$kind => Lane::$lane, )* }
             }
@@ -63,19 +62,19 @@ kinds! {
 /// A job that a person started.
 #[derive(Clone, Debug)]
 pub struct Task {
-    /// What it is.
+    /// The kind.
     pub kind: TaskKind,
-    /// Its name on screen, e.g. `Generate data_4 right`.
+    /// The name on screen, e.g. `Generate data_4 right`.
     pub title: String,
-    /// How far it is.
+    /// The progress.
     pub progress: Progress,
     /// The predictions it makes, if it makes any: one per finger.
     pub recipes: Vec<PredictionKey>,
     /// The data set it opens, if it opens one.
     pub opening: Option<DatasetSeq>,
-    /// Whether it was told to stop and has not stopped yet.
+    /// True where it was told to stop and has not stopped yet.
     pub cancelling: bool,
-    /// Whether another data set was opened since.
+    /// True where another data set was opened since.
     pub outdated: bool,
 }
 
@@ -84,7 +83,7 @@ pub struct Task {
 pub struct Tasks {
     /// Jobs that a person started, by ticket.
     pub running: BTreeMap<Ticket, Task>,
-    /// What the visible panes wait for: the list last handed to the runtime.
+    /// The requests that the visible panes wait for: the list last handed to the runtime.
     pub demanded: Vec<Request>,
     /// Results that could not be computed, and why: they are not tried again until something changes.
     pub failed: BTreeMap<Request, TaskError>,
@@ -102,12 +101,12 @@ impl Tasks {
         self.running.iter().find(|(_, task)| !task.recipes.is_empty()).map(|(t, task)| (*t, task))
     }
 
-    /// Whether nothing runs and nothing waits.
+    /// True where nothing runs and nothing waits.
     pub fn is_idle(&self) -> bool {
         self.running.is_empty() && self.demanded.is_empty()
     }
 
-    /// What runs of a kind for the data set that is open.
+    /// The running task of a kind for the data set that is open.
     pub fn of_kind(&self, kind: TaskKind) -> Option<(Ticket, &Task)> {
         let mut tasks = self.running.iter();
         tasks.find(|(_, task)| task.kind == kind && !task.outdated).map(|(ticket, task)| (*ticket, task))
@@ -119,7 +118,7 @@ impl Tasks {
     }
 }
 
-/// How much a person should care.
+/// The degree to which a person should care.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Level {
     /// Something was done.
@@ -135,21 +134,21 @@ pub enum Level {
 pub struct Entry {
     /// Counts up from 1: a toast is shown once per number.
     pub number: u64,
-    /// How much a person should care.
+    /// The degree to which a person should care.
     pub level: Level,
-    /// What happened.
+    /// The event, in words.
     pub text: String,
     /// Why, and other detail.
     pub detail: Option<String>,
-    /// What to do.
+    /// The advice.
     pub hint: Option<String>,
-    /// What was written, if it says so.
+    /// The place that was written to, if it says so.
     pub place: Option<PathBuf>,
-    /// How often the same line came in a row.
+    /// The number of times that the line came in a row.
     pub count: u32,
 }
 
-/// What happened, newest last.
+/// The log of what happened, newest last.
 #[derive(Clone, Debug, Default)]
 pub struct Log {
     /// The entries; old ones are dropped.

@@ -1,4 +1,4 @@
-//! What a training is asked for, and its last answer.
+//! The form of a training, and its last answer.
 
 use std::ops::RangeInclusive;
 use std::sync::Arc;
@@ -14,12 +14,12 @@ pub(crate) const STEPS: RangeInclusive<u32> = 1..=100_000;
 /// Most percent of the pairs that can be left out.
 pub(crate) const MOST_HELD_OUT: u8 = 90;
 
-/// What a person chose about the next training. Not kept between runs of the program.
+/// The choices of a person about the next training. Not kept between runs of the program.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrainForm {
     /// The division into pairs to learn from and pairs that are left out.
     pub choice: TrainChoice,
-    /// Whether the number of steps is given, not the time.
+    /// True where the number of steps is given, not the time.
     pub by_steps: bool,
     /// For how long.
     pub minutes: u32,
@@ -43,7 +43,7 @@ impl TrainForm {
         self
     }
 
-    /// How long it trains.
+    /// The length of the training.
     pub fn tuning(&self) -> Tuning {
         match self.by_steps {
             true => Tuning::Steps(self.steps),
@@ -55,10 +55,10 @@ impl TrainForm {
 /// The training and how it is asked for.
 #[derive(Clone, Debug, Default)]
 pub struct TrainState {
-    /// What is asked for.
+    /// The choices.
     pub form: TrainForm,
     /// The last training on the open data set.
     pub result: Option<Arc<Trained>>,
-    /// Its bundle.
+    /// The bundle of the result.
     pub bundle: Option<Arc<str>>,
 }

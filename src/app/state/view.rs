@@ -1,4 +1,4 @@
-//! What is on screen: panes, the active finger, the pointer.
+//! The selection: panes on screen, the active finger, the pointer.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use super::export::Output;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 
-/// What is looked at.
+/// The selection: everything that is looked at.
 #[derive(Clone, Debug, Default)]
 pub struct Selection {
     /// The pair.
@@ -19,13 +19,13 @@ pub struct Selection {
     pub finger: PadId,
     /// The imprint whose mask clean-ups work on.
     pub imprint: ImprintSource,
-    /// Whether a proposal is shown over the mask.
+    /// True where a proposal is shown over the mask.
     pub proposing: bool,
-    /// Whether imprints show which pixels the registered angle hangs on.
+    /// True where imprints show which pixels the registered angle hangs on.
     pub influence: bool,
-    /// Whether imprints are magnified around the pointer.
+    /// True where imprints are magnified around the pointer.
     pub lens: bool,
-    /// Whether both fingers are shown, or only the active one.
+    /// True where both fingers are shown; else only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.
     pub hover: Option<Hover>,
@@ -33,9 +33,9 @@ pub struct Selection {
     pub hover_point: Option<DVec3>,
     /// The panes on screen.
     pub panes: BTreeSet<Pane>,
-    /// Whether the command palette is open.
+    /// True where the command palette is open.
     pub palette: bool,
-    /// Whether the shortcut sheet is open.
+    /// True where the shortcut sheet is open.
     pub shortcut_sheet: bool,
 }
 
@@ -61,7 +61,7 @@ pub enum CameraPreset {
     Top,
 }
 
-/// What only the window can do, once. Handed out by [`super::super::runtime::Runtime::tick`].
+/// A request that only the window can fulfil, once. Handed out by the runtime's `tick`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum UiRequest {
     /// Show the native dialog for a folder, or a path box; answer with `LibraryCommand::Open`.

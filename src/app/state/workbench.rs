@@ -9,17 +9,17 @@ use super::super::keys::{ImprintSource, PairKey, RunKey};
 use touch2touch_core::manual::{ManualCost, ManualPose};
 use touch2touch_core::rig::{PadId, Rig};
 
-/// What colors the contact points in 3D.
+/// The coloring of the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
 pub enum Layer {
     /// One color.
     #[default]
     None,
-    /// How far each is from the model.
+    /// The distance of each from the model.
     Residuals,
-    /// What became of each.
+    /// The fate of each in the registration.
     Reasons,
-    /// How far each lies outside or inside the model, and the same on the model's surface.
+    /// The signed distance of each from the model, negative inside, and the same on the model's surface.
     Distance,
     /// Lines to the model.
     Correspondences,
@@ -37,7 +37,7 @@ impl Layer {
         }
     }
 
-    /// What it shows, for the tooltip.
+    /// The tooltip.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::None => "Contact points in one color",
@@ -51,7 +51,7 @@ impl Layer {
     }
 }
 
-/// What a click in a 3D pane does.
+/// The effect of a click in a 3D pane.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
 pub enum SceneTool {
     /// Reads a point.
@@ -115,13 +115,13 @@ impl SectionAxis {
 pub struct Section {
     /// The axis it stands on.
     pub axis: SectionAxis,
-    /// Where on it, meters.
+    /// The position on the axis, meters.
     pub at_m: f64,
-    /// Whether what lies before it is left out instead.
+    /// True where what lies before it is left out instead.
     pub flipped: bool,
 }
 
-/// How far from the middle of the grasp a plane can stand, meters.
+/// The farthest that a plane can stand from the middle of the grasp, meters.
 pub(crate) const SECTION_REACH_M: f64 = 0.06;
 
 /// A point that was clicked.
@@ -131,7 +131,7 @@ pub struct Picked {
     pub source: ImprintSource,
     /// Of which finger.
     pub finger: PadId,
-    /// Its raw bubble pixel.
+    /// The raw bubble pixel.
     pub pixel: [u16; 2],
 }
 
@@ -144,11 +144,11 @@ pub struct ManualTry {
     pub source: ImprintSource,
     /// The pose, `grasp_from_object`.
     pub pose: ManualPose,
-    /// Where it began.
+    /// The pose where it began.
     pub began: ManualPose,
-    /// What it costs; `None` while cloud or model are not there.
+    /// The cost; `None` while cloud or model are not there.
     pub cost: Option<ManualCost>,
-    /// What it cost where it began.
+    /// The cost where it began.
     pub began_cost: Option<ManualCost>,
     /// The registration from here that is being computed.
     pub icp: Option<RunKey>,
@@ -156,20 +156,20 @@ pub struct ManualTry {
     pub from_icp: Option<RunKey>,
 }
 
-/// What the 3D panes do and show besides.
+/// The workbench: what the 3D panes do and show besides.
 #[derive(Clone, Debug)]
 pub struct Workbench {
-    /// What colors the contact points.
+    /// The coloring of the contact points.
     pub layer: Layer,
-    /// Whether the tool is moved along its weakest direction.
+    /// True where the tool is moved along its weakest direction.
     pub animate_weakest: bool,
-    /// Whether each 3D pane shows the clouds of both imprints.
+    /// True where each 3D pane shows the clouds of both imprints.
     pub both_clouds: bool,
-    /// What cuts the 3D views open.
+    /// The plane that cuts the 3D views open.
     pub section: Option<Section>,
-    /// What a click does.
+    /// The effect of a click.
     pub tool: SceneTool,
-    /// Whether the tool can leave the plane.
+    /// True where the tool can leave the plane.
     pub six_dof: bool,
     /// The side that the pointer was over last: what the panes beside the 3D views are about.
     pub side: ImprintSource,

@@ -138,7 +138,7 @@ pub(in crate::agreement) fn what_arrives_is_followed_by_the_studio_to_the_number
     assert!(both.studio.state.pair_name().ends_with("data_40"), "{}", both.studio.state.pair_name());
     let out = both.at("watched");
     let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
-    let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+    let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
     let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
     let lines = run(&all, &both.home);
     assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));

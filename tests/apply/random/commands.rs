@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use touch2touch::app::settings::prefer;
 
 use glam::{DVec3, Mat4};
 use proptest::prelude::*;
@@ -29,6 +28,7 @@ use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, Stro
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::services::{Followed, Services as _};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource,
     MaskTool, SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,

@@ -1,4 +1,4 @@
-//! How the 3D views look.
+//! The look of the 3D views.
 
 use std::collections::BTreeMap;
 
@@ -39,7 +39,7 @@ pub enum SceneLayer {
     Guides,
 }
 
-/// How large a layer draws its parts.
+/// The size at which a layer draws its parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LayerSize {
@@ -60,7 +60,7 @@ impl LayerSize {
         }
     }
 
-    /// The same unit with another number.
+    /// A size of the same unit with another number.
     #[must_use]
     pub fn with(self, value: f32) -> Self {
         match self {
@@ -70,11 +70,11 @@ impl LayerSize {
     }
 }
 
-/// How a layer is drawn.
+/// The look of a layer.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LayerLook {
-    /// Whether it is.
+    /// True where it is drawn.
     pub shown: bool,
     /// sRGB; `None` = the theme's.
     pub color: Option<[u8; 3]>,
@@ -91,7 +91,7 @@ impl Default for LayerLook {
 }
 
 impl SceneLayer {
-    /// How it looks before anybody changed it.
+    /// The look before anybody changed it.
     pub fn preset(self) -> LayerLook {
         let look = LayerLook::default();
         match self {
@@ -103,12 +103,12 @@ impl SceneLayer {
         }
     }
 
-    /// Whether it has points or lines that have a size.
+    /// True where it has points or lines that have a size.
     pub(crate) fn has_size(self) -> bool {
         !matches!(self, Self::Surface | Self::Cad | Self::Guides)
     }
 
-    /// Whether its size can be in millimeters.
+    /// True where its size can be in millimeters.
     pub(crate) fn has_points(self) -> bool {
         matches!(self, Self::Membrane | Self::Contact | Self::OtherContact | Self::Dropped | Self::Added)
     }
@@ -117,19 +117,19 @@ impl SceneLayer {
 /// Largest end of the scale of distances, meters.
 const MAX_DISTANCE_M: f32 = 0.05;
 
-/// How all 3D views look.
+/// The look of all 3D views.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct SceneLook {
-    /// What was changed, layer by layer.
+    /// The changes, layer by layer.
     pub layers: BTreeMap<SceneLayer, LayerLook>,
-    /// Whether what lies behind its neighbors is darkened (eye-dome lighting).
+    /// True where what lies behind its neighbors is darkened (eye-dome lighting).
     pub eye_dome: bool,
-    /// Whether the edges of the model are drawn.
+    /// True where the edges of the model are drawn.
     pub edges: bool,
     /// Parallel projection.
     pub orthographic: bool,
-    /// Whether only what the GelSlims see is drawn.
+    /// True where only what the GelSlims see is drawn.
     pub only_window: bool,
     /// The scale of distances reaches as far to both sides, meters.
     pub distance_m: f32,
@@ -149,7 +149,7 @@ impl Default for SceneLook {
 }
 
 impl SceneLook {
-    /// How a layer is drawn.
+    /// The look of a layer.
     pub fn layer(&self, layer: SceneLayer) -> LayerLook {
         self.layers.get(&layer).copied().unwrap_or_else(|| layer.preset())
     }

@@ -1,11 +1,11 @@
-//! What is compared with what, and how.
+//! The two sides of a comparison, and how they are shown.
 
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use touch2touch_work::subject::Subject;
 
-/// How two imprints are held against each other.
+/// The way in which two imprints are held against each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum VersusMode {
@@ -34,7 +34,7 @@ impl VersusMode {
         }
     }
 
-    /// What it shows, for the tooltip.
+    /// The tooltip.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Side => "A at the left, B at the right",
@@ -45,7 +45,7 @@ impl VersusMode {
         }
     }
 
-    /// Whether it is a 3D view.
+    /// True where it is a 3D view.
     pub fn is_3d(self) -> bool {
         matches!(self, Self::Clouds | Self::Apart)
     }
@@ -59,7 +59,7 @@ pub struct Versus {
     pub a: Subject,
     /// The other.
     pub b: Subject,
-    /// How.
+    /// The way.
     pub mode: VersusMode,
 }
 
