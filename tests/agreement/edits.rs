@@ -5,7 +5,7 @@ use touch2touch_work::io::masks::MaskStore;
 use super::*;
 
 #[test]
-fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
+pub(super) fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
     let path = folder.to_str().unwrap();
@@ -27,7 +27,7 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
     studio.send(LabelsCommand::EndStroke.into());
     studio.send(LabelsCommand::CleanUp(studio.state.settings.mask.clean_up(CleanKind::Smooth)).into());
-    let drawn = studio.state.drawn_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
+    let drawn = results::drawn_mask(&studio.state, ImprintSource::Measured, finger).unwrap().mask.clone();
     drop(studio);
     let stored =
         || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(finger).unwrap().mask.clone();

@@ -45,7 +45,10 @@ fn held(verb: &str) -> Option<Held> {
         ]),
         "ledger" => By(&[chain::a_random_recipe_has_the_same_depth_chain_in_the_pane_and_by_the_verb]),
         "stats" => By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same]),
-        "watch" => By(&[watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows]),
+        "watch" => By(&[
+            watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows,
+            watched::what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes,
+        ]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
         "sweep" => By(&[
             tables::a_random_dial_over_a_random_recipe_is_the_same_in_the_pane_and_by_the_verb,
@@ -63,7 +66,7 @@ fn held(verb: &str) -> Option<Held> {
         "basin" => By(&[posed::a_basin_map_is_the_same_in_the_pane_and_by_the_verb]),
         "label" => By(&[
             labels::random_edits_of_masks_by_hand_are_those_of_the_verb,
-            super::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
+            super::edits::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
         ]),
         "masks export" | "masks import" => {
             By(&[exchange::masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back])
@@ -85,7 +88,8 @@ fn held(verb: &str) -> Option<Held> {
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "training-data" => Not("only the training in Python reads it"),
         "doctor" => Not("it says of all pairs at once what the studio says of each when it is opened"),
-        "unit" | "read-as" => Not("it writes a word beside the data, which every reader reads"),
+        "unit" => By(&[files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb]),
+        "read-as" => Not("the studio offers no such button; what it writes every reader reads"),
         "bundle check" => Not("it looks at one model's files and computes nothing of a touch"),
         "cache" => Not("it counts and removes what can be made again"),
         "runtime" => Not("it says which engine is there, or fetches one"),

@@ -6,7 +6,7 @@ use std::sync::mpsc::Sender;
 
 use super::super::answers::Answer;
 use super::super::keys::DatasetSeq;
-use super::super::services::{DataSource, Followed};
+use super::super::source::{DataSource, Followed};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
 use touch2touch_work::error::TaskError;

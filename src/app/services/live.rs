@@ -8,11 +8,12 @@ use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::{PairLabels, Review};
-use super::super::library::state::Place;
 use super::super::services::Opened;
-use super::super::settings::state::{SETTINGS_VERSION, Settings};
-use super::{DataSource, Services};
+use super::super::source::DataSource;
+use super::super::state::labels::{PairLabels, Review};
+use super::super::state::library::Place;
+use super::super::state::settings::{SETTINGS_VERSION, Settings};
+use super::Services;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;
@@ -299,7 +300,7 @@ impl Services for LiveServices {
     ) -> Vec<(PredictionKey, Prediction)> {
         let keyed = |kept: KeptPrediction| {
             let bundle = kept.prediction.bundle.clone();
-            (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
+            (PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine }, kept.prediction)
         };
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }

@@ -3,6 +3,7 @@
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::ExportCommand;
 use touch2touch::app::export::Output;
+use touch2touch::app::{recipe, results};
 use touch2touch_work::case::{self, Case};
 use touch2touch_work::io::case_file;
 use touch2touch_work::mask::MaskSource;
@@ -25,7 +26,7 @@ pub(in crate::agreement) fn a_random_recipe_exports_the_same_files_by_button_and
             for (pane, source) in [Pane::SceneMeasured, Pane::ScenePredicted].into_iter().zip(ImprintSource::iter()) {
                 let what = format!("{} {source:?}, {recipe:?}", both.studio.state.pair_name());
                 let folder = both.home.parent().unwrap().join(format!("exported-{at}-{}", source.key()));
-                let there = both.studio.state.pose(source).ready().is_some();
+                let there = results::pose(&both.studio.state, source).ready().is_some();
                 both.studio.send(ExportCommand::Write(Output::Pair(source), folder.clone()).into());
                 let said = both.said(pane);
                 assert_eq!(there, said.is_ok(), "{what}: {said:?}");
@@ -74,6 +75,19 @@ pub(in crate::agreement) fn a_random_recipe_draws_the_same_pictures_by_button_an
     compared(&counts, 20_000);
 }
 
+#[test]
+pub(in crate::agreement) fn the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let [own, twin] = ["one", "other"].map(|name| lab_folder(&home.path().join(name)));
+    let mut both = Both::open(Place::Path(own.clone()), home.path());
+    let (tool, unit) = ("pattern_36", "m");
+    let named = LibraryCommand::ReadToolAs { tool: tool.into(), unit: unit.parse().unwrap(), replacing: None };
+    both.studio.send(named.into());
+    both.run(&["unit", twin.to_str().unwrap(), "--tool", tool, "--set", unit].map(str::to_owned)).unwrap();
+    let [shown, said] = [own, twin].map(|folder| std::fs::read_to_string(folder.join("tools_stls/unit.txt")).unwrap());
+    assert_eq!((shown.trim(), &shown), (unit, &said));
+}
+
 /// A case without what decides no result: how the studio showed it, and numbers of masks of another source.
 fn decisive(case: &Case) -> Value {
     let mut value = written(case);
@@ -105,7 +119,7 @@ pub(in crate::agreement) fn a_case_of_a_random_recipe_is_the_same_by_button_and_
         let by_studio = both.home.parent().unwrap().join("studio.t2tcase");
         both.studio.send(ExportCommand::Write(Output::Case, by_studio.clone()).into());
         let by_verb = both.at("verb.t2tcase");
-        let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
         let out = ["--out".to_owned(), by_verb.clone()];
         let said = both.of_pair(&["case", "make"], out.into_iter().chain(words));
         assert_eq!(by_studio.is_file(), said.is_ok(), "{what}: {said:?}");

@@ -4,9 +4,9 @@ use std::collections::BTreeSet;
 
 use glam::DVec3;
 
-use super::super::export::state::Output;
 use super::super::keys::ImprintSource;
 use super::super::pane::Pane;
+use super::export::Output;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 

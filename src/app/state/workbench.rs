@@ -6,13 +6,8 @@ use glam::DVec3;
 use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
-use super::super::pane::Demand;
-use super::super::state::State;
-use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::manual::{AcceptedPose, ManualCost, ManualPose, PoseDifference};
+use touch2touch_core::manual::{ManualCost, ManualPose};
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::propose::hand_pose;
 
 /// What colors the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -238,70 +233,5 @@ impl PoseOf {
     /// All rows of a rig's table.
     pub fn all(rig: &Rig) -> Vec<Self> {
         rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
-    }
-}
-
-impl State {
-    /// The true pose of the selected pair, `grasp_from_object`, where it is known.
-    pub fn truth(&self) -> Option<PlanarPose> {
-        self.sample().ready()?.grasp_from_object
-    }
-
-    /// The imprint that a pose is made from, where all fingers show the same.
-    pub(crate) fn shown_imprint(&self, source: ImprintSource) -> Option<ImprintOf> {
-        let rig = self.rig();
-        let mut of = rig.pads().filter_map(|pad| self.mask_place(source, pad)).map(|place| place.of);
-        let first = of.next()?;
-        of.all(|other| other == first).then_some(first)
-    }
-
-    /// The pose that was accepted of the imprint of the selected pair that is shown.
-    pub fn accepted(&self, source: ImprintSource) -> Option<AcceptedPose> {
-        self.document.pair(self.pair_name())?.accepted(&self.shown_imprint(source)?)
-    }
-
-    /// The other predictions of the selected pair that a pose was accepted of.
-    pub fn accepted_elsewhere(&self) -> Vec<&ImprintOf> {
-        let shown = self.shown_imprint(ImprintSource::Predicted);
-        let poses = self.document.pair(self.pair_name()).map(|labels| labels.accepted.keys());
-        let other = |of: &&ImprintOf| of.source() == ImprintSource::Predicted && **of != ImprintOf::unknown();
-        poses.into_iter().flatten().filter(other).filter(|of| Some(*of) != shown.as_ref()).collect()
-    }
-
-    /// The pose that a person set and accepted.
-    pub fn by_hand(&self, source: ImprintSource) -> Option<ManualPose> {
-        hand_pose(None, self.accepted(source))
-    }
-
-    /// Where the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
-    pub fn shown_pose(&self, source: ImprintSource) -> Option<ManualPose> {
-        let held = self.workbench.hand(source).map(|hand| hand.pose);
-        held.or_else(|| self.by_hand(source)).or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into()))
-    }
-
-    /// Where setting a pose by hand begins.
-    pub fn manual_begins(&self, source: ImprintSource) -> ManualPose {
-        let accepted = self.accepted(source).map(|a| a.pose);
-        accepted.or_else(|| Some(self.pose(source).shown()?.grasp_from_object.into())).unwrap_or_default()
-    }
-
-    /// Whether something on screen shows the layers of an imprint.
-    pub(crate) fn shows_layers(&self, source: ImprintSource) -> bool {
-        let bench = &self.workbench;
-        let in_scene = self.needs(Demand::Scene(source))
-            && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
-                || bench.picked.is_some_and(|picked| picked.source == source));
-        in_scene || (self.needs(Demand::Layers) && bench.side == source)
-    }
-
-    /// Whether a 3D view shows the distances between an imprint and the model.
-    pub(crate) fn shows_deviation(&self, source: ImprintSource) -> bool {
-        self.workbench.layer == Layer::Distance && self.needs(Demand::Scene(source))
-    }
-
-    /// How far the registered poses of measurement and prediction are apart, where both are there.
-    pub(crate) fn sides_apart(&self) -> Option<PoseDifference> {
-        let pose = |source| Some(self.pose(source).ready()?.grasp_from_object);
-        Some(PoseDifference::between(pose(ImprintSource::Measured)?, pose(ImprintSource::Predicted)?))
     }
 }

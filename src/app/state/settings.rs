@@ -10,14 +10,18 @@ use strum::EnumIter;
 
 use super::super::action::{Action, Bindings};
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
-use super::super::library::state::Place;
+use super::super::pane::Workspace;
+use super::library::Place;
 use scene::SceneLook;
+use touch2touch_core::colormap;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
 use touch2touch_core::postprocess::RefitShift;
 use touch2touch_core::units::clamp_or;
 use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
 use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::labels::system_person;
 pub use touch2touch_work::mask::{MaskChoice, MaskSource};
 pub use touch2touch_work::propose::ProposalSource;
 use touch2touch_work::repeats;
@@ -61,7 +65,8 @@ pub struct Settings {
     /// The mask tools.
     pub mask: MaskSettings,
     /// The registration.
-    pub pose_engine: RegistrationChoice,
+    #[serde(rename = "pose_engine")]
+    pub registration: RegistrationChoice,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
     /// What the predictions kept on the disk may take, MiB; 0 keeps none.
@@ -132,7 +137,7 @@ impl Default for Settings {
             refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
-            pose_engine: RegistrationChoice::default(),
+            registration: RegistrationChoice::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),
@@ -199,6 +204,46 @@ impl Settings {
         self.recent.truncate(MAX_RECENT);
         self
     }
+
+    /// Who labels: the name in the preferences, else whom the system says; empty where nobody knows.
+    pub fn labeler(&self) -> String {
+        let named = Some(self.person.trim()).filter(|name| !name.is_empty());
+        named.map(str::to_owned).or_else(system_person).unwrap_or_default()
+    }
+
+    /// Who labels; `None` where nobody knows.
+    pub(in crate::app) fn known_labeler(&self) -> Option<String> {
+        Some(self.labeler()).filter(|name| !name.is_empty())
+    }
+
+    /// What is compared with what in the workspace in front.
+    pub fn compared(&self) -> Versus {
+        self.versus.get(&self.workspace).cloned().unwrap_or_default()
+    }
+
+    /// How figures look, in the colors of the panes.
+    pub(in crate::app) fn figure_look(
+        &self,
+        panes: Vec<FigurePane>,
+        error_m: f32,
+        theme: FigureTheme,
+        scale: f64,
+    ) -> FigureLook {
+        let (range, window) = (self.range, self.footprint_visible);
+        let map = match self.color_map {
+            ColorMap::Viridis => colormap::ColorMap::Viridis,
+            ColorMap::Gray => colormap::ColorMap::Gray,
+        };
+        FigureLook {
+            panes,
+            map,
+            range: colormap::Range { lo: range.min_m, hi: range.max_m },
+            error_m,
+            theme,
+            window,
+            scale,
+        }
+    }
 }
 
 /// Colors of the window.
@@ -210,33 +255,6 @@ pub enum Theme {
     Dark,
     /// Dark on light.
     Light,
-}
-
-/// The four arrangements of the same panes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum Workspace {
-    /// Truth and prediction side by side.
-    #[default]
-    Inspect,
-    /// The cloud on the CAD.
-    Align,
-    /// Correcting masks.
-    Label,
-    /// Numbers.
-    Evaluate,
-}
-
-impl Workspace {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Inspect => "Inspect",
-            Self::Align => "Align",
-            Self::Label => "Label",
-            Self::Evaluate => "Evaluate",
-        }
-    }
 }
 
 /// The range of imprint depths that the color map spans, shared by all panes.

@@ -1,15 +1,10 @@
 //! What a training is asked for, and its last answer.
 
 use std::ops::RangeInclusive;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::super::state::State;
-use super::super::tasks::state::TaskKind;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::job::Curve;
-use touch2touch_work::train::{TrainChoice, TrainSetup, Trained};
+use touch2touch_work::train::{TrainChoice, Trained};
 use touch2touch_work::tuning::Tuning;
 
 /// Minutes that can be asked for.
@@ -66,42 +61,4 @@ pub struct TrainState {
     pub result: Option<Arc<Trained>>,
     /// Its bundle.
     pub bundle: Option<Arc<str>>,
-}
-
-impl State {
-    /// What a training started now would do; `None` without data or a mask model. Where the new bundle lies is not the
-    /// state's to say.
-    pub(crate) fn train_setup(&self) -> Option<TrainSetup> {
-        self.library.open.as_ref()?;
-        let generators = self.library.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator);
-        Some(TrainSetup {
-            start: self.bundle(BundleKind::Mask).ok()?.clone(),
-            generators: generators.cloned().collect(),
-            engine: self.settings.runtime,
-            choice: self.train.form.choice,
-            tuning: self.train.form.tuning(),
-            unfinished: None,
-            out: PathBuf::new(),
-        })
-    }
-
-    /// How the training goes, or how the last one went.
-    pub(crate) fn training_curves(&self) -> &[Curve] {
-        match (self.running(TaskKind::Train), &self.train.result) {
-            (Some((_, task)), _) => &task.progress.curves,
-            (None, Some(result)) => &result.curves,
-            (None, None) => &[],
-        }
-    }
-
-    /// The bundle that was trained on the open data set.
-    pub fn trained(&self) -> Option<&BundleInfo> {
-        self.library.bundle(self.train.bundle.as_deref()?)
-    }
-
-    /// Whether that makes the automatic masks now.
-    pub fn uses_trained(&self) -> bool {
-        let now = self.bundle(BundleKind::Mask).ok().map(|bundle| &bundle.id);
-        self.trained().is_some_and(|trained| Some(&trained.id) == now)
-    }
 }

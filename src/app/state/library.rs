@@ -8,16 +8,17 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::evaluate::state::TableState;
 use super::super::keys::{DatasetSeq, PairKey};
-use super::super::labels::state::Document;
-use super::super::services::DataSource;
-use super::super::state::State;
+use super::super::keys::{MaskRecipe, PredictionKey};
+use super::super::source::DataSource;
+use super::evaluate::TableState;
+use super::labels::Document;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
-use touch2touch_core::rig::Rig;
+use touch2touch_core::rig::{Rig, SensorKind};
 use touch2touch_work::bundles::{BundleInfo, BundleKind, by_id};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::filter::Filter;
+use touch2touch_work::prediction::made_with;
 
 /// What can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -223,6 +224,37 @@ impl Library {
         }
         self.order = order;
     }
+
+    /// True where what a generator predicts is a color picture.
+    pub(crate) fn predicts_color(&self, bundle: &str) -> bool {
+        let bundle = self.bundle(bundle).and_then(|bundle| bundle.generator.as_ref());
+        bundle.is_some_and(|generator| generator.sensors.output.kind == SensorKind::Color)
+    }
+
+    /// The name of the model that made a prediction.
+    pub(crate) fn model_name(&self, bundle: &str) -> &str {
+        let known = self.bundle(bundle).map(|bundle| &*bundle.name);
+        let lacking = self.lacking.as_ref().filter(|(id, _)| **id == *bundle).map(|(_, name)| &**name);
+        known.or(lacking).unwrap_or("a model that is not there any more")
+    }
+
+    /// True where the open case was made with this generator, and it is not here.
+    pub(in crate::app) fn lacks(&self, bundle: &str) -> bool {
+        self.lacking.as_ref().is_some_and(|(id, _)| **id == *bundle)
+    }
+
+    /// How a prediction was made, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
+    pub fn made_with(&self, recipe: &PredictionKey) -> String {
+        made_with(self.model_name(&recipe.bundle), &recipe.config)
+    }
+
+    /// The name of the mask model that a recipe takes; empty where it takes none.
+    pub(crate) fn mask_model(&self, recipe: &MaskRecipe) -> &str {
+        match recipe {
+            MaskRecipe::Unet(id, _) => self.bundle(id).map_or("", |bundle| &bundle.name),
+            _ => "",
+        }
+    }
 }
 
 /// A pair's name without its folder and without its tool, which is said beside it.
@@ -230,11 +262,4 @@ pub fn short_name(entry: &PairEntry) -> &str {
     let name = entry.name.rsplit('/').next().unwrap_or(&entry.name);
     let rest = entry.tool.as_deref().and_then(|tool| name.strip_prefix(tool)).map(|rest| rest.trim_start_matches('_'));
     rest.filter(|rest| !rest.is_empty()).unwrap_or(name)
-}
-
-impl State {
-    /// Recomputes the order of the list.
-    pub(in crate::app) fn reorder(&mut self) {
-        self.library.reorder(&self.document, &self.table);
-    }
 }

@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 
-use super::keys::Revision;
-use super::labels::state::{Document, DrawnMask, MaskPlace, Review};
+use super::super::keys::Revision;
+use super::labels::{Document, DrawnMask, MaskPlace, Review};
 use touch2touch_core::label::PackedMask;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_work::labels::ImprintOf;

@@ -4,8 +4,9 @@ use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 
 use super::super::jobs::Lane;
-use super::super::keys::{DatasetSeq, PredictionKey, Request};
-use super::super::state::State;
+use super::super::keys::DatasetSeq;
+use super::super::keys::PredictionKey;
+use super::super::state::results::Request;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
 
@@ -105,13 +106,16 @@ impl Tasks {
     pub fn is_idle(&self) -> bool {
         self.running.is_empty() && self.demanded.is_empty()
     }
-}
 
-impl State {
     /// What runs of a kind for the data set that is open.
-    pub fn running(&self, kind: TaskKind) -> Option<(Ticket, &Task)> {
-        let mut tasks = self.tasks.running.iter();
+    pub fn of_kind(&self, kind: TaskKind) -> Option<(Ticket, &Task)> {
+        let mut tasks = self.running.iter();
         tasks.find(|(_, task)| task.kind == kind && !task.outdated).map(|(ticket, task)| (*ticket, task))
+    }
+
+    /// Seeds that are still to come.
+    pub(crate) fn seeds_to_come(&self) -> usize {
+        self.demanded.iter().filter(|r| matches!(r, Request::Seed(_))).count()
     }
 }
 

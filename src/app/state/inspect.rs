@@ -2,11 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, PairKey, PoseBits, RegistrationChoice};
-use super::super::pane::Demand;
-pub(crate) use super::super::results::inspection::Inspection;
-use super::super::state::State;
-use super::super::workbench::state::Layer;
+use super::super::keys::{ImprintSource, Inspection, PairKey, PoseBits, RegistrationChoice};
 use touch2touch_core::align::TraceStep;
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
@@ -81,7 +77,7 @@ pub struct Pin {
     /// The imprint.
     pub source: ImprintSource,
     /// The registration.
-    pub engine: RegistrationChoice,
+    pub registration: RegistrationChoice,
     /// The start it belongs to.
     pub run: usize,
     /// Its position in the run.
@@ -114,30 +110,9 @@ impl Inspected<'_> {
     }
 }
 
-impl State {
-    /// The step that is looked at, of the run shown (also of the one before, while the next is computed).
-    pub fn inspected(&self) -> Option<Inspected<'_>> {
-        let inspection = self.inspection().shown()?;
-        let last_run = inspection.num_runs().checked_sub(1)?;
-        let run = self.inspect.run.unwrap_or(inspection.report().winner).min(last_run);
-        let last = inspection.num_steps(run).checked_sub(1)?;
-        let at = self.inspect.at.unwrap_or(last).min(last);
-        Some(Inspected { inspection, run, at, step: inspection.step(run, at)? })
-    }
-
-    /// Whether something on screen shows a step of an imprint's registration.
-    pub(crate) fn shows_steps(&self, source: ImprintSource) -> bool {
-        let lines = self.workbench.layer == Layer::Correspondences && self.needs(Demand::Scene(source));
-        self.inspect.source == source && (lines || self.needs(Demand::Steps))
-    }
-
-    /// The step that the 3D view of a side shows instead of the registered pose.
-    pub(crate) fn inspected_in(&self, source: ImprintSource) -> Option<Inspected<'_>> {
-        if self.shows_steps(source) { self.inspected() } else { None }
-    }
-
-    /// The kept steps of the selected pair.
-    pub fn pins(&self) -> [Option<Pin>; 2] {
-        self.inspect.pins.map(|pin| pin.filter(|p| Some(p.pair) == self.pair_key()))
+impl Inspect {
+    /// The kept steps of a pair.
+    pub fn pins_of(&self, pair: Option<PairKey>) -> [Option<Pin>; 2] {
+        self.pins.map(|pin| pin.filter(|p| Some(p.pair) == pair))
     }
 }
