@@ -26,7 +26,7 @@ use touch2touch_work::labels::Recovered;
 use touch2touch_work::models::{GenerateInput, Models};
 use touch2touch_work::prediction::Prediction;
 
-/// The yield of opening a data set.
+/// A data set that was opened.
 #[derive(Clone)]
 pub struct Opened {
     /// The data.

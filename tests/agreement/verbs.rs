@@ -66,7 +66,7 @@ fn held(verb: &str) -> Option<Held> {
         "basin" => By(&[posed::a_basin_map_is_the_same_in_the_pane_and_by_the_verb]),
         "label" => By(&[
             labels::random_edits_of_masks_by_hand_are_those_of_the_verb,
-            super::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
+            super::edits::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
         ]),
         "masks export" | "masks import" => {
             By(&[exchange::masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back])
