@@ -104,7 +104,7 @@ enum Verb {
     /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
     /// `python -m training.train` reads.
     TrainingData(Box<training_data::TrainingDataArgs>),
-    /// Where starts of the registration lead, for one pair: the numbers behind the basin map.
+    /// Poses that many starts of the registration lead to, for one pair: the numbers behind the basin map.
     Basin(Box<basin::BasinArgs>),
     /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
     Label(Box<label::LabelArgs>),
@@ -146,10 +146,10 @@ struct ToolArgs {
     tool_scale: Option<ToolScale>,
 }
 
-/// What a verb hands back: whether everything asked for was done.
+/// Result of a verb: true where everything asked for was done.
 pub type VerbResult = anyhow::Result<bool>;
 
-/// What the shell makes of a program that writes into a pipe nobody reads any more.
+/// Exit code that the shell gives a program that writes into a pipe nobody reads any more.
 const PIPE_CLOSED: u8 = 141;
 
 /// Parses the arguments and runs the verb or the window.
@@ -174,10 +174,10 @@ pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
     }
 }
 
-/// Whether a command line, the program's name first, is understood; nothing is run, opened or looked for.
+/// Checks that a command line, the program's name first, is understood; nothing is run, opened or looked for.
 ///
 /// # Errors
-/// What the program would say.
+/// The message that the program would print.
 pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
     let arguments = arguments.into_iter().map(Into::into).collect();
     match Cli::try_parse_from(args::JsonArgs::with_equals(arguments)) {
@@ -190,7 +190,7 @@ pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Ite
 /// The recipe of a command line of `pose`, the program's name first, for the sensors of `rig`; nothing is predicted.
 ///
 /// # Errors
-/// What the program would say.
+/// The message that the program would print.
 pub fn recipe_of<T: Into<OsString> + Clone>(
     arguments: impl IntoIterator<Item = T>,
     rig: &Rig,
@@ -201,7 +201,7 @@ pub fn recipe_of<T: Into<OsString> + Clone>(
     }
 }
 
-/// What is asked for; `None` where it was only help or the version, which has been printed.
+/// Command line, parsed; `None` where it was only help or the version, which has been printed.
 fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option<Cli>> {
     let arguments: Vec<OsString> = arguments.into_iter().collect();
     // Before the parser, which takes any word for a path and complains about what follows it.

@@ -13,6 +13,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use touch2touch::app::settings::prefer;
+use touch2touch::app::{export, results};
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
@@ -40,6 +41,7 @@ use touch2touch_work::export::{ExportChoice, Which};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::images;
+use touch2touch_work::io::masks::MaskStore;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
@@ -249,7 +251,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
         for source in ImprintSource::iter() {
             let case = poses["cases"].as_array().unwrap().iter();
             let case = case.filter(|case| case["name"] == name && case["imprint"] == source.key()).collect::<Vec<_>>();
-            let Lookup::Ready(pose) = state.pose(source) else {
+            let Lookup::Ready(pose) = results::pose(state, source) else {
                 assert!(
                     case.is_empty() || case[0]["angle_deg"].is_null(),
                     "{name} {source:?}: only the verb has a pose"
@@ -264,7 +266,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
             *compared.entry(case[0]["mask"].as_str().unwrap().to_owned()).or_default() += 1;
         }
         for finger in state.rig().pads() {
-            let Lookup::Ready(found) = state.comparison(finger) else { continue };
+            let Lookup::Ready(found) = results::comparison(state, finger) else { continue };
             let key = state.finger_name(finger).to_string();
             let row = generated["pairs"].as_array().unwrap().iter();
             let row = row.filter(|row| row["name"] == name && row["finger"] == key.as_str()).collect::<Vec<_>>();
@@ -330,7 +332,7 @@ fn two_predictions_are_compared_by_one_function() {
             ("b", [&versus.b, &Subject::Measured]),
             ("a_b", [&versus.a, &versus.b]),
         ] {
-            let found = state.subjects_compared(one, other, pad).ready().expect(key);
+            let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
             let seen = found.split.and_then(|split| split.seen.mae);
             assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
             assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
@@ -339,7 +341,7 @@ fn two_predictions_are_compared_by_one_function() {
         }
     }
     for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
-        let pose = state.subject_pose(subject).expect("a pose");
+        let pose = results::subject_pose(state, subject).expect("a pose");
         assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
     }
 }
@@ -528,7 +530,7 @@ fn a_dial_does_the_same_in_both() {
     {
         studio.send(DialCommand::Choose(dial).into());
         studio.send(DialCommand::Range(range, count).into());
-        let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+        let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
         studio.send(DialCommand::Start.into());
         let found = studio.state.dial.result.clone().expect("the dial was turned");
         let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
@@ -543,7 +545,7 @@ fn a_dial_does_the_same_in_both() {
     let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs[1].name.clone();
     studio.send(LibraryCommand::SetFilter(listed.clone()).into());
     studio.send(DialCommand::Over(DialPairs::Listed).into());
-    let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
     studio.send(DialCommand::Start.into());
     let found = studio.state.dial.result.clone().expect("the dial was turned");
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
@@ -557,14 +559,14 @@ fn a_dial_does_the_same_in_both() {
     studio.send(DialCommand::Use(Dial::Gate.parse("0.6").unwrap()).into());
     studio.send(DialCommand::Use(Dial::Threshold.parse("4").unwrap()).into());
     studio.predict(0);
-    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
     for said in ["--engine distance_field:gate=0.6", "--mask threshold --threshold-mm 4"] {
         assert!(words.join(" ").contains(said), "{words:?}");
     }
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
     let report = json(&words, home.path());
     for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
-        let shown = studio.state.pose(source).ready().unwrap();
+        let shown = results::pose(&studio.state, source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
@@ -581,7 +583,7 @@ fn every_pane_says_a_command_that_the_program_understands() {
             let choice = MaskChoice { source, ..MaskChoice::default() };
             studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
             for pane in Pane::iter() {
-                let Some(words) = studio.state.equivalent_words(pane, 0.004) else { continue };
+                let Some(words) = export::equivalent_words(&studio.state, pane, 0.004) else { continue };
                 said += 1;
                 if let Err(err) = touch2touch::headless::check_command(&words) {
                     panic!("{pane:?}: {words:?}: {err}");
@@ -594,18 +596,18 @@ fn every_pane_says_a_command_that_the_program_understands() {
     studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
     studio.send(prefer(|s| s.mask = MaskSettings::default()).into());
     studio.predict(3);
-    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
     let report = json(&words, home.path());
     for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
-        let shown = studio.state.pose(source).ready().unwrap();
+        let shown = results::pose(&studio.state, source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
 
 /// The value of an option in the command of a pane.
 fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
-    let words = studio.state.equivalent_words(pane, 0.004)?;
+    let words = export::equivalent_words(&studio.state, pane, 0.004)?;
     touch2touch::headless::check_command(&words).unwrap();
     let at = words.iter().position(|word| word == option)?;
     words.get(at + 1).cloned()
@@ -635,7 +637,7 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), Some(listed.join(",")));
     // Nothing is marked done: there is nothing to fit, and no command for it.
     studio.send(AdaptCommand::Choose(AdaptPairs::Done).into());
-    assert_eq!(studio.state.equivalent_words(Pane::Adapt, 0.004), None);
+    assert_eq!(export::equivalent_words(&studio.state, Pane::Adapt, 0.004), None);
 }
 
 #[test]
@@ -661,7 +663,7 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
     studio.send(LabelsCommand::EndStroke.into());
     studio.send(LabelsCommand::CleanUp(studio.state.settings.mask.clean_up(CleanKind::Smooth)).into());
-    let drawn = studio.state.drawn_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
+    let drawn = results::drawn_mask(&studio.state, ImprintSource::Measured, finger).unwrap().mask.clone();
     drop(studio);
     let stored =
         || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(finger).unwrap().mask.clone();
@@ -674,6 +676,14 @@ fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     json(&[&begun[..], &draw[..]].concat(), home.path());
     assert_eq!(stored(), drawn, "by the verb");
     assert!(drawn.as_slice().contains(&true));
+    // The journal says the same of both: what was done one after the other, each with its numbers.
+    let store = MaskStore::for_dataset(&Dataset::open(&folder).unwrap()).unwrap();
+    let journal = String::from_utf8(store.journal(&name).unwrap()).unwrap();
+    let lines = journal.lines().map(|line| serde_json::from_str::<Value>(line).unwrap());
+    let deeds: Vec<(Value, Value)> = lines.map(|line| (line["name"].clone(), line["how"].clone())).collect();
+    let [by_hand, by_verb] = [&deeds[..3], &deeds[4..]];
+    assert_eq!((by_hand, &deeds[3].0), (by_verb, &"correction removed".into()));
+    assert_eq!(by_hand[0].0, "polygon");
     // The mask of a prediction is another one, until it is taken over.
     let of_prediction = ["--imprint", "predicted", "--from", "measured", "--steps", "1"];
     let labeled = json(&[&begun[..], &of_prediction[..]].concat(), home.path());

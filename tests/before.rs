@@ -4,9 +4,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde_json::Value;
+use sha2::{Digest as _, Sha256};
 use touch2touch::app::command::{Command, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
+use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
@@ -74,11 +76,11 @@ fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
     runtime
         .tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::ScenePredicted].into()))]);
     runtime.settle(&mut state);
-    let shown = state.chosen(lab::RIGHT).expect("it is predicted by itself");
-    assert_eq!((shown.steps, shown.config().eta, state.outdated(lab::RIGHT)), (2, 0.1, None));
-    assert!(state.drawn_mask(ImprintSource::Predicted, lab::RIGHT).is_some());
-    assert!(state.by_hand(ImprintSource::Predicted).is_some());
-    state.accepted_elsewhere().len()
+    let shown = results::chosen(&state, lab::RIGHT).expect("it is predicted by itself");
+    assert_eq!((shown.config.steps, shown.config.eta, results::outdated(&state, lab::RIGHT)), (2, 0.1, None));
+    assert!(results::drawn_mask(&state, ImprintSource::Predicted, lab::RIGHT).is_some());
+    assert!(results::by_hand(&state, ImprintSource::Predicted).is_some());
+    results::accepted_elsewhere(&state).len()
 }
 
 #[test]
@@ -102,6 +104,56 @@ fn a_mask_on_a_prediction_is_found_by_what_decided_the_prediction() {
         assert_eq!(pose(&["--seed", "7"])["mask"], "top_percent", "another prediction has its own");
         assert_eq!(in_studio(dir.path(), &places), 0);
     }
+}
+
+/// A bundle of another name and note, written anew in another folder.
+fn rebuilt(bundle: &Path, dir: &Path) -> PathBuf {
+    let to = dir.join("rebuilt");
+    std::fs::create_dir(&to).unwrap();
+    for entry in std::fs::read_dir(bundle).unwrap() {
+        let file = entry.unwrap().path();
+        std::fs::copy(&file, to.join(file.file_name().unwrap())).unwrap();
+    }
+    let manifest = to.join("manifest.json");
+    let mut keys: Value = serde_json::from_slice(&std::fs::read(&manifest).unwrap()).unwrap();
+    keys["name"] = "the same again".into();
+    keys["provenance"] = serde_json::json!({"note": "written anew"});
+    std::fs::write(&manifest, serde_json::to_vec(&keys).unwrap()).unwrap();
+    to
+}
+
+#[test]
+fn what_was_drawn_and_kept_under_a_bundle_is_found_when_it_was_written_anew() {
+    let dir = tempfile::tempdir().unwrap();
+    let [set, bundle] = labeled(dir.path(), str::to_owned);
+    // As an earlier build filed it: under the digest of the manifest's text.
+    let id = bundles::open("test", bundle.as_path()).unwrap().id;
+    let text = std::fs::read(bundle.join("manifest.json")).unwrap();
+    let digest: String = Sha256::digest(&text).iter().map(|byte| format!("{byte:02x}")).collect();
+    assert_ne!(*id, *digest);
+    for entry in std::fs::read_dir(set.join("touch2touch_masks")).unwrap() {
+        let file = entry.unwrap().path();
+        let named = std::fs::read_to_string(&file).unwrap().replace(&*id, &digest);
+        std::fs::write(&file, named).unwrap();
+    }
+    let again = rebuilt(&bundle, dir.path());
+    let pose = |bundle: &Path| -> Value {
+        let fixed = ["pose", set.to_str().unwrap(), "--imprint", "predicted", "--mask", "top_percent", "--json"];
+        let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
+        let done = run(&[&fixed[..], &choices, &["--bundle", bundle.to_str().unwrap()]].concat(), dir.path());
+        serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
+    };
+    let found = pose(&bundle);
+    assert_eq!(found["mask"], "hand, top_percent", "{found:#}");
+    assert_eq!(in_studio(dir.path(), &[set.clone(), bundle.clone()]), 0);
+    // One pair as a verb of this build writes it, then the rebuilt bundle.
+    let name = "test_only/pattern_36_data_0";
+    let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
+    let label = ["label", set.to_str().unwrap(), "--pair", name, "--note", "again", "--bundle"];
+    assert!(run(&[&label[..], &[bundle.to_str().unwrap()], &choices].concat(), dir.path()).status.success());
+    let rebuilt = pose(&again);
+    assert_eq!([&rebuilt["mask"], &rebuilt["angle_deg"]], [&found["mask"], &found["angle_deg"]], "{rebuilt:#}");
+    assert_eq!(in_studio(dir.path(), &[set, again]), 0);
 }
 
 #[test]
@@ -193,7 +245,12 @@ fn a_kept_prediction_is_found() {
     let dir = tempfile::tempdir().unwrap();
     let store = Store::new(fixture("predictions", dir.path()), DEFAULT_BUDGET);
     let config = GenerateConfig { steps: 2, eta: 0.1, ..GenerateConfig::default() };
-    let key = |config| KeptKey::new("ab".repeat(32), "cd".repeat(32), EngineKind::Rten, config);
+    let key = |config: &GenerateConfig| KeptKey {
+        input: "ab".repeat(32),
+        bundle: "cd".repeat(32),
+        engine: EngineKind::Rten,
+        config: *config,
+    };
     let found = store.get(&key(&config)).expect("it is found by all that decides it");
     assert_eq!((found.raw.channels.len(), found.raw.channels[2][(3, 1)], found.seconds), (3, 213.0 / 7.0, 0.5));
     assert!(store.get(&key(&GenerateConfig { eta: 0.2, ..config })).is_none());

@@ -25,6 +25,7 @@ use touch2touch_work::job::{Cancel, JobCx};
 use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Revision};
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
+use touch2touch_work::recipe::Recipe;
 
 fn write(root: &Path, grasps: std::ops::Range<u64>) {
     let tools = &catalog::tools()[..2];
@@ -44,7 +45,10 @@ fn setup() -> Setup {
     Setup {
         bundles: vec![bundle("generator")],
         classifier: Some(bundle("classifier")),
-        mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+        recipe: Recipe {
+            mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
+            ..Recipe::default()
+        },
         resamples: 50,
         ..Setup::default()
     }
@@ -115,7 +119,8 @@ fn a_second_evaluation_computes_nothing_and_says_the_same() {
     let copy = folder.path().join("copy");
     write(&copy, 0..3);
     assert_eq!(run(&copy, &setup(), &cache).1, 0, "the same content elsewhere");
-    let other = Setup { mask: MaskChoice { threshold_m: 0.004, ..setup().mask }, ..setup() };
+    let mask = MaskChoice { threshold_m: 0.004, ..setup().recipe.mask };
+    let other = Setup { recipe: Recipe { mask, ..Recipe::default() }, ..setup() };
     assert!(known(&dataset, &other, &models(&cache)).unwrap().iter().all(|s| s.grasps.is_empty()));
 }
 
@@ -170,7 +175,11 @@ fn what_was_changed_or_damaged_is_computed_again() {
     let (hand, fresh) = run(&data, &setup(), &cache);
     assert_eq!(fresh, 1);
     assert_ne!(hand.scores[0].grasps[0].angle_error_rad, cold.scores[0].grasps[0].angle_error_rad);
-    assert_eq!(run(&data, &Setup { hand: false, ..setup() }, &cache).1, 0, "left out, as before it was drawn");
+    assert_eq!(
+        run(&data, &Setup { recipe: Recipe { hand: false, ..setup().recipe }, ..setup() }, &cache).1,
+        0,
+        "left out, as before it was drawn"
+    );
     labels.save(&name, &PairLabels::default(), &Operation::default()).unwrap();
     assert_eq!(run(&data, &setup(), &cache).1, 0, "taken back");
     // A touch.

@@ -16,6 +16,7 @@ use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 
 use rand::{Rng, SeedableRng};
@@ -261,8 +262,8 @@ fn start(mut runtime: Runtime, folder: &Path) -> (Runtime, State) {
 /// Whether the selected pair can be drawn on: everything a stroke starts from is there.
 fn ready(state: &State) -> bool {
     let known = |finger| {
-        let mask = state.mask_in_force(ImprintSource::Measured, finger);
-        let imprint = state.imprint(ImprintSource::Measured, finger).ready().is_some();
+        let mask = results::mask_in_force(state, ImprintSource::Measured, finger);
+        let imprint = results::imprint(state, ImprintSource::Measured, finger).ready().is_some();
         imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)))
     };
     state.entry().is_some() && state.document.is_editable(state.pair_name()) && lab::PADS.into_iter().all(known)

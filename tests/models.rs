@@ -504,7 +504,7 @@ mod running {
         let generator = Generator::open(&bundle, EngineChoice::Rten).unwrap();
         let recipe = generator.recipe("the digest of an image".into(), &config());
         assert_eq!((recipe.bundle.as_str(), recipe.engine), (bundle.hash(), EngineKind::Rten));
-        assert_eq!(recipe.config(), config());
+        assert_eq!(recipe.config, config());
     }
 }
 

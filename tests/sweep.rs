@@ -79,7 +79,7 @@ fn the_poses_are_those_of_the_results_table_bit_for_bit() {
         let Recipe { mask, .. } = found.series[0].points[at].value.unwrap().put(&found.in_force).unwrap();
         let table = Setup {
             bundles: vec![Origin::from(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator"))],
-            mask,
+            recipe: Recipe { mask, ..Recipe::default() },
             resamples: 0,
             ..Setup::default()
         };

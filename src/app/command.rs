@@ -14,10 +14,10 @@ pub use super::predict::PredictCommand;
 pub use super::seeds::SeedsCommand;
 pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
+pub use super::state::view::{CameraPreset, Hover, UiRequest};
 pub use super::tasks::TasksCommand;
 pub use super::train::TrainCommand;
 pub use super::view::ViewCommand;
-pub use super::view::state::{CameraPreset, Hover, UiRequest};
 pub use super::workbench::WorkbenchCommand;
 
 macro_rules! commands {

@@ -1,12 +1,11 @@
 //! The room of a followed folder: what arrives is listed, and the newest is shown and predicted.
 
 use super::effect::Effect;
-use super::keys::Request;
-use super::library::state::Follow;
-use super::results::Results;
-use super::services::Followed;
+use super::source::Followed;
 use super::state::State;
-use super::tasks::state::Ticket;
+use super::state::library::Follow;
+use super::state::results::{Request, Results};
+use super::state::tasks::Ticket;
 use super::{library, predict};
 use touch2touch_work::error::TaskError;
 

@@ -1,9 +1,7 @@
 //! The room of the open data set and its list.
 
-pub mod state;
-
-pub(crate) use state::OpenDataset;
-pub use state::{Follow, Library, Place, Sort, short_name};
+pub(crate) use super::state::library::OpenDataset;
+pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -12,14 +10,16 @@ use std::sync::Arc;
 use super::adapt::AdaptState;
 use super::dial::DialState;
 use super::effect::{Access, Effect, Errand};
-use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
-use super::labels::state::{Document, Review};
-use super::results::{Request, Results};
-use super::services::{DataSource, Opened};
-use super::settings::state::MAX_RECENT;
+use super::services::Opened;
+use super::source::DataSource;
 use super::state::State;
-use super::tasks::state::{Level, TaskKind};
+use super::state::evaluate::ScoreChoice;
+use super::state::labels::{Document, Review};
+use super::state::results::Request;
+use super::state::results::Results;
+use super::state::settings::MAX_RECENT;
+use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
@@ -354,7 +354,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     labels::end_stroke(state, effects);
     // What is being written goes on; what could not be would be forgotten.
     let failed = state.document.failed.clone();
-    let unsaved: Vec<_> = state.unsaved().into_iter().filter(|one| failed.contains_key(&one.name)).collect();
+    let unsaved: Vec<_> = labels::unsaved(state).into_iter().filter(|one| failed.contains_key(&one.name)).collect();
     if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
         effects.push(Effect::keep_waiting(open.source.clone(), unsaved));
     }

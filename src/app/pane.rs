@@ -1,8 +1,38 @@
 //! [`Pane`]: the panes of the window, one row each. Titles, menus, default places, what is drawn by which file of the
 //! window and what is computed while a pane is on screen all follow from its row.
 
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
 use super::keys::ImprintSource;
-use super::settings::state::Workspace;
+use touch2touch_work::figure::FigurePane;
+
+/// The four arrangements of the same panes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Workspace {
+    /// Truth and prediction side by side.
+    #[default]
+    Inspect,
+    /// The cloud on the CAD.
+    Align,
+    /// Correcting masks.
+    Label,
+    /// Numbers.
+    Evaluate,
+}
+
+impl Workspace {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inspect => "Inspect",
+            Self::Align => "Align",
+            Self::Label => "Label",
+            Self::Evaluate => "Evaluate",
+        }
+    }
+}
 
 /// What a pane shows, as far as mouse, colors and links between panes depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -289,6 +319,27 @@ impl Pane {
         let of_all =
             |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::LabelStats | Demand::Training);
         self.needs().iter().any(|need| !of_all(need))
+    }
+}
+
+impl Pane {
+    /// The name that a picture of it is offered under.
+    pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
+        let name = self.title().to_lowercase().replace(' ', "-");
+        format!("{name}.{}", if pixels { "png" } else { "svg" })
+    }
+
+    /// The column of a figure that shows the same; `None` for panes that are no pictures.
+    pub(crate) fn in_figure(self) -> Option<FigurePane> {
+        Some(match (self, self.kind()) {
+            (Self::GelDifference, _) => FigurePane::GelSlim,
+            (Self::GelRaw, _) => FigurePane::Raw,
+            (Self::GelReference, _) => FigurePane::Reference,
+            (_, Kind::Imprint(ImprintSource::Measured)) => FigurePane::Measured,
+            (_, Kind::Imprint(ImprintSource::Predicted)) => FigurePane::Predicted,
+            (Self::Error, _) => FigurePane::Error,
+            _ => return None,
+        })
     }
 }
 

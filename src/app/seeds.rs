@@ -1,9 +1,8 @@
 //! The room of several seeds of one touch.
 
-pub mod state;
+pub use super::state::seeds::{COUNT, Seeds};
 
-pub use state::{COUNT, Seeds};
-
+use super::results;
 use super::state::State;
 
 /// What can be done with seeds.
@@ -20,7 +19,7 @@ pub enum SeedsCommand {
 pub(super) fn step(state: &mut State, command: SeedsCommand) {
     match command {
         SeedsCommand::Count(count) => state.seeds.count = count.clamp(*COUNT.start(), *COUNT.end()),
-        SeedsCommand::Run(true) => state.seeds.asked = state.seeds_of(),
+        SeedsCommand::Run(true) => state.seeds.asked = results::seeds_of(state),
         SeedsCommand::Run(false) => (state.seeds.asked, state.seeds.every) = (None, false),
         SeedsCommand::EveryPair(every) => state.seeds.every = every,
     }

@@ -2,26 +2,44 @@
 
 use std::sync::Arc;
 
-use super::adapt::state::AdaptState;
-use super::dial::state::DialState;
-use super::evaluate::state::TableState;
-use super::export::state::ExportState;
-use super::history::History;
-use super::inspect::state::Inspect;
+pub mod adapt;
+pub mod cache;
+pub mod dial;
+pub mod evaluate;
+pub mod export;
+pub mod history;
+pub mod inspect;
+pub mod labels;
+pub mod library;
+pub mod results;
+pub mod seeds;
+pub mod settings;
+pub mod shown;
+pub mod tasks;
+pub mod train;
+pub mod view;
+pub mod workbench;
+
 use super::keys::{PairKey, TouchKey};
-use super::labels::state::Document;
-use super::library::state::Library;
 use super::pane::Demand;
-use super::results::Results;
-use super::seeds::state::Seeds;
-use super::settings::state::Settings;
-use super::tasks::state::{Log, Tasks};
-use super::train::state::TrainState;
-use super::view::state::Selection;
-use super::workbench::state::Workbench;
+use adapt::AdaptState;
+use dial::DialState;
+use evaluate::TableState;
+use export::ExportState;
+use history::History;
+use inspect::Inspect;
+use labels::Document;
+use library::Library;
+use results::{Cached, Request, Results};
+use seeds::Seeds;
+use settings::Settings;
+use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
 use touch2touch_core::rig::{PadId, Rig, Text};
 use touch2touch_work::error::TaskError;
+use train::TrainState;
+use view::Selection;
+use workbench::Workbench;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]
@@ -118,6 +136,41 @@ impl State {
     /// Whether a pane on screen shows something of the selected pair.
     pub(super) fn shows_pair(&self) -> bool {
         self.selection.panes.iter().any(|pane| pane.is_of_pair())
+    }
+
+    /// The result of a recipe, or what stands in its place.
+    pub(crate) fn look<K: Cached>(&self, key: K) -> Lookup<'_, Arc<K::Value>> {
+        self.look_or(Ok(Some(key)), || None)
+    }
+
+    /// The result of a recipe that may be unknown still, or not be possible; meanwhile the one before.
+    pub(crate) fn look_or<'a, K: Cached>(
+        &'a self,
+        key: Result<Option<K>, Absent>,
+        before: impl FnOnce() -> Option<&'a Arc<K::Value>>,
+    ) -> Lookup<'a, Arc<K::Value>> {
+        let key = match key {
+            Ok(key) => key,
+            Err(absent) => return Lookup::Absent(absent),
+        };
+        if let Some(value) = key.as_ref().and_then(|key| K::cache(&self.results).get(key)) {
+            return Lookup::Ready(value);
+        }
+        match (key.and_then(|key| self.failure(key)), before()) {
+            (Some(err), _) => Lookup::Failed(err),
+            (None, Some(before)) => Lookup::Stale(before),
+            (None, None) => Lookup::Waiting,
+        }
+    }
+
+    /// Why a result could not be computed, if that was tried.
+    pub(crate) fn failure(&self, request: impl Into<Request>) -> Option<&TaskError> {
+        self.tasks.failed.get(&request.into())
+    }
+
+    /// Recomputes the order of the list.
+    pub(in crate::app) fn reorder(&mut self) {
+        self.library.reorder(&self.document, &self.table);
     }
 }
 

@@ -55,13 +55,13 @@ impl Gpu {
         Self { device, queue, samples: if software { 1 } else { max_samples }, software, storage, max_samples, adapter }
     }
 
-    /// The same device with the smoothest edges it can draw, for figures.
+    /// Device with the smoothest edges it can draw, for figures.
     pub fn smooth(&self) -> Self {
         Self { samples: self.max_samples, ..self.clone() }
     }
 
-    /// What the window asks an adapter for. Of a GL driver all that it has: the toolkit asks such a driver for what a browser
-    /// has, and that is no storage buffers.
+    /// Limits that the window asks an adapter for. Of a GL driver all that it has: the toolkit asks such a driver for
+    /// what a browser has, and that is no storage buffers.
     pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let required_limits = match adapter.get_info().backend {
             wgpu::Backend::Gl => adapter.limits(),

@@ -11,7 +11,7 @@ use super::vertex::{CREASE_RAD, place};
 use super::{Gpu, GpuError, view, wgpu};
 use touch2touch_core::mesh::TriMesh;
 
-/// How the edges of a mesh are drawn.
+/// Style of the edges of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EdgeStyle {
     /// sRGB, 0..1.
@@ -20,7 +20,7 @@ pub struct EdgeStyle {
     pub opacity: f32,
     /// Physical pixels.
     pub width_px: f32,
-    /// Whether creases are drawn, or the silhouette and borders alone.
+    /// True where creases are drawn, else the silhouette and borders alone.
     pub creases: bool,
 }
 
@@ -108,18 +108,18 @@ fn edges(mesh: &TriMesh) -> Vec<EdgeVertex> {
     const CREASE: u32 = 1;
     const BORDER: u32 = 2;
     let corner = |i: &u32| mesh.vertices.get(*i as usize).copied().filter(|p| p.is_finite());
-    let mut found: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
+    let mut index_of: HashMap<[[u64; 3]; 2], usize> = HashMap::new();
     let mut list: Vec<([DVec3; 2], Vec<DVec3>)> = Vec::new();
     for t in &mesh.triangles {
         let [Some(a), Some(b), Some(c)] = t.map(|i| corner(&i)) else { continue };
         let Some(normal) = (b - a).cross(c - a).try_normalize() else { continue };
         for (p, q) in [(a, b), (b, c), (c, a)] {
             let (p, q) = if place(p) <= place(q) { (p, q) } else { (q, p) };
-            let at = *found.entry([place(p), place(q)]).or_insert_with(|| {
+            let index = *index_of.entry([place(p), place(q)]).or_insert_with(|| {
                 list.push(([p, q], Vec::new()));
                 list.len() - 1
             });
-            list[at].1.push(normal);
+            list[index].1.push(normal);
         }
     }
     let vertex = |([a, b], normals): ([DVec3; 2], Vec<DVec3>)| {

@@ -31,7 +31,7 @@ pub struct Segment {
     pub rgba: [u8; 4],
 }
 
-/// How lines look and where they are.
+/// Style and pose of lines.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinesStyle {
     /// From the lines' frame to the world (the grasp frame).

@@ -24,7 +24,7 @@ pub struct MeshItem {
     pub revision: u64,
     /// Meters, in its own frame. Triangles with a corner that does not exist or is not finite are left out.
     pub mesh: Arc<TriMesh>,
-    /// How normals are made.
+    /// Shading: how normals are made.
     pub shading: Shading,
     /// A value per vertex, shown through [`MeshStyle::map`] and [`MeshStyle::range`] where it is finite; empty for none.
     pub values: Arc<[f32]>,
@@ -32,7 +32,7 @@ pub struct MeshItem {
     pub style: MeshStyle,
 }
 
-/// How normals are made.
+/// Shading: how normals are made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Shading {
     /// Every triangle by itself.
@@ -42,7 +42,7 @@ pub enum Shading {
     Smooth,
 }
 
-/// What a mesh does to the things behind it.
+/// Effect of a mesh on the things behind it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Look {
     /// Hides them, or tints them where the opacity is below 1.
@@ -54,7 +54,7 @@ pub enum Look {
     Outline,
 }
 
-/// How a mesh looks and where it is.
+/// Style and pose of a mesh.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeshStyle {
     /// From the mesh's frame (the object frame) to the world (the grasp frame). A rigid motion.
@@ -65,13 +65,13 @@ pub struct MeshStyle {
     pub opacity: f32,
     /// Solid, x-ray, or edges alone.
     pub look: Look,
-    /// Its edges, if they are drawn.
+    /// Style of its edges, if they are drawn.
     pub edges: Option<EdgeStyle>,
     /// For [`MeshItem::values`].
     pub map: ColorMap,
     /// For [`MeshItem::values`].
     pub range: Range,
-    /// Whether the surface has an inside: what a plane lays open is then filled.
+    /// True where the surface has an inside: what a plane lays open is then filled.
     pub closed: bool,
 }
 
@@ -106,7 +106,7 @@ pub(super) struct MeshUniform {
     pub(super) unused_1: u32,
 }
 
-/// How bright a surface is, 0..1, for a unit normal towards the eye, with the directions of the camera. Twin of the
+/// Brightness of a surface, 0..1, for a unit normal towards the eye, with the directions of the camera. Twin of the
 /// function in `shaders/mesh.wgsl`.
 pub fn light_on(normal: DVec3, camera: &Camera) -> f64 {
     let [_, up, _] = camera.axes();
@@ -171,8 +171,8 @@ impl MeshData {
         let old = data.edges.take();
         if let Some(edges) = &style.edges {
             let what = (item.name.as_str(), item.revision, &*item.mesh);
-            let (found, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
-            data.edges = Some(found);
+            let (edge_data, [list, numbers]) = EdgeData::update(gpu, pipelines, old, what, (world_from_mesh, edges))?;
+            data.edges = Some(edge_data);
             did = [did[0] | list, did[1] | numbers];
         }
         Ok((data, did))

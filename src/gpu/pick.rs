@@ -1,4 +1,4 @@
-//! Which point is under the pointer, found on the CPU: exact, and the same on every machine.
+//! Picking: the point under the pointer, found on the CPU: exact, and the same on every machine.
 
 use glam::{DAffine3, DVec2, DVec3};
 
@@ -7,11 +7,11 @@ use super::view::{Camera, Projector};
 /// A picked point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Its index in the cloud.
+    /// Index in the cloud.
     pub index: usize,
-    /// Its distance from the pointer on the screen, pixels.
+    /// Distance from the pointer on the screen, pixels.
     pub distance_px: f64,
-    /// Its distance in front of the eye, meters; smaller is nearer.
+    /// Distance in front of the eye, meters; smaller is nearer.
     pub depth_m: f64,
 }
 
@@ -32,8 +32,8 @@ pub fn nearest_point(
         .iter()
         .enumerate()
         .filter_map(|(index, p)| {
-            let (at, depth_m) = projector.project(*p)?;
-            let distance_px = (at - px).length();
+            let (point_px, depth_m) = projector.project(*p)?;
+            let distance_px = (point_px - px).length();
             (distance_px <= radius_px).then_some(Hit { index, distance_px, depth_m })
         })
         .collect();

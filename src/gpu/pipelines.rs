@@ -31,7 +31,7 @@ pub struct Pipelines {
     pub(super) edl: wgpu::RenderPipeline,
 }
 
-/// What differs between the pipelines.
+/// Settings that differ between the pipelines.
 struct Variant<'a> {
     label: &'a str,
     module: &'a wgpu::ShaderModule,
@@ -43,7 +43,7 @@ struct Variant<'a> {
     depth: Depth,
 }
 
-/// What a pipeline does with depth.
+/// Use of depth by a pipeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Depth {
     /// Tests and writes it.
@@ -52,7 +52,7 @@ enum Depth {
     Tests,
     /// Neither, in a pass that has it.
     Ignores,
-    /// Its pass has none.
+    /// None: its pass has no depth.
     Absent,
 }
 

@@ -26,7 +26,7 @@ pub struct CloudItem {
     pub style: CloudStyle,
 }
 
-/// What colors the points.
+/// Source of the points' colors.
 #[derive(Clone, Debug)]
 pub enum PointColors {
     /// [`CloudStyle::color`] for all.
@@ -46,7 +46,7 @@ pub enum PointSize {
     Meters(f32),
 }
 
-/// How a cloud looks and where it is.
+/// Style and pose of a cloud.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CloudStyle {
     /// From the cloud's frame to the world (the grasp frame).

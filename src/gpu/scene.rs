@@ -28,11 +28,11 @@ pub struct SceneData {
     pub meshes: Vec<MeshItem>,
     /// Lines, with different names.
     pub lines: Vec<LinesItem>,
-    /// What cuts meshes and points; only [`MAX_PLANES`] do.
+    /// Planes that cut meshes and points; only [`MAX_PLANES`] do.
     ///
     /// [`MAX_PLANES`]: super::view::MAX_PLANES
     pub cut: Vec<Plane>,
-    /// Whether what lies behind its neighbors is darkened (eye-dome lighting).
+    /// True where what lies behind its neighbors is darkened (eye-dome lighting).
     pub eye_dome: bool,
     /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
     pub moving: bool,
@@ -69,7 +69,7 @@ impl SceneData {
     }
 }
 
-/// What a renderer has done since it was made: proof that nothing is done twice.
+/// Counts of what a renderer has done since it was made: proof that nothing is done twice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Geometry sent to the device, items.
@@ -98,7 +98,7 @@ pub struct SceneRenderer {
     counters: Counters,
 }
 
-/// What the picture was drawn from, apart from the contents of the buffers.
+/// State that the picture was drawn from, apart from the contents of the buffers.
 #[derive(Clone, Debug, PartialEq)]
 struct Shown {
     target: u64,
@@ -151,7 +151,7 @@ impl SceneRenderer {
         })
     }
 
-    /// What was done so far.
+    /// Counts so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }

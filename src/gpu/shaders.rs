@@ -106,14 +106,14 @@ fn paste(
     open.push(path.to_owned());
     let mut own = Vec::new();
     for (number, line) in text.lines().enumerate() {
-        let at = || format!("{path}:{}", number + 1);
+        let location = || format!("{path}:{}", number + 1);
         if !line.trim_start().starts_with('#') {
             own.push((number + 1, line));
             continue;
         }
         let target = line.trim().strip_prefix("#import <").and_then(|rest| rest.strip_suffix('>'));
-        let target = target.ok_or_else(|| ShaderError::Directive { at: at(), text: line.to_owned() })?;
-        paste(files, target, Some(at()), open, out)?;
+        let target = target.ok_or_else(|| ShaderError::Directive { at: location(), text: line.to_owned() })?;
+        paste(files, target, Some(location()), open, out)?;
     }
     open.pop();
     out.files.push(path.to_owned());
@@ -164,8 +164,8 @@ mod tests {
         ];
         let r = resolve(&files, "a.wgsl").unwrap();
         assert_eq!(r.source, "fn c() {}\nfn b() {}\n// a\nfn a() {}\n");
-        let at: Vec<String> = (1..=5).map(|l| r.locate(l)).collect();
-        assert_eq!(at, ["c.wgsl:1", "b.wgsl:2", "a.wgsl:1", "a.wgsl:4", "a.wgsl:end"]);
+        let locations: Vec<String> = (1..=5).map(|l| r.locate(l)).collect();
+        assert_eq!(locations, ["c.wgsl:1", "b.wgsl:2", "a.wgsl:1", "a.wgsl:4", "a.wgsl:end"]);
     }
 
     #[test]

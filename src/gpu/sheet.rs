@@ -1,6 +1,6 @@
 //! Flat triangles into a picture that stays: what the window's toolkit draws, at what a software renderer can do fast.
 //!
-//! Its cost is that of the fragments: one color without a texture costs a fraction of a sampled one, and what is opaque
+//! The cost is that of the fragments: one color without a texture costs a fraction of a sampled one, and what is opaque
 //! need not be blended with what it hides.
 
 use std::collections::BTreeMap;
@@ -23,19 +23,19 @@ pub struct Corner {
     pub color: [u8; 4],
 }
 
-/// How triangles are filled.
+/// Fill of triangles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fill {
     /// By the colors of their corners.
     Flat {
-        /// Whether nothing below shows through.
+        /// True where nothing below shows through.
         opaque: bool,
     },
     /// By a texture times the colors of their corners.
     Textured {
-        /// Which texture.
+        /// Key of the texture.
         key: u64,
-        /// Whether nothing below shows through.
+        /// True where nothing below shows through.
         opaque: bool,
     },
 }
@@ -47,7 +47,7 @@ pub struct Run {
     pub scissor: [u32; 4],
     /// Their corners in the list of indices.
     pub indices: Range<u32>,
-    /// How they are filled.
+    /// Fill of the triangles.
     pub fill: Fill,
 }
 
@@ -251,7 +251,7 @@ impl TriangleSheet {
         self.textures.remove(&key);
     }
 
-    /// Whether nothing shows through a texture.
+    /// True where nothing shows through a texture.
     pub(crate) fn is_opaque(&self, key: u64) -> bool {
         self.textures.get(&key).is_some_and(|t| t.opaque)
     }

@@ -163,14 +163,14 @@ impl Target {
     }
 }
 
-/// What a pass does with the picture.
+/// Settings of a pass over the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pass {
     /// Clears everything to this color (sRGB) first; without one the picture goes on.
     pub clear: Option<[f32; 3]>,
-    /// Whether it tests against depth.
+    /// True where it tests against depth.
     pub with_depth: bool,
-    /// Whether the picture is finished after it.
+    /// True where the picture is finished after it.
     pub last: bool,
 }
 

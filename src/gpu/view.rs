@@ -50,14 +50,14 @@ impl Preset {
 /// A half line in the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Ray {
-    /// Where it starts, meters.
+    /// Start, meters.
     pub origin: DVec3,
     /// Unit vector into the scene.
     pub direction: DVec3,
 }
 
 impl Ray {
-    /// Where it meets the plane through `point` with `normal`; `None` if it is parallel or points away.
+    /// Point where it meets the plane through `point` with `normal`; `None` if it is parallel or points away.
     pub(crate) fn meets_plane(&self, point: DVec3, normal: DVec3) -> Option<DVec3> {
         let along = self.direction.dot(normal);
         let t = (point - self.origin).dot(normal) / along;
@@ -67,7 +67,7 @@ impl Ray {
 
 /// Planes that can cut at a time.
 pub(crate) const MAX_PLANES: usize = 8;
-/// What is nearer to the eye is not drawn, as a share of the distance.
+/// Nearest distance from the eye that is drawn, as a share of the distance to the target.
 const NEAR: f64 = 0.02;
 /// Depths of a parallel projection: so many distances to both sides of the target.
 const ORTHOGRAPHIC_REACH: f64 = 40.0;
@@ -128,7 +128,7 @@ impl Camera {
         [right, back.cross(right), back]
     }
 
-    /// Where the eye is, meters, world.
+    /// Position of the eye, meters, world.
     pub fn eye(&self) -> DVec3 {
         self.target + self.axes()[2] * self.distance
     }
@@ -179,7 +179,7 @@ impl Camera {
         self.distance = (radius.max(1e-3) / angle.sin()).clamp(*DISTANCE.start(), *DISTANCE.end());
     }
 
-    /// Whether every number is one that can be drawn with: stored state is outside data.
+    /// True where every number is one that can be drawn with: stored state is outside data.
     pub(crate) fn is_valid(&self) -> bool {
         self.target.is_finite()
             && DISTANCE.contains(&self.distance)
@@ -214,8 +214,8 @@ impl Camera {
         DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
     }
 
-    /// Where a point (meters, world) appears: pixels from the upper left corner, and its distance in front of the
-    /// eye in meters. `None` behind the eye and for a point that is not finite.
+    /// Projection of a point (meters, world): pixels from the upper left corner, and its distance in front of the eye
+    /// in meters. `None` behind the eye and for a point that is not finite.
     pub fn project(&self, p_in_world: DVec3, size: [u32; 2]) -> Option<(DVec2, f64)> {
         Projector::new(self, &DAffine3::IDENTITY, size).project(p_in_world)
     }
@@ -298,9 +298,9 @@ impl Projector {
         let p = p.extend(1.0);
         let clip = self.clip * p;
         let depth = self.depth_row.dot(p);
-        let at = DVec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * self.size;
+        let place_px = DVec2::new(0.5 + 0.5 * clip.x / clip.w, 0.5 - 0.5 * clip.y / clip.w) * self.size;
         // Reversed depth: in front of the near plane means z <= w.
-        (at.is_finite() && clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0).then_some((at, depth))
+        (place_px.is_finite() && clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0).then_some((place_px, depth))
     }
 }
 

@@ -26,7 +26,7 @@ pub(super) struct DatasetArgs {
     /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
     #[arg(value_name = "PATH", required_unless_present = "input")]
     path: Option<PathBuf>,
-    /// The same as PATH.
+    /// PATH, as an option.
     #[arg(long, value_name = "PATH", conflicts_with = "path")]
     input: Option<PathBuf>,
     /// Read the data otherwise than they are stored, for this run: what the doctor offers, such as swap-fingers, several with
@@ -45,7 +45,7 @@ pub(super) fn parse_readings(text: &str) -> Result<Readings, String> {
 }
 
 impl DatasetArgs {
-    /// What was named.
+    /// Path that was named.
     pub(super) fn path(&self) -> &Path {
         // The parser sees to it that one of them is there.
         self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
@@ -75,7 +75,7 @@ impl DatasetArgs {
     }
 }
 
-/// Where the result goes as one JSON object.
+/// Destination of the result as one JSON object.
 #[derive(Debug, Clone, Args)]
 pub struct JsonArgs {
     /// Print one JSON object on standard output, as every verb does; with `=FILE`, write it to a file and print the text
@@ -85,7 +85,7 @@ pub struct JsonArgs {
 }
 
 impl JsonArgs {
-    /// What standard output is for.
+    /// Use of standard output.
     pub fn common(&self) -> Common {
         Common { json: matches!(self.json, Some(None)) }
     }
@@ -153,7 +153,7 @@ impl TypedValueParser for RegistrationParser {
     }
 }
 
-/// How much of a data set is taken.
+/// Limit on how much of a data set is taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct LimitArgs {
     /// Take only this many, spread evenly over the data set.
@@ -185,7 +185,7 @@ pub fn at_least_one<T: FromStr + PartialOrd + From<u8>>(text: &str) -> Result<T,
     }
 }
 
-/// Which finger's image: the name of one, or `both`, which means all.
+/// Finger whose image is meant: the name of one, or `both`, which means all.
 #[derive(Debug, Clone)]
 pub(super) struct FingerArg(String);
 

@@ -30,17 +30,17 @@ pub(super) struct BasinArgs {
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
-    /// Which imprint to align.
+    /// Imprint to align.
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     imprint: ImprintSource,
-    /// What of the start is varied: columns and rows of the grid.
+    /// Coordinates of the start that are varied: columns and rows of the grid.
     #[arg(long, value_enum, default_value_t = PlaneArg::AngleY)]
     plane: PlaneArg,
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     json: JsonArgs,
     #[command(flatten)]
@@ -70,12 +70,13 @@ impl From<PlaneArg> for Plane {
 #[derive(Debug, Serialize)]
 struct Report {
     pair: String,
-    engine: String,
+    #[serde(rename = "engine")]
+    registration: String,
     imprint: &'static str,
     mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     mask_notes: Vec<String>,
-    /// What is odd about the files.
+    /// Oddities of the files.
     notes: Vec<Finding>,
     /// The true pose, `grasp_from_object`, where known.
     truth: Option<PlanarPose>,
@@ -97,7 +98,7 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
     let (tool, odd) = load_tool(&dataset, name)?;
     let models = args.model.models();
-    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?;
+    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     notes.take(&output, &odd);
@@ -108,10 +109,10 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
     let own = felt.pose().map_err(Clone::clone)?;
     let started = Instant::now();
-    let basin = touch2touch_work::pose::basin(points, &tool, args.engine, args.plane.into(), &output.job())?;
+    let basin = touch2touch_work::pose::basin(points, &tool, args.registration, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
-        engine: args.engine.to_string(),
+        registration: args.registration.to_string(),
         imprint: args.imprint.key(),
         mask: contact.made_of(),
         mask_notes: contact.notes(&sample.rig),

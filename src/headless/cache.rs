@@ -28,7 +28,7 @@ struct Report {
     sheets: usize,
     bytes: u64,
     budget_bytes: u64,
-    /// What `--clear` removed.
+    /// Number of files that `--clear` removed.
     #[serde(skip_serializing_if = "Option::is_none")]
     removed: Option<usize>,
     /// And the files of scores among it.

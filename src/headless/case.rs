@@ -15,7 +15,7 @@ use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::recipe::Recipe;
 
-/// What is done with a case.
+/// Verbs of a case.
 #[derive(Debug, Subcommand)]
 pub(super) enum CaseVerb {
     /// Put a pair into one file: its data, labels, settings, and the results to be had from them.
@@ -39,8 +39,8 @@ pub(super) struct MakeArgs {
     #[arg(long)]
     measured_only: bool,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -79,7 +79,7 @@ fn run_make(args: &MakeArgs) -> VerbResult {
     let output = Output::new(args.common, "making", 1);
     let models = args.model.models();
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
-    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?.of(ImprintSource::Measured);
     // A shift is of predictions.
     let shift = if args.measured_only { Default::default() } else { recipe.shift };
     let labels = match args.mask.no_hand {

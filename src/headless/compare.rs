@@ -30,7 +30,7 @@ use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::Stage;
-use touch2touch_work::subject::Subject;
+use touch2touch_work::subject::{MadeFrom, Subject};
 use touch2touch_work::tool::load_tool;
 
 /// Half the range of the difference's colors in a written picture, meters.
@@ -61,22 +61,22 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     tool: ToolArgs,
     /// The registration.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
     json: JsonArgs,
 }
 
-/// What can be said of one imprint against another.
+/// Figures of one imprint against another.
 #[derive(Debug, Serialize)]
 struct Figures {
     psnr_db: Option<f64>,
     ssim: Option<f64>,
     /// Mean absolute difference, meters.
     mae_m: Option<f64>,
-    /// The same where the GelSlim saw, and where the model made it up.
+    /// Mean absolute difference where the GelSlim saw, and where the model made it up.
     seen_mae_m: Option<f64>,
     invented_mae_m: Option<f64>,
 }
@@ -110,7 +110,7 @@ struct Poses {
     b_deg: f64,
     a_error_deg: Option<f64>,
     b_error_deg: Option<f64>,
-    /// How far the two poses are apart.
+    /// Difference of the two poses.
     apart_deg: f64,
     apart_m: f64,
 }
@@ -124,7 +124,7 @@ struct Report {
     fingers: Vec<Finger>,
     /// `None` without camera, tool or contact.
     poses: Option<Poses>,
-    /// What is odd about the files, and why there are no poses.
+    /// Oddities of the files, and reasons why there are no poses.
     notes: Vec<Finding>,
 }
 
@@ -154,14 +154,20 @@ impl Found {
 fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models) -> anyhow::Result<Found> {
     let Touch { dataset, pair, sample, .. } = touch;
     let cx = JobCx::unwatched();
-    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.engine);
-    match subject {
-        Subject::Measured => {
+    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
+    let made_from = subject.made_from(|generator| {
+        let own_mapping = subject.wish().is_some_and(|wish| wish.shift.is_some());
+        let model = if own_mapping { args.model.without_mapping() } else { args.model.clone() };
+        let model = generator.map_or_else(|| model.clone(), |name| model.with_generator(name));
+        recipe(&model, ImprintSource::Predicted)
+    })?;
+    match made_from {
+        MadeFrom::Measurement => {
             let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let tile = tile_of(dataset, pair, sample)?;
             Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile })
         }
-        Subject::Stored => {
+        MadeFrom::Picture => {
             let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let found = beside(dataset, pair, sample)?;
             let found = found.ok_or_else(|| anyhow::anyhow!("there is no NAME_vqvae.png beside this pair"))?;
@@ -169,20 +175,19 @@ fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models
             let pads = sample.rig.pads().map(|pad| sample.pad(pad).map(|_| found.imprint.clone()));
             Ok(Found { felt: Felt::of_imprints(&recipe, pads.collect()), tile: Some(found.tile) })
         }
-        Subject::Predicted(wish) => {
-            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
+        MadeFrom::Prediction(recipe) => {
             Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile: None })
         }
-        Subject::Mean(wish, count) => {
-            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
+        MadeFrom::Mean(recipes) => {
+            let recipe = recipes.first().ok_or_else(|| anyhow::anyhow!("{subject}: no seed is asked for"))?;
             let mut imprints = PerPad::default();
             for (pad, _) in sample.pads.entries() {
                 if recipe.generating()?.picture(sample, pad)?.is_some() {
-                    let made = seeds_of((sample, pad), &recipe, *count, models, &cx)?;
+                    let made = seeds_of((sample, pad), recipe, recipes.len(), models, &cx)?;
                     imprints[pad] = Some(made.ensemble.spread.mean);
                 }
             }
-            Ok(Found { felt: Felt::of_imprints(&recipe, imprints), tile: None })
+            Ok(Found { felt: Felt::of_imprints(recipe, imprints), tile: None })
         }
     }
 }

@@ -84,7 +84,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     Ok(opened)
 }
 
-/// What is wrong with single files, and before it what is wrong with all of them, with the readings that would mend that.
+/// Faults of single files, and before them faults of all of them, with the readings that would mend those.
 fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> (DoctorReport, Option<String>) {
     let mut report = doctor::examine(dataset, &mut |done, total| {
         output.set(done, total);
@@ -97,7 +97,7 @@ fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> (DoctorRep
     (report, doubts::remedy(dataset, &doubts))
 }
 
-/// What is found by trying; predictions are compared where a generator for these sensors is there.
+/// Doubts that are found by trying; predictions are compared where a generator for these sensors is there.
 fn tried(args: &DoctorArgs, dataset: &Dataset) -> Vec<Doubt> {
     let cx = JobCx::unwatched();
     let bundle = (!args.no_predictions && args.tried > 0)

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::recipe::{MappingArgs, RuntimeArg};
+use super::recipe::{MappingArgs, RuntimeArg, common};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
@@ -34,8 +34,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
@@ -172,18 +172,14 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let finger = fingers.first().copied().filter(|_| fingers.len() < dataset.rig.pads().len());
     let only = if let [one] = generators.as_slice() { Some(Bundle::open(one.clone())?) } else { None };
     let shift = args.mapping.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
+    let mask_model = first(&args.mask_bundle, |b| b.mask_unet().is_some());
     Ok(Setup {
         bundles: generators,
-        mask_bundle: first(&args.mask_bundle, |b| b.mask_unet().is_some()),
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        mask: args.mask.choice(),
-        hand: !args.mask.no_hand,
-        engine: args.engine,
-        shift,
+        recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime)?,
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,
-        runtime: args.runtime.choice(),
         grasps_per_tool: args.grasps,
         finger,
         batch: args.batch,

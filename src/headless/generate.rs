@@ -43,7 +43,7 @@ pub(super) struct GenerateArgs {
     /// The folder for the predictions; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// Which finger's GelSlim image: right, left (or as the data set names it), both.
+    /// Finger whose GelSlim image is taken: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
     finger: FingerArg,
     /// Only this pair, by its name or a part of it that no other has.

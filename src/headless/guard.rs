@@ -20,7 +20,7 @@ fn names(files: &[PathBuf]) -> String {
 /// Does the work of one pair. After a [`Bug`], whatever `work` changes must be made anew.
 ///
 /// # Errors
-/// Its own, and [`Bug`] where it panics.
+/// The errors of `work`, and [`Bug`] where it panics.
 pub(super) fn guarded<T>(files: Vec<PathBuf>, work: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     caught(work).unwrap_or_else(|message| Err(Bug { files, message }.into()))
 }

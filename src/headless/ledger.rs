@@ -31,7 +31,7 @@ pub(super) struct LedgerArgs {
     /// The pair, by its name or a part of it that no other has.
     #[arg(long)]
     pair: String,
-    /// Which finger (an image folder has only one).
+    /// Finger whose chain is shown (an image folder has only one).
     #[arg(long, default_value = "right")]
     finger: FingerArg,
     /// Read the decoder's range as it is meant instead of twice; leaves no shift to be done.
@@ -101,11 +101,11 @@ struct Report {
     scale: &'static str,
     stages: Vec<StageReport>,
     against_truth: Option<AgainstReport>,
-    /// The same picture in every other way to meters.
+    /// Depth of the picture by every other way to meters.
     readings: Vec<ChainReading>,
     ambiguity: Option<Ambiguity>,
     flags: Vec<Flag>,
-    /// What is odd about the files.
+    /// Oddities of the files.
     notes: Vec<Finding>,
 }
 

@@ -31,7 +31,7 @@ use touch2touch_work::labels::{ImprintSource, Labels, PairLabels};
 use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::Tools;
 
-/// What can be done with masks.
+/// Verbs of masks.
 #[derive(Debug, Subcommand)]
 pub(super) enum MasksVerb {
     /// Write masks for training, and check what was written by the rules of its form.
@@ -42,7 +42,7 @@ pub(super) enum MasksVerb {
     Compare(CompareMasksArgs),
     /// Propose masks for many pairs at once. What was painted by hand stays, and every pair is still to be looked at.
     Propose(Box<propose::ProposeArgs>),
-    /// How many pairs of each tool are in which review state, and what the masks took: seconds, edits, repeats.
+    /// Count the pairs of each tool in each review state, and what the masks took: seconds, edits, repeats.
     Stats(stats::StatsArgs),
     /// List the pairs, the most uncertain masks first.
     Queue(Box<queue::QueueArgs>),
@@ -62,7 +62,7 @@ pub(super) struct CompareMasksArgs {
     common: Common,
 }
 
-/// What `masks compare` answers.
+/// Answer of `masks compare`.
 #[derive(Serialize)]
 struct Comparison {
     folders: [PathBuf; 2],
@@ -127,8 +127,8 @@ pub(super) struct ExportArgs {
     /// pictures.
     #[arg(long, default_value = Format::default().key(), value_parser = keyed::<Format>())]
     format: Format,
-    /// Which pairs: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the missing
-    /// masks). Pairs marked "skip" or "flagged" never go along.
+    /// Pairs that go along: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the
+    /// missing masks). Pairs marked "skip" or "flagged" never do.
     #[arg(long, default_value = Which::default().key(), value_parser = keyed::<Which>())]
     pairs: Which,
     /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they go to test.

@@ -11,13 +11,13 @@ use touch2touch_work::infer::bundle::Bundle;
 use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
 use touch2touch_work::infer::{runtime, sandbox};
 
-/// What can be done with a bundle.
+/// Verbs of a bundle.
 #[derive(Debug, Subcommand)]
 pub(super) enum BundleVerb {
     /// Check a bundle's manifest, files and shapes, then load and run it once on every engine that is present, and list
     /// everything that is wrong.
     Check(BundleArgs),
-    /// What `check` starts in a process of its own.
+    /// Try a bundle: `check` starts this in a process of its own.
     #[command(hide = true)]
     Try(TryArgs),
 }
@@ -121,7 +121,7 @@ pub(super) struct RuntimeArgs {
     /// Fetch the ONNX Runtime library for this platform (by Python's pip) and keep it for the studio.
     #[arg(long)]
     fetch: bool,
-    /// Where to keep it instead of the application's data folder.
+    /// Folder to keep it in instead of the application's data folder.
     #[arg(long, requires = "fetch")]
     dir: Option<PathBuf>,
     #[command(flatten)]

@@ -1,5 +1,5 @@
-//! What is odd about the files of a run: on standard error when it is met, and in the JSON. What is wrong with the data set
-//! as a whole comes first.
+//! Oddities of the files of a run: on standard error when they are met, and in the JSON. Faults of the data set as a
+//! whole come first.
 
 use super::{Output, output};
 use touch2touch_core::dataset::Problem;
@@ -10,7 +10,7 @@ use touch2touch_work::io::dataset::Dataset;
 #[derive(Debug)]
 pub(super) struct Notes {
     findings: Findings,
-    /// How often each kind was found in the data set itself, which was said when it was opened.
+    /// Number of each kind in the data set itself, which was said when it was opened.
     said: Vec<usize>,
 }
 

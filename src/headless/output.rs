@@ -12,7 +12,7 @@ use super::Common;
 use touch2touch_core::text::printable;
 use touch2touch_work::job::{Cancel, JobCx, Progress};
 
-/// Where a verb reports to.
+/// Reporter of a verb.
 pub struct Output {
     json: bool,
     bar: ProgressBar,
@@ -41,7 +41,7 @@ impl Output {
         self.bar.set_position(done as u64);
     }
 
-    /// What is being done now.
+    /// Says what is being done now.
     pub fn message(&self, text: &str) {
         self.bar.set_message(printable(text).into_owned());
     }
@@ -62,7 +62,7 @@ impl Output {
         self.bar.suspend(|| note(text));
     }
 
-    /// Whether standard output is for programs.
+    /// True where standard output is for programs.
     pub fn json(&self) -> bool {
         self.json
     }

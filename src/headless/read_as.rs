@@ -29,7 +29,7 @@ pub(super) struct ReadAsArgs {
 struct Report {
     /// The ways in which the data are read, in order; none where they are read as they are stored.
     read_as: Vec<String>,
-    /// What is wrong with what is stored.
+    /// Mistake in the stored data that each of them mends.
     because: Vec<String>,
     /// The file that says so.
     file: Option<PathBuf>,

@@ -8,11 +8,13 @@ use super::contact_mask::MaskArgs;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Spacing};
 use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint;
+use touch2touch_work::infer::bundle::Origin;
 use touch2touch_work::infer::engine::{EngineChoice, resolve};
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::MaskSource;
@@ -63,7 +65,7 @@ impl ModelArgs {
         Ok(Recipe { generator: Some((bundle.into(), config)), shift, ..recipe })
     }
 
-    /// The same with masks and a registration. A mask model is looked for where one is taken.
+    /// Recipe with masks and a registration. A mask model is looked for where one is taken.
     pub(super) fn posed(
         &self,
         imprint: ImprintSource,
@@ -106,6 +108,26 @@ impl ModelArgs {
         bundle.check_guidance(config.guidance)?;
         Ok(config)
     }
+}
+
+/// The recipe that several generators have in common, which are no part of it.
+pub(super) fn common(
+    shift: ShiftMode,
+    mask: &MaskArgs,
+    mask_model: Option<Origin>,
+    registration: RegistrationChoice,
+    engine: RuntimeArg,
+) -> Result<Recipe, TaskError> {
+    let open = |origin| bundles::open("Open the mask model", origin).map(Model::from);
+    Ok(Recipe {
+        shift,
+        mask: mask.choice(),
+        mask_model: mask_model.map(open).transpose()?,
+        hand: !mask.no_hand,
+        registration,
+        engine: engine.choice(),
+        ..Recipe::default()
+    })
 }
 
 /// That the generator of a recipe was fitted to other data than this sample.

@@ -10,8 +10,8 @@ use touch2touch_work::io::atomic;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::names::Outputs;
 
-/// Where the files of the pairs go, without an ending, each pair's its own; the folder is made if it is not there. A run
-/// that would write two pairs to one file ends here, before it wrote anything.
+/// Paths of the pairs' files, without an ending, each pair's its own; the folder is made if it is not there. A run that
+/// would write two pairs to one file ends here, before it wrote anything.
 pub(super) fn output_stems(folder: &Path, dataset: &Dataset, ids: &[usize]) -> anyhow::Result<Vec<PathBuf>> {
     let mut outputs = outputs(folder)?;
     Ok(ids.iter().map(|id| outputs.stem(&dataset.index.pairs[*id].name)).collect::<Result<_, _>>()?)

@@ -17,7 +17,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::models::Models;
 use touch2touch_work::recipe::Recipe;
 
-/// How many seeds.
+/// Number of seeds.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct SeedArgs {
     /// Predict with this many seeds, from the seed on: mean, spread per pixel, spread of the decoder's channels, and
@@ -26,7 +26,7 @@ pub(super) struct SeedArgs {
     pub seeds: u16,
 }
 
-/// Where the pictures of the fans go.
+/// Folder for the pictures of the fans.
 #[derive(Debug, Clone, Args)]
 pub(super) struct FanArgs {
     /// With `--seeds`: write a picture of each fan of poses into this folder.
@@ -90,8 +90,8 @@ pub(super) struct PoseFan {
     mean_deg: Option<f64>,
     /// Circular standard deviation.
     std_deg: Option<f64>,
-    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, and of what
-    /// instead (`depth`, `flat`).
+    /// Number of masks (one per seed and one of the mean imprint) that are not of the source that was asked, by what
+    /// they are of instead (`depth`, `flat`).
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     mask_notes: BTreeMap<String, usize>,
     /// Farthest to either side of the mean, as differences from it.
@@ -110,8 +110,8 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
-        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
+    pub(super) fn write(&self, stem: &Path, name: &str, registration: RegistrationChoice) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", registration.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;

@@ -34,15 +34,15 @@ pub(super) struct SimulateArgs {
     /// trained on. The same as the built-in data set `test-set`, which needs no files.
     #[arg(long, conflicts_with_all = ["grasps", "seed", "faults", "part"])]
     test_set: bool,
-    /// What is wrong with the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft;
-    /// mixed: every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
+    /// Fault of the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft; mixed:
+    /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
     /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
     /// millimeters) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed"])]
     faults: bool,
-    /// Which of the lab's layouts.
+    /// Layout, one of the lab's.
     #[arg(long, value_enum, default_value_t = Part::Test)]
     part: Part,
     #[command(flatten)]
@@ -142,7 +142,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
 #[derive(Serialize)]
 struct WrittenFaults {
     out: PathBuf,
-    /// What is wrong with each tool's touch.
+    /// Fault of each tool's touch.
     faults: BTreeMap<String, &'static str>,
 }
 

@@ -19,6 +19,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::models::GenerateInput;
 use touch2touch_work::pairs;
+use touch2touch_work::predict::Generating;
 use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
 /// Arguments of `stats`.
@@ -29,7 +30,7 @@ pub(super) struct StatsArgs {
     /// The file to write; use it with `--shift refit --stats FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Which finger's touches: right, left (or as the data set names it), both.
+    /// Finger whose touches are taken: right, left (or as the data set names it), both.
     #[arg(long, default_value = "both")]
     finger: FingerArg,
     /// Take only this many pairs, spread evenly over the data set.
@@ -60,20 +61,13 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     let models = args.model.models();
     let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
     let generating = recipe.generating()?;
-    let setup = StatisticsSetup {
-        pairs: ids,
-        fingers: args.finger.fingers(&dataset.rig)?,
-        config: *generating.config,
-        bundle: generating.bundle.clone(),
-        input: generating.input(&dataset.rig)?,
-        dataset: dataset.title.clone(),
-    };
     let chain = chain_of(&models.chains(generating.bundle)?, &generating.bundle.id, ShiftMode::Raw)?;
     let load = |id| dataset.load(id).map(Arc::new).map_err(|err| TaskError::from_error("Load", &err));
-    let predict = |wanted: GenerateInput<'_>, cx: &JobCx| {
-        let made = models.predict(generating.bundle, generating.engine, generating.config, &[wanted], cx)?;
-        made.into_iter().next().ok_or_else(|| TaskError::new("Predict", "no answer"))
+    let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
+        models.predict(by.bundle, by.engine, by.config, inputs, cx)
     };
+    let fingers = args.finger.fingers(&dataset.rig)?;
+    let setup = StatisticsSetup { pairs: ids, fingers, recipe: recipe.clone(), dataset: dataset.title.clone() };
     let (statistics, failed) = statistics(&setup, load, predict, &output.job())?;
     for failure in &failed {
         output.note(&failure.to_string());

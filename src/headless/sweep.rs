@@ -18,12 +18,12 @@ use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, 
 pub(super) struct SweepArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// What is turned: `threshold` (imprint depth of contact, mm), `probability` (of the mask model, 0 to 1), `gate`
+    /// Dial to turn: `threshold` (imprint depth of contact, mm), `probability` (of the mask model, 0 to 1), `gate`
     /// (distance beyond which the registration leaves a contact out, mm), `trim` (share of the contacts that it leaves
     /// out, 0 to 0.9) or `shift` (exact, unfitted, paper, raw).
     #[arg(long, value_parser = keyed::<Dial>())]
     dial: Dial,
-    /// What it is turned to, separated by commas (default: a usual range).
+    /// Values that it is turned to, separated by commas (default: a usual range).
     #[arg(long, value_name = "LIST", value_delimiter = ',', allow_hyphen_values = true)]
     values: Vec<String>,
     /// Take only this many pairs, spread evenly over the data set.
@@ -36,8 +36,8 @@ pub(super) struct SweepArgs {
     #[arg(long)]
     measured_only: bool,
     /// The registration. Its key may be followed by what it leaves out, as with `pose`.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let output = Output::new(args.common, "turning the dial", pairs.len());
     let models = args.model.models();
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
-    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?.of(ImprintSource::Measured);
     // The dial may ask for the mask model where the choice does not.
     let model = || args.model.mask_model(false, &dataset.rig);
     let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };
@@ -73,7 +73,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     Ok(complete)
 }
 
-/// What the dial is turned to.
+/// Settings that the dial is turned to.
 fn values(args: &SweepArgs) -> Result<Vec<Setting>, String> {
     if args.values.is_empty() {
         let (first, last, count) = args.dial.usual();

@@ -34,18 +34,18 @@ pub(super) struct UnitArgs {
 struct Fit {
     /// `mm`.
     unit: &'static str,
-    /// How long the tool then is: `64.35 mm`.
+    /// Length of the tool then: `64.35 mm`.
     length: String,
 }
 
 #[derive(Serialize)]
 struct Tool {
     name: String,
-    /// Whether its CAD model can be used as it is read now.
+    /// True where its CAD model can be used as it is read now.
     usable: bool,
     /// The units in which it would be as large as a tool.
     fits: Vec<Fit>,
-    /// What unit.txt says.
+    /// Content of unit.txt.
     says: Option<String>,
     /// Why it cannot be used.
     problem: Option<String>,
@@ -56,7 +56,7 @@ struct Report {
     tools: Vec<Tool>,
     /// The file that was written or said it already.
     file: Option<PathBuf>,
-    /// What it says.
+    /// Word in that file.
     word: Option<String>,
 }
 

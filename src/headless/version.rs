@@ -14,7 +14,7 @@ const SHORT: &str = concat!("touch2touch ", env!("CARGO_PKG_VERSION"));
 /// The version of rten in this build. The manifest demands exactly this one, so that a prediction stays what it was.
 const RTEN: &str = "0.27.0";
 
-/// How long the graphics driver is waited for.
+/// Time that the graphics driver is waited for.
 #[cfg(feature = "gui")]
 const PATIENCE: Duration = Duration::from_millis(800);
 

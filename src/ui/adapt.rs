@@ -9,6 +9,7 @@ use super::theme::{SMALL, caption, section};
 use super::thumbnail;
 use super::widget::{curves, empty};
 use crate::app::action::Action;
+use crate::app::adapt;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane};
 use crate::app::tasks::TaskKind;
@@ -29,27 +30,27 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);
         ui.separator();
-        let found = cx.state.adapt.result.clone();
-        if found.is_none() && cx.state.tuning_curves().is_empty() {
+        let adapted = cx.state.adapt.result.clone();
+        if adapted.is_none() && adapt::tuning_curves(cx.state).is_empty() {
             return nothing_yet(cx, ui);
         }
         ScrollArea::vertical().auto_shrink(false).id_salt("fit").show(ui, |ui| {
-            if let Some(found) = &found {
-                refusal(cx, ui, found);
-                scores(cx, ui, found);
+            if let Some(adapted) = &adapted {
+                refusal(cx, ui, adapted);
+                scores(cx, ui, adapted);
             }
             tuning(cx, ui);
             before_and_after(cx, ui);
-            if let Some(found) = &found {
-                pads(cx, ui, found);
-                remarks(cx, ui, found);
+            if let Some(adapted) = &adapted {
+                pads(cx, ui, adapted);
+                remarks(cx, ui, adapted);
             }
         });
     });
 }
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (what, why) = match cx.state.running(TaskKind::Fit) {
+    let (what, why) = match cx.state.tasks.of_kind(TaskKind::Fit) {
         Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
         None => (
             "The model is as it was trained, on simulated touches",
@@ -63,18 +64,18 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What speaks against the fit, and a way to keep it all the same.
-fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
-    let refused = found.unwritten.is_some();
-    if !refused && found.objections.is_empty() {
+/// Objections to the fit, and a way to keep it all the same.
+fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
+    let refused = adapted.unwritten.is_some();
+    if !refused && adapted.objections.is_empty() {
         return;
     }
     let heading = if refused { "The fit was not kept" } else { "Kept, though this speaks against the fit" };
     ui.label(RichText::new(heading).strong().color(cx.p.wrong));
-    for reason in found.objections.iter().chain(&found.in_place_of) {
+    for reason in adapted.objections.iter().chain(&adapted.in_place_of) {
         ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
     }
-    if refused && cx.state.running(TaskKind::Fit).is_none() {
+    if refused && cx.state.tasks.of_kind(TaskKind::Fit).is_none() {
         let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
         if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
             cx.push(AdaptCommand::Keep);
@@ -83,9 +84,9 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, found: &Adapted) {
     ui.add_space(8.0);
 }
 
-/// How the tuning goes, or went.
+/// Curves of the tuning, while it runs and afterwards.
 fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
-    let curves = cx.state.tuning_curves();
+    let curves = adapt::tuning_curves(cx.state);
     if curves.is_empty() {
         return;
     }
@@ -102,20 +103,20 @@ fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
 /// A touch that was left out: what was felt, and what the model draws before and after.
 fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
-    let Some(held) = state.held_back() else { return };
+    let Some(held) = adapt::held_back(state) else { return };
     ui.add_space(8.0);
     ui.label(section("A touch that was left out", cx.p));
     // A fit that was made again has other pictures.
-    let fit = state.adapt.result.as_ref().map(|found| found.seconds.to_bits());
+    let fit = state.adapt.result.as_ref().map(|adapted| adapted.seconds.to_bits());
     let (map, range) = (map_of(state), range_of(state));
     let scale = held.measured.height() as f32 / held.measured.width().max(1) as f32;
     let width = ((ui.available_width() - 2.0 * GAP) / 3.0).clamp(40.0, 260.0);
     let (area, _) = ui.allocate_exact_size(vec2(3.0 * width + 2.0 * GAP, CAPTION + width * scale), Sense::hover());
     let all = [("Felt", &held.measured), ("As it was trained", &held.before), ("Fitted to the others", &held.after)];
     for (i, (name, picture)) in all.into_iter().enumerate() {
-        let at = area.min + vec2(i as f32 * (width + GAP), 0.0);
-        ui.painter().text(at, Align2::LEFT_TOP, name, FontId::proportional(SMALL), cx.p.weak);
-        let rect = Rect::from_min_size(at + vec2(0.0, CAPTION), vec2(width, width * scale));
+        let corner = area.min + vec2(i as f32 * (width + GAP), 0.0);
+        ui.painter().text(corner, Align2::LEFT_TOP, name, FontId::proportional(SMALL), cx.p.weak);
+        let rect = Rect::from_min_size(corner + vec2(0.0, CAPTION), vec2(width, width * scale));
         let response = ui.interact(rect, ui.scope_id().with(("held back", i)), Sense::hover());
         response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
         let recipe = (held.pair, held.pad, fit);
@@ -127,7 +128,7 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(caption(text, cx.p));
 }
 
-/// Which pairs, and the buttons.
+/// Choice of the pairs, and the buttons.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -142,7 +143,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
         response.response.accessible_name("Pairs to fit to").on_hover_text("Which pairs the model is fitted to");
-        let count = cx.state.adapt_pairs().count();
+        let count = adapt::pairs(cx.state).count();
         let text = RichText::new(format!("{count} pairs")).size(SMALL);
         let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
         ui.label(text).on_hover_text(format!(
@@ -162,7 +163,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.push(AdaptCommand::Steps(steps));
             }
         }
-        match cx.state.running(TaskKind::Fit) {
+        match cx.state.tasks.of_kind(TaskKind::Fit) {
             Some((ticket, task)) => {
                 let tip = "Stop; the same fit goes on from here when it is asked for again";
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
@@ -170,7 +171,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             None => {
                 cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
                 cx.action_button(ui, Action::UseFit, "Use the fitted model");
-                if cx.state.uses_fit() {
+                if adapt::uses_fit(cx.state) {
                     let tip = "The fitted model predicts now; another can be chosen in the Generate pane";
                     ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
                 }
@@ -201,12 +202,12 @@ const FIGURES: [FitColumn; 7] = [
 ];
 
 /// Before and after, on pairs that were left out.
-fn scores(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
+fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     ui.label(section("On pairs that were left out", cx.p));
     let rows = [
-        ("As it was trained", Some(&found.before)),
-        ("Fitted (closed form)", found.closed_form.as_ref()),
-        ("Tuned", found.after.as_ref()),
+        ("As it was trained", Some(&adapted.before)),
+        ("Fitted (closed form)", adapted.closed_form.as_ref()),
+        ("Tuned", adapted.after.as_ref()),
     ];
     egui::Grid::new("fit scores").num_columns(FIGURES.len() + 1).spacing(vec2(18.0, 4.0)).show(ui, |ui| {
         ui.label("");
@@ -225,19 +226,19 @@ fn scores(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
     });
     let text = format!(
         "{} pairs, {} touches; {:.1} s, {:.2} s of it for the fit",
-        found.pairs, found.touches, found.seconds, found.fit_seconds
+        adapted.pairs, adapted.touches, adapted.seconds, adapted.fit_seconds
     );
     ui.label(caption(text, cx.p));
-    for warning in &found.warnings {
+    for warning in &adapted.warnings {
         ui.add(egui::Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
     }
 }
 
-/// What was found for each pad.
-fn pads(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
+/// Correction of each pad.
+fn pads(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     ui.add_space(8.0);
     ui.label(section("What was found", cx.p));
-    for pad in &found.pads {
+    for pad in &adapted.pads {
         let text = format!(
             "{} ({} touches): moved {:+.1} px right and {:+.1} px down in the decoder's picture; {} · d {} mm",
             pad.pad,
@@ -257,7 +258,7 @@ fn signed(offset_m: f64) -> String {
 }
 
 /// Pairs to look at.
-fn remarks(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
+fn remarks(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     let mut list = |heading: &str, remarks: &[Remark]| {
         if remarks.is_empty() {
             return;
@@ -268,6 +269,6 @@ fn remarks(cx: &Cx<'_>, ui: &mut Ui, found: &Adapted) {
             ui.add(egui::Label::new(format!("{}: {}", remark.name, remark.why)).wrap());
         }
     };
-    list("Pairs that contradict the others", &found.doubtful);
-    list("Pairs that could not be used", &found.left_out);
+    list("Pairs that contradict the others", &adapted.doubtful);
+    list("Pairs that could not be used", &adapted.left_out);
 }

@@ -1,5 +1,6 @@
 //! The window: one frame from input to commands.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -28,31 +29,33 @@ use crate::app::evaluate::EvaluateCommand;
 use crate::app::export::Output;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
-use crate::app::pane::Kind;
+use crate::app::pane::{Kind, Workspace};
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
-use crate::app::settings::{Last, MaskTool, Theme, Workspace};
+use crate::app::settings::Last;
+use crate::app::settings::MaskTool;
+use crate::app::settings::Theme;
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use touch2touch_core::rig::SensorKind;
 use touch2touch_work::io::caught::caught;
 
-/// How the studio is started.
+/// Options that the studio is started with.
 pub struct Options {
     /// Files and models.
     pub services: SharedServices,
-    /// What to open; `None` opens what was open last, else the demo.
+    /// Path to open; `None` opens what was open last, else the demo.
     pub open: Option<PathBuf>,
     /// Jobs run between frames on the window's own thread, one per frame, instead of on lanes of their own: the same
     /// input then gives the same frames (tests).
     pub inline: bool,
-    /// Whether the system's file dialogs are tried before the path box.
+    /// True where the system's file dialogs are tried before the path box.
     pub native_dialogs: bool,
-    /// Whether all preferences and layouts start from their defaults.
+    /// True where all preferences and layouts start from their defaults.
     pub reset: bool,
-    /// Where pictures are written; `None` = the user's folder for pictures.
+    /// Folder that pictures are written to; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
-    /// Whether every frame is painted whole even where a program draws (for measuring what [`super::kept`] saves).
+    /// True where every frame is painted whole even where a program draws (for measuring what [`super::kept`] saves).
     pub whole_frames: bool,
 }
 
@@ -86,14 +89,14 @@ pub struct StudioApp {
     device: Result<Device, String>,
     inline: bool,
     first_prediction: bool,
-    /// Whether cameras and the large pane of the last run were looked for.
+    /// True once cameras and the large pane of the last run were looked for.
     resumed: bool,
     applied_theme: Option<Theme>,
     applied_zoom: f32,
     folder: Option<PathBuf>,
-    /// Whether the window may close: everything is saved, or is not to be.
+    /// True where the window may close: everything is saved, or is not to be.
     leaving: bool,
-    /// Whether what has to be done at the end was done.
+    /// True once everything that has to be done at the end was done.
     ended: bool,
     shot_sender: Sender<(Shot, Arc<egui::ColorImage>)>,
     shots: Receiver<(Shot, Arc<egui::ColorImage>)>,
@@ -153,7 +156,7 @@ impl StudioApp {
         }
     }
 
-    /// What the studio knows. For tests and the screenshot tool.
+    /// State of the studio. For tests and the screenshot tool.
     pub fn state(&self) -> &State {
         &self.state
     }
@@ -173,17 +176,17 @@ impl StudioApp {
         ctx.with_plugin(|kept: &mut KeptFrame| kept.painted())
     }
 
-    /// Whether nothing runs, nothing waits and nothing is to be executed.
+    /// True where nothing runs, nothing waits and nothing is to be executed.
     pub fn is_idle(&self) -> bool {
         self.inbox.is_empty() && self.state.tasks.is_idle()
     }
 
-    /// Where a point of the grasp frame (meters) appeared in a 3D pane when it was last drawn. For tests.
+    /// Place of a point of the grasp frame (meters) in a 3D pane when it was last drawn, points. For tests.
     pub fn on_screen(&self, source: ImprintSource, p: [f64; 3]) -> Option<egui::Pos2> {
         self.panes.memories.scene.on_screen(source, p.into())
     }
 
-    /// Where each pane was drawn last. For tests.
+    /// Rectangle of each pane when it was drawn last, points. For tests.
     pub fn places(&self) -> BTreeMap<Pane, egui::Rect> {
         self.panes.places.clone()
     }
@@ -271,9 +274,9 @@ impl StudioApp {
             self.first_prediction = !demo;
             return;
         }
-        if self.state.can_generate().is_ok() && self.state.sample().ready().is_some() {
+        if results::can_generate(&self.state).is_ok() && results::sample(&self.state).ready().is_some() {
             self.first_prediction = true;
-            if self.state.chosen(self.state.selection.finger).is_none() {
+            if results::chosen(&self.state, self.state.selection.finger).is_none() {
                 self.inbox.push(Command::Predict(PredictCommand::Generate));
             }
         }
@@ -304,7 +307,7 @@ impl StudioApp {
         self.inbox.push(Command::Settings(SettingsCommand::Remember(last)));
     }
 
-    /// What only the window can do.
+    /// Does what only the window can do.
     fn perform(&mut self, ctx: &egui::Context, request: UiRequest) {
         match request {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),

@@ -16,6 +16,7 @@ use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::inspect::{BasinColor, InspectCommand};
 use crate::app::keys::PoseBits;
+use crate::app::results;
 use crate::app::state::Lookup;
 use touch2touch_core::align::basin::{Arrival, Axis, Basin, Cell, Plane};
 use touch2touch_core::colormap::ColorMap;
@@ -51,7 +52,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.spacing_mut().item_spacing = vec2(4.0, 3.0);
         controls(cx, ui);
         let rest = ui.available_rect_before_wrap();
-        let lookup = cx.state.basin();
+        let lookup = results::basin(cx.state);
         match (lookup, lookup.shown()) {
             (Lookup::Failed(err), _) => {
                 let (what, why) = match err.is_cancelled() {
@@ -80,7 +81,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// What is varied, and what is colored.
+/// Choice of the coordinates that are varied and of the colors.
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     ui.horizontal(|ui| {
@@ -96,7 +97,7 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         for color in BasinColor::iter() {
             let text = RichText::new(color.name()).size(12.0);
-            let possible = color != BasinColor::Error || cx.state.truth().is_some();
+            let possible = color != BasinColor::Error || results::truth(cx.state).is_some();
             let button = ui.add_enabled(possible, egui::Button::selectable(inspect.color == color, text));
             let button = button.accessible_name(format!("Color by {}", color.name().to_lowercase()));
             let tip = match color {
@@ -126,7 +127,7 @@ impl Map<'_> {
         vec2(self.rect.width() / columns as f32, self.rect.height() / rows as f32)
     }
 
-    /// Where values of the two axes (radians, meters) lie: the first and last start are centers of cells.
+    /// Place of values of the two axes (radians, meters): the first and last start are centers of cells.
     fn place(&self, values: [f64; 2]) -> Pos2 {
         let inner = self.rect.shrink2(self.cell_size() * 0.5);
         let share: [f32; 2] = std::array::from_fn(|i| {
@@ -140,9 +141,9 @@ impl Map<'_> {
     }
 
     /// The values at a place.
-    fn values(&self, at: Pos2) -> [f64; 2] {
+    fn values(&self, place: Pos2) -> [f64; 2] {
         let inner = self.rect.shrink2(self.cell_size() * 0.5);
-        let share = [(at.x - inner.left()) / inner.width(), (inner.bottom() - at.y) / inner.height()];
+        let share = [(place.x - inner.left()) / inner.width(), (inner.bottom() - place.y) / inner.height()];
         std::array::from_fn(|i| (2.0 * f64::from(share[i]) - 1.0) * self.basin.config.reach(self.axes[i]))
     }
 }
@@ -199,7 +200,7 @@ struct Scale {
 
 impl Scale {
     fn of(cx: &Cx<'_>, basin: &Basin) -> Self {
-        let truth = cx.state.truth();
+        let truth = results::truth(cx.state);
         let color = match cx.state.inspect.color {
             BasinColor::Error if truth.is_none() => BasinColor::Cost,
             color => color,
@@ -242,14 +243,14 @@ impl Scale {
             let shown = self.ends.min(ENDS.len() + 1);
             let width = bar.width() / shown.max(1) as f32;
             for i in 0..shown {
-                let at = Rect::from_min_size(pos2(bar.left() + width * i as f32, bar.top()), vec2(width, 8.0));
-                painter.rect_filled(at.shrink2(vec2(1.0, 0.0)), 1.0, end_color(p, i));
+                let swatch = Rect::from_min_size(pos2(bar.left() + width * i as f32, bar.top()), vec2(width, 8.0));
+                painter.rect_filled(swatch.shrink2(vec2(1.0, 0.0)), 1.0, end_color(p, i));
                 let name = match i {
                     0 => "cheapest".to_owned(),
                     i if i < ENDS.len() => format!("{}.", i + 1),
                     _ => "others".into(),
                 };
-                painter.text(pos2(at.center().x, y), Align2::CENTER_TOP, name, font.clone(), p.weak);
+                painter.text(pos2(swatch.center().x, y), Align2::CENTER_TOP, name, font.clone(), p.weak);
             }
             return;
         }
@@ -317,8 +318,8 @@ fn axes(p: &Palette, painter: &Painter, map: &Map<'_>) {
     let below = pos2(map.rect.center().x, map.rect.bottom() + 14.0);
     painter.text(below, Align2::CENTER_TOP, name(across), font.clone(), p.weak);
     let galley = painter.layout_no_wrap(name(up).to_owned(), font, p.weak);
-    let at = pos2(map.rect.left() - MARGIN.x - 1.0, map.rect.center().y + galley.size().x * 0.5);
-    let turned = egui::epaint::TextShape::new(at, galley, p.weak).with_angle(-std::f32::consts::FRAC_PI_2);
+    let corner = pos2(map.rect.left() - MARGIN.x - 1.0, map.rect.center().y + galley.size().x * 0.5);
+    let turned = egui::epaint::TextShape::new(corner, galley, p.weak).with_angle(-std::f32::consts::FRAC_PI_2);
     painter.add(turned);
 }
 
@@ -343,7 +344,7 @@ fn marks(cx: &Cx<'_>, painter: &Painter, map: &Map<'_>, hovered: Option<&Cell>) 
         let share = end.starts as f32 / map.basin.cells.len().max(1) as f32;
         painter.circle(map.place_of(end.end), 2.5 + 3.0 * share, Color32::WHITE, Stroke::new(1.5, dark));
     }
-    if let Some(pose) = cx.state.pose(cx.state.inspect.source).shown() {
+    if let Some(pose) = results::pose(cx.state, cx.state.inspect.source).shown() {
         for run in &pose.report.runs {
             let (from, to) = (map.place_of(run.start), map.place_of(run.end));
             painter.line_segment([from, to], Stroke::new(2.5, dark));
@@ -357,13 +358,13 @@ fn marks(cx: &Cx<'_>, painter: &Painter, map: &Map<'_>, hovered: Option<&Cell>) 
             );
         }
     }
-    if let Some(truth) = cx.state.truth() {
+    if let Some(truth) = results::truth(cx.state) {
         cross(painter, map.place_of(truth), 6.0, cx.p.truth);
     }
-    if let Some(shown) = cx.state.inspected_in(cx.state.inspect.source) {
-        let at = map.place_of(shown.step.grasp_from_object);
-        painter.circle_stroke(at, 6.0, Stroke::new(3.5, dark));
-        painter.circle_stroke(at, 6.0, Stroke::new(2.0, cx.p.accent));
+    if let Some(shown) = results::inspected_in(cx.state, cx.state.inspect.source) {
+        let place = map.place_of(shown.step.grasp_from_object);
+        painter.circle_stroke(place, 6.0, Stroke::new(3.5, dark));
+        painter.circle_stroke(place, 6.0, Stroke::new(2.0, cx.p.accent));
     }
     if let Some(cell) = hovered {
         outline(painter, map, cell, Color32::WHITE);
@@ -386,15 +387,15 @@ fn outline(painter: &Painter, map: &Map<'_>, cell: &Cell, color: Color32) {
     painter.rect_stroke(rect, 0.0, Stroke::new(1.5, color), egui::StrokeKind::Outside);
 }
 
-fn cross(painter: &Painter, at: Pos2, size: f32, color: Color32) {
+fn cross(painter: &Painter, center: Pos2, size: f32, color: Color32) {
     for (width, color) in [(4.0, Color32::from_black_alpha(150)), (2.0, color)] {
         for d in [vec2(size, size), vec2(size, -size)] {
-            painter.line_segment([at - d, at + d], Stroke::new(width, color));
+            painter.line_segment([center - d, center + d], Stroke::new(width, color));
         }
     }
 }
 
-/// What is under the pointer, else what the map says as a whole.
+/// Figures of the start under the pointer, else of the map as a whole.
 fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
     let line = |ui: &mut Ui, text: String, color: Color32| {
         ui.add(egui::Label::new(RichText::new(text).size(SMALL).color(color)).truncate());
@@ -406,7 +407,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
             Some(a) => {
                 line(ui, format!("began {}", pose_text(a.applied)), p.text);
                 line(ui, format!("ended {}", pose_text(a.end)), p.text);
-                let error = cx.state.truth().map_or(String::new(), |t| {
+                let error = results::truth(cx.state).map_or(String::new(), |t| {
                     format!(", error {}", units::text_deg(units::angle_error(a.end.theta_rad, t.theta_rad)))
                 });
                 let cost = units::mm(a.cost_m2.max(0.0).sqrt());
@@ -430,7 +431,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
     legend(cx, ui);
 }
 
-/// What the marks mean.
+/// Legend of the marks.
 fn legend(cx: &Cx<'_>, ui: &mut Ui) {
     let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 14.0), Sense::hover());
     let painter = ui.painter_at(rect);
@@ -443,17 +444,17 @@ fn legend(cx: &Cx<'_>, ui: &mut Ui) {
         painter.galley(pos2(x + 8.0, y - galley.size().y * 0.5), galley, cx.p.weak);
         x += width + 20.0;
     };
-    entry("own starts", &|at| {
-        painter.rect_filled(Rect::from_center_size(at, vec2(7.0, 7.0)), 0.0, cx.p.accent);
+    entry("own starts", &|center| {
+        painter.rect_filled(Rect::from_center_size(center, vec2(7.0, 7.0)), 0.0, cx.p.accent);
     });
-    entry("ends", &|at| {
-        painter.circle_filled(at, 3.5, cx.p.strong);
+    entry("ends", &|center| {
+        painter.circle_filled(center, 3.5, cx.p.strong);
     });
-    if cx.state.truth().is_some() {
-        entry("truth", &|at| cross(&painter, at, 3.5, cx.p.truth));
+    if results::truth(cx.state).is_some() {
+        entry("truth", &|center| cross(&painter, center, 3.5, cx.p.truth));
     }
-    entry("prior", &|at| {
-        let ends = [at - vec2(5.0, 0.0), at + vec2(5.0, 0.0)];
+    entry("prior", &|center| {
+        let ends = [center - vec2(5.0, 0.0), center + vec2(5.0, 0.0)];
         painter.add(Shape::dashed_line(&ends, Stroke::new(1.0, cx.p.strong), 3.0, 2.0));
     });
 }

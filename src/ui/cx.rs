@@ -1,4 +1,4 @@
-//! What every pane gets: the state to read, a list to put commands on, and what panes share.
+//! Context of every pane: the state to read, a list to put commands on, and what panes share.
 
 use std::collections::BTreeMap;
 
@@ -15,17 +15,17 @@ use crate::app::action::{Action, Bindings};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
-use crate::app::tasks::state::{Task, Ticket};
+use crate::app::state::tasks::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
 
-/// What a pane may use while it is drawn.
+/// Context of a pane while it is drawn.
 pub(super) struct Cx<'a> {
     /// Everything the studio knows. Read only.
     pub state: &'a State,
     /// Executed before the next frame.
     pub out: &'a mut Vec<Command>,
-    /// What panes share.
+    /// Things that panes share.
     pub shared: &'a mut Shared,
     /// The graphics device; `None` if the window has none that can draw 3D.
     pub device: Result<&'a Device, &'a str>,
@@ -56,12 +56,12 @@ impl Cx<'_> {
         self.acting(ui, action, egui::Button::new(text), action.name())
     }
 
-    /// The same for an action that turns something on or off.
+    /// A button for an action that turns something on or off.
     pub(super) fn action_switch(&mut self, ui: &mut Ui, action: Action, text: &str, on: bool) -> Response {
         self.acting(ui, action, egui::Button::selectable(on, text), action.name())
     }
 
-    /// The same for a button of any look, under a name for screen readers.
+    /// A button of any look for an action, under a name for screen readers.
     pub(super) fn acting(
         &mut self,
         ui: &mut Ui,
@@ -81,7 +81,7 @@ impl Cx<'_> {
         response
     }
 
-    /// How far a task is, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
+    /// Progress of a task, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
     /// stopping keeps.
     pub(super) fn stoppable(
         &mut self,
@@ -102,7 +102,7 @@ impl Cx<'_> {
 /// Room for the button beside a bar, points.
 const CANCEL: f32 = 70.0;
 
-/// What part of pictures is seen, and the colors of errors: one for all panes.
+/// Part of the pictures that is seen, and the colors of errors: one for all panes.
 pub(super) struct Views {
     /// Of GelSlim images.
     pub gel: ViewTransform,
@@ -139,9 +139,9 @@ impl Views {
     }
 }
 
-/// What the panes share that only the window knows.
+/// Things that the panes share and only the window knows.
 pub(super) struct Shared {
-    /// What part of pictures is seen.
+    /// Part of the pictures that is seen.
     pub views: Views,
     /// Pictures on the graphics card.
     pub textures: Textures,
@@ -149,7 +149,7 @@ pub(super) struct Shared {
     pub dialogs: Dialogs,
     /// The number under the pointer, for the status bar and the clipboard.
     pub readout: Option<String>,
-    /// Whether a pane has the pixel under the pointer in this frame.
+    /// True where a pane has the pixel under the pointer in this frame.
     pub hover_claimed: bool,
     /// When labels were last written.
     pub saved: Saved,

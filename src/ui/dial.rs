@@ -10,12 +10,13 @@ use super::theme::{SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{DialCommand, Pane};
+use crate::app::dial;
 use crate::app::dial::DialPairs;
 use crate::app::keys::ImprintSource;
 use crate::app::tasks::TaskKind;
 use touch2touch_work::sweep::{Dial, MOST_VALUES, Series, Sweep};
 
-/// Which imprints are shown.
+/// Source of the imprints that are shown.
 #[derive(Default)]
 pub(super) struct Memory {
     source: Option<ImprintSource>,
@@ -27,21 +28,21 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);
         ui.separator();
-        let Some(found) = cx.state.dial.result.clone() else {
+        let Some(sweep) = cx.state.dial.result.clone() else {
             return nothing_yet(cx, ui);
         };
-        let Some(series) = about(cx, ui, memory, &found) else { return };
+        let Some(series) = about(cx, ui, memory, &sweep) else { return };
         ScrollArea::vertical().auto_shrink(false).id_salt("dial").show(ui, |ui| {
-            plots::line(cx, ui, &found, series);
+            plots::line(cx, ui, &sweep, series);
             ui.add_space(6.0);
-            plots::multiples(cx, ui, &found, series);
+            plots::multiples(cx, ui, &sweep, series);
         });
     });
 }
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let refused = cx.state.sweep_setup().err();
-    let (what, why) = match (cx.state.running(TaskKind::Dial), refused) {
+    let refused = dial::setup(cx.state).err();
+    let (what, why) = match (cx.state.tasks.of_kind(TaskKind::Dial), refused) {
         (Some(_), _) => {
             ("The plots appear when all pairs are done".to_owned(), "Cancel keeps those done until then".to_owned())
         }
@@ -61,7 +62,7 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// Which dial, from where to where, over which pairs.
+/// Choice of the dial, its range and the pairs.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
@@ -94,7 +95,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut predictions, "predictions").on_hover_text(tip).changed() {
             cx.push(DialCommand::Predictions(predictions));
         }
-        match cx.state.running(TaskKind::Dial) {
+        match cx.state.tasks.of_kind(TaskKind::Dial) {
             Some((ticket, task)) => {
                 let tip = "Stop, and show the pairs that were done until then";
                 cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));
@@ -105,7 +106,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     if cx.state.dial.result.is_some()
-        && let Err(why) = cx.state.sweep_setup()
+        && let Err(why) = dial::setup(cx.state)
     {
         ui.add(egui::Label::new(RichText::new(why).size(SMALL).color(cx.p.caution)).wrap());
     }
@@ -134,13 +135,13 @@ fn range(cx: &mut Cx<'_>, ui: &mut Ui, dial: Dial) {
     }
 }
 
-/// What is shown, which imprints of it, and what to know about it.
-fn about<'a>(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, found: &'a Sweep) -> Option<&'a Series> {
-    let of = |source: ImprintSource| found.series.iter().find(|series| series.source == source);
-    let series = memory.source.and_then(of).or_else(|| of(ImprintSource::Predicted)).or(found.series.first())?;
+/// Summary of the sweep, choice of the imprints shown, and remarks.
+fn about<'a>(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, sweep: &'a Sweep) -> Option<&'a Series> {
+    let of = |source: ImprintSource| sweep.series.iter().find(|series| series.source == source);
+    let series = memory.source.and_then(of).or_else(|| of(ImprintSource::Predicted)).or(sweep.series.first())?;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(6.0, 4.0);
-        for one in &found.series {
+        for one in &sweep.series {
             let text = RichText::new(one.source.name()).color(side_color(cx.p, one.source));
             let button = ui.add(egui::Button::selectable(one.source == series.source, text));
             let button = button.accessible_name(format!("Dial over {} imprints", one.source.key()));
@@ -153,21 +154,21 @@ fn about<'a>(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, found: &'a Sweep) ->
         } else {
             "the true poses are not known: a dot is a pair at the change of its angle against what is in force; a click opens it"
         };
-        let text = format!("{} over {} pairs: {what}", found.dial.name(), found.pairs);
+        let text = format!("{} over {} pairs: {what}", sweep.dial.name(), sweep.pairs);
         ui.label(caption(text, cx.p));
-        if let Some(first) = found.left_out.first() {
-            let list: Vec<String> = found.left_out.iter().map(|r| format!("{}: {}", r.name, r.why)).take(20).collect();
-            let text = format!("{} left out, the first: {}", found.left_out.len(), first.name);
+        if let Some(first) = sweep.left_out.first() {
+            let list: Vec<String> = sweep.left_out.iter().map(|r| format!("{}: {}", r.name, r.why)).take(20).collect();
+            let text = format!("{} left out, the first: {}", sweep.left_out.len(), first.name);
             ui.label(RichText::new(text).size(SMALL).color(cx.p.caution)).on_hover_text(list.join("\n"));
         }
-        if !found.complete {
+        if !sweep.complete {
             ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));
         }
-        if cx.state.is_dial_outdated() {
+        if dial::is_outdated(cx.state) {
             let tip = "Another setting than the dial was changed since: run it again to see this with what is in force";
             ui.label(RichText::new("of earlier settings").size(SMALL).color(cx.p.caution)).on_hover_text(tip);
         }
-        for note in &found.notes {
+        for note in &sweep.notes {
             ui.label(caption(note, cx.p));
         }
     });

@@ -12,7 +12,7 @@ use crate::ui::theme::{Palette, caption};
 /// A dialog that ends empty sooner than a person could have closed it was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(700);
 
-/// What is being chosen.
+/// Purpose of a dialog.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Purpose {
     /// A folder with pairs, to open.
@@ -25,7 +25,7 @@ pub(super) enum Purpose {
     Masks,
     /// The folder that labels are written to which could not be saved.
     Labels,
-    /// Where something is written.
+    /// A place that something is written to.
     Output(Output),
 }
 
@@ -56,7 +56,7 @@ pub(super) struct Dialogs {
     answers: Receiver<(Purpose, Option<PathBuf>, Duration)>,
     waiting: bool,
     path_box: Option<PathBox>,
-    /// Whether the system's dialogs are tried at all.
+    /// True where the system's dialogs are tried at all.
     native: bool,
 }
 
@@ -99,7 +99,7 @@ impl Dialogs {
         }
     }
 
-    /// Whether the path box is open.
+    /// True where the path box is open.
     pub(super) fn is_path_box_open(&self) -> bool {
         self.path_box.is_some()
     }

@@ -1,6 +1,6 @@
 //! Fuzzy search for the command palette.
 
-/// How well `query` fits `text`: higher is better, `None` if its letters do not all occur in order. Case is ignored.
+/// Score of `query` in `text`: higher is better, `None` if its letters do not all occur in order. Case is ignored.
 ///
 /// Letters at the start of a word and letters in a row count more; of equal fits the shorter text wins.
 pub(super) fn score(query: &str, text: &str) -> Option<i32> {

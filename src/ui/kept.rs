@@ -36,13 +36,13 @@ pub(super) struct KeptFrame {
     picture: Option<Arc<sheet::FramePicture>>,
     /// Changes of each texture so far.
     versions: BTreeMap<TextureId, u64>,
-    /// What each tile was painted from.
+    /// Triangles that each tile was painted from.
     tiles: Vec<Tile>,
     /// Pixels painted so far.
     painted: u64,
 }
 
-/// What a tile shows.
+/// Content of a tile.
 #[derive(Clone, Copy, Default, PartialEq, Eq)]
 struct Tile {
     /// Of all triangles that touch it and are not hidden.
@@ -94,7 +94,7 @@ impl KeptFrame {
     /// Installs itself in `ctx`; returns whether it did: only where a program draws and the window has plain bytes.
     ///
     /// # Errors
-    /// What the device refuses: then the toolkit paints the window as before.
+    /// The device's refusal: then the toolkit paints the window as before.
     pub(super) fn install(ctx: &Context, window: &RenderState) -> Result<bool, GpuError> {
         let format = window.target_format;
         let plain = matches!(format, wgpu::TextureFormat::Rgba8Unorm | wgpu::TextureFormat::Bgra8Unorm);
@@ -195,7 +195,7 @@ impl Plugin for KeptFrame {
             let grid = size.map(|s| s.div_ceil(TILE));
             let triangles = triangles(&primitives, &self.sheet, ppp, size);
             let tiles = tiles(&primitives, &triangles, &self.versions, grid);
-            let blocks = blocks(grid, |at| self.tiles.get(at).is_none_or(|old| old.hash != tiles[at].hash));
+            let blocks = blocks(grid, |tile| self.tiles.get(tile).is_none_or(|old| old.hash != tiles[tile].hash));
             let mut jobs = FrameMesh { ppp, size, ..FrameMesh::default() };
             for block in &blocks {
                 let [x0, y0] = block.min.map(|v| v * TILE);
@@ -204,7 +204,7 @@ impl Plugin for KeptFrame {
                 let part = Rect::from_min_max(pos2(x0 as f32, y0 as f32), pos2(x1 as f32, y1 as f32));
                 let rows = block.min[1]..block.max[1];
                 let places = rows.flat_map(|y| (block.min[0]..block.max[0]).map(move |x| (y * grid[0] + x) as usize));
-                let first = places.map(|at| tiles[at].first).min().flatten();
+                let first = places.map(|tile| tiles[tile].first).min().flatten();
                 if first.is_none() {
                     jobs.ground(part);
                 }
@@ -277,7 +277,7 @@ fn vertices(mesh: &Mesh, corners: [u32; 3]) -> Option<[Vertex; 3]> {
     Some([at(corners[0])?, at(corners[1])?, at(corners[2])?])
 }
 
-/// What every tile shows, row by row.
+/// Content of every tile, row by row.
 fn tiles(
     primitives: &[ClippedPrimitive],
     triangles: &[Triangle],
@@ -338,7 +338,7 @@ fn mix(a: u64, b: u64) -> u64 {
     m ^ (m >> 29)
 }
 
-/// What two triangles in a row hide together: the rectangle that they make, where both are opaque. Physical pixels.
+/// Rectangle that two triangles in a row make and hide together, where both are opaque, physical pixels.
 fn covered(primitives: &[ClippedPrimitive], a: &Triangle, b: &Triangle) -> Option<Rect> {
     let opaque = matches!(a.fill, Fill::Flat { opaque: true } | Fill::Textured { opaque: true, .. });
     if !opaque || a.primitive != b.primitive || a.fill != b.fill || a.bounds != b.bounds {
@@ -409,7 +409,7 @@ fn blocks(grid: [u32; 2], changed: impl Fn(usize) -> bool) -> Vec<Block> {
     }
 }
 
-/// What is sent to the device for one frame.
+/// Mesh that is sent to the device for one frame.
 #[derive(Default)]
 struct FrameMesh {
     ppp: f32,
@@ -441,7 +441,7 @@ impl FrameMesh {
         }
     }
 
-    /// What `part` (physical pixels) is painted on where nothing hides what was there before.
+    /// Paints the ground of `part` (physical pixels), where nothing hides what was there before.
     fn ground(&mut self, part: Rect) {
         let places = [part.left_top(), part.right_top(), part.right_bottom(), part.left_bottom()];
         let [a, b, c, d] =

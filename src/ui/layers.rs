@@ -13,6 +13,7 @@ use super::widget::line::Line;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
 use touch2touch_core::align::Observability;
@@ -37,7 +38,7 @@ pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
     }
 }
 
-/// What a reason means, for its tooltip.
+/// Tooltip of a reason.
 fn reason_tip(reason: Reason) -> &'static str {
     match reason {
         Reason::Inlier => "Contact point near the outline: it pulls on the pose",
@@ -61,7 +62,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             ui.spacing_mut().item_spacing.y = 2.0;
             let source = cx.state.workbench.side;
             choice(cx, ui, source);
-            match cx.state.layers(source) {
+            match results::layers(cx.state, source) {
                 Lookup::Ready(layers) | Lookup::Stale(layers) => {
                     histogram(cx, ui, layers);
                     reasons(cx, ui, layers);
@@ -77,7 +78,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                     ui.label(caption(absent.text(), cx.p));
                 }
             }
-            if let Some(pose) = cx.state.pose(source).shown()
+            if let Some(pose) = results::pose(cx.state, source).shown()
                 && let Some(o) = &pose.report.observability
             {
                 observability(cx, ui, o, pose.rms_m);
@@ -86,7 +87,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// Which side the pane is about, and which layer colors the points.
+/// Choice of the side that the pane is about, and of the layer that colors the points.
 fn choice(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;

@@ -8,13 +8,12 @@ use std::collections::BTreeMap;
 use eframe::egui::Id;
 use egui_tiles::{Container, Linear, LinearDir, Tile, TileId, Tiles, Tree};
 
-use crate::app::pane::{Dock, Pane};
-use crate::app::settings::Workspace;
+use crate::app::pane::{Dock, Pane, Workspace};
 
 /// Part of the stored text: a layout of another version is not even tried.
 const FORMAT: &str = "touch2touch-layout-2";
 
-/// How a workspace divides the window among its docks; of rows with fewer docks the first shares count.
+/// Shares of the window that the docks of a workspace take; of rows with fewer docks the first shares count.
 struct Shares {
     /// Left column, middle, right column.
     columns: [f32; 3],
@@ -76,7 +75,7 @@ fn tree_id(workspace: Workspace) -> Id {
     Id::unique(("workspace", workspace.name()))
 }
 
-/// Whether the tree holds every pane of the workspace exactly once, below its root, and nothing else.
+/// True where the tree holds every pane of the workspace exactly once, below its root, and nothing else.
 pub(super) fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
     let mut counts: BTreeMap<Pane, u32> = BTreeMap::new();
     let Some(root) = tree.root() else { return false };

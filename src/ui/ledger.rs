@@ -3,6 +3,7 @@
 
 mod plots;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Align2, FontId, Layout, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
@@ -42,8 +43,8 @@ pub(super) type Memory = ();
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let finger = cx.state.selection.finger;
-    let lookup = cx.state.ledger(finger);
-    let Some(found) = lookup.shown() else {
+    let lookup = results::ledger(cx.state, finger);
+    let Some(chain) = lookup.shown() else {
         return match lookup {
             Lookup::Failed(err) => images::failed(cx, ui, err),
             Lookup::Absent(absent) => images::absent_text(cx, ui, absent),
@@ -60,8 +61,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ScrollArea::vertical().id_salt("depth chain").show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 2.0;
             head(cx, ui, finger);
-            fit_parts(cx, ui, found);
-            flags(cx, ui, &found.ledger.flags);
+            fit_parts(cx, ui, chain);
+            flags(cx, ui, &chain.ledger.flags);
             let width = ui.available_width();
             if width >= WIDE {
                 let left = (width * 0.58).floor();
@@ -73,20 +74,20 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                         add(ui);
                     });
                 };
-                column(ui, 0.0, left - 12.0, &mut |ui| stages(cx, ui, found, finger));
+                column(ui, 0.0, left - 12.0, &mut |ui| stages(cx, ui, chain, finger));
                 let bottom = ui.min_rect().bottom();
-                column(ui, left, width - left - 4.0, &mut |ui| against(cx, ui, found, finger));
+                column(ui, left, width - left - 4.0, &mut |ui| against(cx, ui, chain, finger));
                 let bottom = bottom.max(ui.min_rect().bottom());
                 ui.advance_cursor_after_rect(Rect::from_min_max(top, pos2(top.x + width, bottom)));
             } else {
-                stages(cx, ui, found, finger);
-                against(cx, ui, found, finger);
+                stages(cx, ui, chain, finger);
+                against(cx, ui, chain, finger);
             }
         });
     });
 }
 
-/// Which finger it is about, and the mapping.
+/// Choice of the finger and of the mapping.
 fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
     ui.horizontal_wrapped(|ui| {
         for of in cx.state.rig().pads() {
@@ -115,7 +116,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
         });
         response.response.accessible_name("Shift of the depth chain").on_hover_text(shift_tooltip(current));
     });
-    match cx.state.running(TaskKind::Refit) {
+    match cx.state.tasks.of_kind(TaskKind::Refit) {
         Some((ticket, task)) => {
             let what = (task.progress.text.as_str(), "Stop computing shift statistics");
             ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, what));
@@ -127,11 +128,11 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
 }
 
 /// The parts of a model's fit to a rig, each with a switch; nothing for a model without one.
-fn fit_parts(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult) {
+fn fit_parts(cx: &mut Cx<'_>, ui: &mut Ui, chain: &LedgerResult) {
     let current = cx.state.settings.shift;
     let parts = match current {
         ShiftMode::Parts(parts) => parts,
-        _ if found.ledger.stages.iter().any(|stage| matches!(stage.stage, Stage::Corrected(_))) => CorrectionParts::ALL,
+        _ if chain.ledger.stages.iter().any(|stage| matches!(stage.stage, Stage::Corrected(_))) => CorrectionParts::ALL,
         _ => return,
     };
     ui.horizontal_wrapped(|ui| {
@@ -177,12 +178,12 @@ fn flags(cx: &Cx<'_>, ui: &mut Ui, flags: &[Flag]) {
     }
 }
 
-fn stages(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
+fn stages(cx: &mut Cx<'_>, ui: &mut Ui, chain: &LedgerResult, finger: PadId) {
     ui.add_space(2.0);
     ui.label(section("Stages", cx.p)).on_hover_text(
         "From the decoder (no unit, -1 to 1) to meters. Pictures and histograms span each stage's own values",
     );
-    for record in &found.ledger.stages {
+    for record in &chain.ledger.stages {
         stage(cx, ui, record, finger);
     }
 }
@@ -202,7 +203,7 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     });
 
     let thumb = Rect::from_min_size(rect.min + vec2(0.0, 2.0), THUMB);
-    let key = (cx.state.chosen(finger), cx.state.settings.shift, record.stage);
+    let key = (results::chosen(cx.state, finger), cx.state.settings.shift, record.stage);
     let range = Range { lo: s.min as f32, hi: s.max as f32 };
     let picture = cx.shared.textures.get(ui.ctx(), ("stage", record.stage), key, false, || {
         (depth_image(&record.image, ColorMap::Viridis, range), None)
@@ -227,9 +228,9 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     // Room for the unit after the last.
     let column = ((right - 6.0 - x - 18.0) / 4.0).min(FIGURE + 6.0);
     for (i, (label, value)) in figures.iter().enumerate() {
-        let at = x + column * (i as f32 + 1.0) - 4.0;
-        text.text(pos2(at, rect.top() + 27.0), Align2::RIGHT_TOP, label, FontId::proportional(9.0), cx.p.weak);
-        text.text(pos2(at, rect.top() + 37.0), Align2::RIGHT_TOP, value, small.clone(), cx.p.strong);
+        let right_x = x + column * (i as f32 + 1.0) - 4.0;
+        text.text(pos2(right_x, rect.top() + 27.0), Align2::RIGHT_TOP, label, FontId::proportional(9.0), cx.p.weak);
+        text.text(pos2(right_x, rect.top() + 37.0), Align2::RIGHT_TOP, value, small.clone(), cx.p.strong);
     }
     text.text(
         pos2(x + 4.0 * column - 2.0, rect.top() + 38.0),
@@ -255,24 +256,24 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     response.on_hover_text(tip);
 }
 
-fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
+fn against(cx: &mut Cx<'_>, ui: &mut Ui, chain: &LedgerResult, finger: PadId) {
     ui.add_space(2.0);
     ui.label(section("Prediction against truth", cx.p)).on_hover_text(
         "How many pixels have which measured and which predicted depth; brighter is more. Dashed: equal. Solid: the \
          line that the depths agree with, every depth counting alike",
     );
-    match &found.ledger.against {
-        Some(found) => {
+    match &chain.ledger.against {
+        Some(against) => {
             let side = ui.available_width().clamp(96.0, 220.0);
             let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), side), Sense::hover());
-            let joint = &found.joint;
+            let joint = &against.joint;
             let line = joint.line;
             let text = match line {
                 Some(l) => format!("slope {}, offset {} mm", fixed(l.slope, 3), fixed(mm(l.offset), 2)),
                 None => "no slope: the truth is flat".to_owned(),
             };
             response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("Joint histogram: {text}")));
-            let key = (cx.state.chosen(finger), cx.state.settings.shift, cx.p.canvas);
+            let key = (results::chosen(cx.state, finger), cx.state.settings.shift, cx.p.canvas);
             let canvas = cx.p.canvas;
             let picture = cx
                 .shared
@@ -283,7 +284,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
             plots::joint(ui, rect, picture, joint, cx.p);
             ui.label(RichText::new(text).size(SMALL).color(cx.p.strong))
                 .on_hover_text("Prediction = slope · truth + offset; 1 and 0 are right");
-            let o = &found.orientation;
+            let o = &against.orientation;
             let r = |v: Option<f64>| v.map_or("–".to_owned(), |v| fixed(v, 2));
             let text = format!(
                 "correlation {}   turned 180° {}   mirrored {}",
@@ -298,10 +299,10 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, found: &LedgerResult, finger: PadId) {
             ui.label(caption("No measured imprint to compare with.", cx.p));
         }
     }
-    readings(cx, ui, &found.readings);
+    readings(cx, ui, &chain.readings);
 }
 
-/// The same picture read in every way; a click takes that way.
+/// Readings of the decoder's picture in every way; a click takes that way.
 fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
     ui.add_space(4.0);
     ui.label(section("Readings", cx.p))
@@ -321,8 +322,8 @@ fn readings(cx: &mut Cx<'_>, ui: &mut Ui, readings: &[ChainReading]) {
         let font = FontId::proportional(SMALL);
         painter.text(pos2(rect.left() + 2.0, rect.center().y), Align2::LEFT_CENTER, name, font.clone(), color);
         for (i, cell) in cells.iter().rev().enumerate() {
-            let at = pos2(rect.right() - 2.0 - column * i as f32, rect.center().y);
-            painter.text(at, Align2::RIGHT_CENTER, cell, font.clone(), if head { cx.p.weak } else { cx.p.strong });
+            let end = pos2(rect.right() - 2.0 - column * i as f32, rect.center().y);
+            painter.text(end, Align2::RIGHT_CENTER, cell, font.clone(), if head { cx.p.weak } else { cx.p.strong });
         }
         response
     };

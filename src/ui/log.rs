@@ -1,4 +1,4 @@
-//! What happened: the log pane, and the notices that appear once.
+//! Log: the pane with all notes, and the notices that appear once.
 
 use std::path::Path;
 use std::time::Duration;
@@ -12,7 +12,7 @@ use crate::app::tasks::{Entry, Level};
 
 /// Notices on screen at once.
 const MOST: usize = 3;
-/// How long a note stays that is no error, seconds.
+/// Time that a note stays that is no error, seconds.
 const STAYS_S: f64 = 12.0;
 
 fn color(p: &Palette, level: Level) -> Color32 {
@@ -23,7 +23,7 @@ fn color(p: &Palette, level: Level) -> Color32 {
     }
 }
 
-/// What can be done with a file that was written.
+/// Links to a file that was written.
 fn links(cx: &mut Cx<'_>, ui: &mut Ui, place: &Path) {
     let show = ui.link(RichText::new("Open folder").size(12.0));
     if show.on_hover_text(place.display().to_string()).clicked() {
@@ -90,13 +90,13 @@ pub(super) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
     let hidden = unseen.len().saturating_sub(MOST);
     let frame = egui::Frame::new().fill(cx.p.panel).inner_margin(egui::Margin::symmetric(12, 3));
     Panel::bottom("notices").frame(frame).resizable(false).show(ui, |ui| {
-        for (at, entry) in unseen.iter().rev().take(MOST).enumerate() {
+        for (index, entry) in unseen.iter().rev().take(MOST).enumerate() {
             ui.horizontal(|ui| {
                 ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                    if at == 0 && ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
+                    if index == 0 && ui.button("Dismiss").on_hover_text("They stay in the log").clicked() {
                         cx.push(TasksCommand::LogSeen(last));
                     }
-                    if at == 0 && hidden > 0 {
+                    if index == 0 && hidden > 0 {
                         ui.label(caption(format!("and {hidden} more in the log"), cx.p));
                     }
                     if let Some(place) = &entry.place {

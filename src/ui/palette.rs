@@ -12,7 +12,7 @@ use touch2touch_core::dataset::PairId;
 
 /// Entries shown at most: nobody reads further, and a list of 32,000 pairs stays quick.
 const MOST: usize = 60;
-/// What another word for an action counts: less than its name in one piece, more than scattered letters.
+/// Score of another word for an action: less than its name in one piece, more than scattered letters.
 const OTHER_WORD: i32 = 45;
 /// Height of an entry, points.
 const ROW: f32 = 28.0;
@@ -25,7 +25,7 @@ enum Entry {
     Tool(String),
 }
 
-/// What is being typed.
+/// Query being typed, with its entries.
 #[derive(Debug, Default)]
 pub(super) struct Memory {
     query: String,
@@ -107,7 +107,7 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
     if memory.found.as_ref().is_some_and(|(q, _)| *q == query) {
         return;
     }
-    let mut found: Vec<(i32, Entry)> = Vec::new();
+    let mut ranked: Vec<(i32, Entry)> = Vec::new();
     for action in Action::iter() {
         let name = score(&query, action.name());
         let help = score(&query, action.tooltip()).map(|s| s - 30).filter(|_| query.len() >= 3);
@@ -115,21 +115,21 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
         let other = action.words().filter(|w| word.len() >= 2 && w.starts_with(&word)).map(|_| OTHER_WORD).next();
         if let Some(s) = name.max(help).max(other) {
             // Actions before samples: there are few of them.
-            found.push((s + 4, Entry::Action(action)));
+            ranked.push((s + 4, Entry::Action(action)));
         }
     }
     if !query.trim().is_empty() {
         if let Some(open) = &cx.state.library.open {
-            found.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
+            ranked.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
         }
         let pairs = (0u32..).zip(cx.state.library.pairs());
-        found.extend(
+        ranked.extend(
             pairs.filter_map(|(i, e)| Some((score(&query, &e.name)? - 2, Entry::Pair(PairId(i), e.name.clone())))),
         );
-        found.sort_by_key(|(s, _)| std::cmp::Reverse(*s));
+        ranked.sort_by_key(|(s, _)| std::cmp::Reverse(*s));
     }
-    found.truncate(MOST);
-    memory.found = Some((query, found.into_iter().map(|(_, e)| e).collect()));
+    ranked.truncate(MOST);
+    memory.found = Some((query, ranked.into_iter().map(|(_, e)| e).collect()));
 }
 
 fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Response {

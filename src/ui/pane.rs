@@ -13,7 +13,7 @@ use crate::app::pane::{Kind, Pane, panes};
 
 macro_rules! views {
     ($( $file:ident { $( $pane:ident $row:tt )* } )*) => {
-        /// What each file that draws panes keeps from one frame to the next.
+        /// Memories of the files that draw panes, kept from one frame to the next.
         #[derive(Default)]
         pub(super) struct Memories {
             $( pub $file: super::$file::Memory, )*
@@ -32,7 +32,7 @@ panes!(views);
 /// The panes of the window.
 #[derive(Default)]
 pub(super) struct Panes {
-    /// What each of them remembers.
+    /// Memories of the files that draw them.
     pub memories: Memories,
     /// The pane that fills the window.
     pub maximized: Option<Pane>,
@@ -40,7 +40,7 @@ pub(super) struct Panes {
     pub hovered: Option<Pane>,
     /// The panes drawn in this frame, so far.
     pub drawn: BTreeSet<Pane>,
-    /// Where each pane was drawn last, points.
+    /// Rectangle of each pane when it was drawn last, points.
     pub places: BTreeMap<Pane, egui::Rect>,
 }
 
@@ -76,13 +76,13 @@ fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
     help::mark(ui, pane.title(), controls, cx.keys());
 }
 
-/// How the panes behave in their tree.
+/// Behavior of the panes in their tree.
 pub(super) struct Docking<'a, 'b> {
-    /// What the panes get.
+    /// Context that the panes get.
     pub cx: &'b mut Cx<'a>,
     /// The panes.
     pub panes: &'b mut Panes,
-    /// Whether a person moved something.
+    /// True where a person moved something.
     pub edited: bool,
 }
 

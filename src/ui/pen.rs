@@ -17,28 +17,28 @@ use crate::app::settings::MaskTool;
 use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::rig::PadId;
 
-/// What is drawn on: a picture on the screen.
+/// Picture on the screen that is drawn on.
 pub(super) struct Easel<'a> {
-    /// Where the pixels of the picture lie.
+    /// Mapping between the pixels of the picture and the screen.
     pub map: CanvasMap,
     /// Draws within it.
     pub painter: &'a Painter,
-    /// What the pointer does to it.
+    /// Response of the picture to the pointer.
     pub response: &'a Response,
-    /// Whether a press here is meant for it.
+    /// True where a press here is meant for it.
     pub on_top: bool,
     /// The imprint that is drawn on.
     pub source: ImprintSource,
     /// The finger that is drawn on: in a 3D view the one that the pointer means.
     pub finger: PadId,
-    /// Whether it is a picture of points in space.
+    /// True for a picture of points in space.
     pub in_3d: bool,
     /// Half the width of the brush here, pixels of the picture.
     pub radius_px: f32,
 }
 
 impl Easel<'_> {
-    /// Whether a stroke is drawn here.
+    /// True where a stroke is drawn here.
     fn has(&self, stroke: &Drawn) -> bool {
         let here = stroke.drawing.sight.is_some() == self.in_3d && stroke.source == self.source;
         here && (self.in_3d || stroke.place.pad == self.finger)
@@ -122,7 +122,7 @@ pub(super) fn follow<K: Copy + PartialEq>(
     }
 }
 
-/// Whether a click ends the polygon: on its first corner, or a second time on its last.
+/// True where a click ends the polygon: on its first corner, or a second time on its last.
 fn closes(cx: &Cx<'_>, easel: &Easel<'_>, pos: Pos2) -> bool {
     const NEAR: f32 = 6.0;
     let Some(stroke) = &cx.state.document.stroke else { return false };

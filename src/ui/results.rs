@@ -10,6 +10,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
+use crate::app::results;
 use crate::app::tasks::TaskKind;
 use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
 
@@ -31,9 +32,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);
         ui.separator();
-        let rows = cx.state.table_rows();
+        let rows = cx.state.table.rows();
         if rows.is_empty() {
-            let (what, why) = match cx.state.running(TaskKind::Evaluate) {
+            let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
                 Some(_) => ("The table appears when all grasps are scored", "Cancel keeps what was scored until then"),
                 None => (
                     "No results yet",
@@ -51,11 +52,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     });
 }
 
-/// What is compared, and the buttons.
+/// Choice of what is compared, and the buttons.
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        let bundles: Vec<_> = cx.state.evaluated().map(|(b, chosen)| (b.clone(), chosen)).collect();
+        let bundles: Vec<_> = results::evaluated(cx.state).map(|(b, chosen)| (b.clone(), chosen)).collect();
         if bundles.is_empty() {
             ui.label(RichText::new("No generator was found").color(cx.p.caution));
         }
@@ -90,7 +91,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
-        match cx.state.running(TaskKind::Evaluate) {
+        match cx.state.tasks.of_kind(TaskKind::Evaluate) {
             Some((ticket, task)) => {
                 let now = &task.progress;
                 let text = match now.fraction() {
@@ -141,7 +142,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     });
 }
 
-/// Where the method's name, the number of grasps and each figure stand: as wide as their headings ask for.
+/// Cells of the method's name and of the figures, the number of grasps first: as wide as their headings ask for.
 fn cells(rect: Rect, shown: &[&Column]) -> (Rect, Vec<Rect>) {
     let letters = |text: &str| text.chars().count().max(6) as f32 + 1.0;
     let shares: Vec<f32> = std::iter::once("grasps").chain(shown.iter().map(|c| c.heading)).map(letters).collect();
@@ -166,10 +167,10 @@ fn heading(cx: &Cx<'_>, ui: &mut Ui, group: Group, shown: &[&Column]) {
     ui.painter_at(name).text(left, Align2::LEFT_CENTER, "Method", font.clone(), cx.p.weak);
     let grasps = ("grasps", "Grasps that were scored");
     let texts = std::iter::once(grasps).chain(shown.iter().map(|c| (c.heading, c.tip)));
-    for (at, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
+    for (column, ((text, tip), cell)) in texts.zip(numbers).enumerate() {
         let right = pos2(cell.right() - 6.0, cell.center().y);
         ui.painter_at(cell).text(right, Align2::RIGHT_CENTER, text, font.clone(), cx.p.weak);
-        ui.interact(cell, ui.scope_id().with((group.label(), at)), Sense::hover()).on_hover_text(tip);
+        ui.interact(cell, ui.scope_id().with((group.label(), column)), Sense::hover()).on_hover_text(tip);
     }
 }
 

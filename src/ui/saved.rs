@@ -7,7 +7,7 @@ use eframe::egui::Color32;
 use super::theme::Palette;
 use crate::app::labels::Document;
 
-/// What is known about saving.
+/// State of the saving, for the status bar.
 #[derive(Debug, Default)]
 pub(super) struct Saved {
     /// The pairs that were not saved yet, at the last look.

@@ -15,13 +15,14 @@ use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
-use crate::app::evaluate::{ScoreTable, SourceScores};
+use crate::app::scores::{ScoreTable, SourceScores};
+
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Metric, mean};
 
 /// Room for the numbers of the axes, points.
 const MARGIN: [f32; 2] = [44.0, 30.0];
-/// How near the pointer has to come to a point, points.
+/// Distance of the pointer from a point at which it means it, points.
 const NEAR: f32 = 8.0;
 /// A shorter drag is a click, points.
 const DRAG: f32 = 4.0;
@@ -37,7 +38,7 @@ struct Axis {
     metric: Metric,
 }
 
-/// What the colors of the points mean.
+/// Meaning of the points' colors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter)]
 enum Coloring {
     /// The tool.
@@ -56,14 +57,14 @@ impl Coloring {
     }
 }
 
-/// What is drawn.
+/// Choices of the scatter, and the rectangle being drawn.
 #[derive(Default)]
 pub(super) struct Memory {
     axes: [Option<Axis>; 2],
     coloring: Coloring,
-    /// Whether the first axis is shown as a histogram of each tool.
+    /// True where the first axis is shown as a histogram of each tool.
     by_tool: bool,
-    /// Where a rectangle was begun.
+    /// Corner at which a rectangle was begun.
     begun: Option<egui::Pos2>,
 }
 
@@ -121,22 +122,22 @@ fn axes(scores: &ScoreTable, memory: &Memory) -> Option<[Axis; 2]> {
     Some([x, y])
 }
 
-/// Which scores, and how they are shown.
+/// Choice of the scores, and of how they are shown.
 fn controls(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTable, mut axes: [Axis; 2]) -> [Axis; 2] {
     let shown = if memory.by_tool { 1 } else { 2 };
-    for (at, (axis, name)) in axes.iter_mut().zip(["x", "y"]).enumerate().take(shown) {
+    for (axis_index, (axis, name)) in axes.iter_mut().zip(["x", "y"]).enumerate().take(shown) {
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
             ui.label(caption(name, cx.p));
             let text = format!("{}: {}", axis.metric.name(), short(scores, &axis.source));
-            let combo = egui::ComboBox::from_id_salt(("axis", at)).width(ui.available_width() - 8.0);
+            let combo = egui::ComboBox::from_id_salt(("axis", axis_index)).width(ui.available_width() - 8.0);
             let response = combo.selected_text(text).truncate().show_ui(ui, |ui| {
                 for source in &scores.sources {
                     ui.label(caption(&*source.name, cx.p));
                     for metric in source.metrics() {
                         let this = Axis { source: source.name.clone(), metric };
                         if ui.selectable_label(*axis == this, metric.name()).on_hover_text(metric.tip()).clicked() {
-                            memory.axes[at] = Some(this.clone());
+                            memory.axes[axis_index] = Some(this.clone());
                             *axis = this;
                         }
                     }
@@ -171,8 +172,8 @@ fn short<'a>(scores: &'a ScoreTable, name: &'a str) -> &'a str {
 }
 
 /// A color for each of some tools, around the circle of hues.
-fn tool_color(dark: bool, at: usize, of: usize) -> Color32 {
-    let hue = at as f32 / of.max(1) as f32;
+fn tool_color(dark: bool, index: usize, of: usize) -> Color32 {
+    let hue = index as f32 / of.max(1) as f32;
     ecolor::Hsva::new(hue, 0.6, if dark { 0.95 } else { 0.65 }, 1.0).into()
 }
 
@@ -182,7 +183,7 @@ fn points(cx: &Cx<'_>, memory: &Memory, scores: &ScoreTable, axes: &[Axis; 2]) -
     let place = |name: &str| sources.iter().position(|source| *source.name == *name).unwrap_or(0);
     let series: Vec<[usize; 2]> = match memory.coloring {
         Coloring::Tool => vec![[place(&axes[0].source), place(&axes[1].source)]],
-        Coloring::Source => (0..sources.len()).map(|at| [at, at]).collect(),
+        Coloring::Source => (0..sources.len()).map(|source| [source, source]).collect(),
     };
     let tools = cx.state.library.open.as_ref().map_or(&[][..], |open| &open.tools);
     let dark = cx.p.canvas.r() < 128;
@@ -196,8 +197,8 @@ fn points(cx: &Cx<'_>, memory: &Memory, scores: &ScoreTable, axes: &[Axis; 2]) -
                 Coloring::Source => cx.p.prediction,
                 Coloring::Tool => {
                     let tool = cx.state.library.entry(*pair).and_then(|entry| entry.tool.as_ref());
-                    let at = tool.and_then(|tool| tools.iter().position(|t| t == tool));
-                    at.map_or(cx.p.text, |at| tool_color(dark, at, tools.len()))
+                    let index = tool.and_then(|tool| tools.iter().position(|t| t == tool));
+                    index.map_or(cx.p.text, |index| tool_color(dark, index, tools.len()))
                 }
             };
             points.push(Point { pair: *pair, at: [axes[0].metric.shown(x), axes[1].metric.shown(y)], color, source });
@@ -234,9 +235,9 @@ fn scatter(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, scores: &ScoreTabl
     if !plot.is_positive() {
         return;
     }
-    let place = |at: [f64; 2]| {
+    let place = |values: [f64; 2]| {
         let share = |v: f64, [low, high]: [f64; 2]| ((v - low) / (high - low)) as f32;
-        pos2(plot.left() + share(at[0], xs) * plot.width(), plot.bottom() - share(at[1], ys) * plot.height())
+        pos2(plot.left() + share(values[0], xs) * plot.width(), plot.bottom() - share(values[1], ys) * plot.height())
     };
     let painter = ui.painter_at(rect);
     painter.rect_filled(plot, 2.0, p.canvas);
@@ -406,7 +407,7 @@ fn histograms(cx: &mut Cx<'_>, ui: &mut Ui, scores: &ScoreTable, axis: &Axis) {
             let middle = 0.5 * (sorted[(sorted.len() - 1) / 2] + sorted[sorted.len() / 2]);
             let average = mean(sorted.iter().copied()).unwrap_or(middle);
             strip(cx, ui, height, tool, &bars, [average, middle].map(|v| ((v - low) / (high - low)) as f32), |bar| {
-                let edge = |at: usize| low + at as f64 * (high - low) / BARS as f64;
+                let edge = |bar: usize| low + bar as f64 * (high - low) / BARS as f64;
                 let n = bars[bar].len();
                 format!(
                     "{tool}: {n} pairs at {:.decimals$} to {:.decimals$}{unit}\nmean {average:.decimals$}{unit}, median {middle:.decimals$}{unit} of {}",
@@ -442,15 +443,17 @@ fn strip(
     painter.rect_filled(plot, 2.0, p.canvas);
     let most = bars.iter().map(Vec::len).max().unwrap_or(0).max(1) as f32;
     let width = plot.width() / bars.len() as f32;
-    let hovered =
-        response.hover_pos().filter(|at| plot.contains(*at)).map(|at| ((at.x - plot.left()) / width) as usize);
+    let hovered = response
+        .hover_pos()
+        .filter(|pointer| plot.contains(*pointer))
+        .map(|pointer| ((pointer.x - plot.left()) / width) as usize);
     let brush = cx.state.library.brush.clone();
-    for (at, pairs) in bars.iter().enumerate().filter(|(_, pairs)| !pairs.is_empty()) {
+    for (index, pairs) in bars.iter().enumerate().filter(|(_, pairs)| !pairs.is_empty()) {
         let height = (plot.height() - 2.0) * pairs.len() as f32 / most;
-        let left = plot.left() + at as f32 * width;
+        let left = plot.left() + index as f32 * width;
         let bar = Rect::from_min_max(pos2(left + 0.5, plot.bottom() - height), pos2(left + width - 0.5, plot.bottom()));
         let brushed = brush.as_ref().is_some_and(|brush| pairs.iter().all(|pair| brush.contains(pair)));
-        let color = if brushed || hovered == Some(at) { p.accent } else { p.prediction.gamma_multiply(0.8) };
+        let color = if brushed || hovered == Some(index) { p.accent } else { p.prediction.gamma_multiply(0.8) };
         painter.rect_filled(bar, 0.0, color);
     }
     let x = |share: f32| plot.left() + share * plot.width();

@@ -30,6 +30,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
+use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
@@ -46,7 +47,7 @@ pub(super) use overlay::{angle_text, error_color, pose_details, pose_time};
 /// Width of the column of buttons, points.
 const BUTTONS: f32 = 28.0;
 
-/// How near the pointer must be to a point to mean it, physical pixels.
+/// Distance of the pointer from a point at which it means it, physical pixels.
 const PICK_PX: f64 = 9.0;
 
 /// The views of both sides, and what the renderer holds of the results; lists are by [`ImprintSource`].
@@ -137,7 +138,7 @@ impl Memory {
         self.drawing.take().is_some()
     }
 
-    /// Where a point of the grasp frame (meters) appeared when a side was last drawn.
+    /// Place of a point of the grasp frame (meters) when a side was last drawn.
     pub(super) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
         self.views[source as usize].on_screen(point)
     }
@@ -154,7 +155,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         }
     };
     let state = cx.state;
-    let lookup = state.cloud(source);
+    let lookup = results::cloud(state, source);
     match (lookup, lookup.shown().is_some()) {
         (Lookup::Failed(err), _) => return images::failed(cx, ui, err),
         (Lookup::Absent(absent), _) => return images::absent_text(cx, ui, absent),
@@ -198,7 +199,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
     }
     let seconds = ui.input(|i| i.time);
-    if state.workbench.animate_weakest && state.pose(source).shown().is_some_and(|p| p.report.observability.is_some()) {
+    if state.workbench.animate_weakest
+        && results::pose(state, source).shown().is_some_and(|p| p.report.observability.is_some())
+    {
         // The only thing that moves by itself, and only while a person asked for it.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
@@ -210,7 +213,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         memory.moved = Some((pass, source));
     }
     let linked = state.settings.cameras_linked;
-    scene.moving = memory.moved.is_some_and(|(at, by)| pass <= at + 1 && (by == source || linked));
+    scene.moving = memory.moved.is_some_and(|(last_pass, by)| pass <= last_pass + 1 && (by == source || linked));
     if scene.moving {
         // Moving views are drawn coarsely: draw all there is once they rest.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
@@ -257,7 +260,7 @@ fn place_camera(
             cx.act(Action::Parallel);
         }
     }
-    let aimed = match (output.fit, output.pointer, cx.state.cloud(source)) {
+    let aimed = match (output.fit, output.pointer, results::cloud(cx.state, source)) {
         (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, output, pointer, clouds),
         _ => false,
     };
@@ -278,12 +281,13 @@ fn place_camera(
 /// Brings what the view draws up to date.
 fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let state = cx.state;
-    if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(source), state.cloud_key(source)) {
+    if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, source), results::cloud_key(state, source)) {
         build::update_cloud(cx, memory, source, key, clouds);
     }
     if state.workbench.both_clouds {
         let other = other_side(source);
-        if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, other), results::cloud_key(state, other))
+        {
             build::update_cloud(cx, memory, other, key, clouds);
         }
     }
@@ -350,11 +354,11 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
         // At rest, or while the view turns, the mark stays where it is.
         cx.shared.hover_claimed = true;
         let marked = cx.state.selection.hover.filter(|_| cx.state.selection.hover_point.is_some());
-        let found = marked.and_then(|hover| {
+        let point = marked.and_then(|hover| {
             let [x, y] = hover.at_px.map(|v| v.round().max(0.0) as usize);
             Some((hover.finger, clouds.finger(hover.finger)?.at_pixel(x, y)?))
         });
-        if let Some((finger, index)) = found {
+        if let Some((finger, index)) = point {
             say(cx, source, finger, index, clouds);
         }
         return;
@@ -379,7 +383,7 @@ fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output
     say(cx, source, finger, index, clouds);
 }
 
-/// What the status bar says of a point.
+/// Puts the figures of a point into the status bar.
 fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
     let cloud = clouds.finger(finger);
     let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
@@ -399,13 +403,14 @@ fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clou
     ));
 }
 
-/// How far a point lies from the registered model where distances are shown, meters; `None` of one outside the contact.
+/// Distance of a point from the registered model where distances are shown, meters; `None` of one outside the contact.
 fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
-    let found = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
+    let deviation =
+        results::deviation(cx.state, source).ready().filter(|_| results::shows_deviation(cx.state, source))?;
     let contact = &clouds.finger(finger)?.contact;
     // Distances are of the contact points alone, in their order.
-    let at = contact.get(..index)?.iter().filter(|contact| **contact).count();
-    let off = contact[index].then(|| found.points[finger].as_ref()?.get(at).copied())??;
+    let contact_index = contact.get(..index)?.iter().filter(|contact| **contact).count();
+    let off = contact[index].then(|| deviation.points[finger].as_ref()?.get(contact_index).copied())??;
     Some(f64::from(off)).filter(|off| off.is_finite())
 }
 

@@ -26,7 +26,7 @@ impl Device {
     /// Takes the window's device.
     ///
     /// # Errors
-    /// What keeps the shaders from being built: shown in place of the 3D views.
+    /// The error that keeps the shaders from being built: shown in place of the 3D views.
     pub(super) fn new(state: &RenderState) -> Result<Self, GpuError> {
         let gpu = Gpu::new(&state.adapter, state.device.clone(), state.queue.clone());
         let pipelines = Arc::new(Pipelines::new(&gpu)?);
@@ -39,18 +39,18 @@ impl Device {
     }
 }
 
-/// How much nearer a notch of the wheel brings the scene.
+/// Factor by which a notch of the wheel brings the scene nearer.
 const ZOOM_PER_NOTCH: f64 = 1.15;
 
 /// One view.
 #[derive(Default)]
 pub(super) struct SceneView {
-    /// Where it looks from.
+    /// Camera of the view.
     pub camera: Camera,
-    /// Whether the camera was placed by a fit or by a person.
+    /// True where the camera was placed by a fit or by a person.
     pub placed: bool,
     drawn: Option<Drawn>,
-    /// Where it was last drawn, and its size in physical pixels.
+    /// Rectangle in which it was last drawn, points, and its size in physical pixels.
     last: Option<(Rect, [u32; 2])>,
     error: Option<String>,
 }
@@ -62,7 +62,7 @@ struct Drawn {
     generation: u64,
 }
 
-/// What the pointer's buttons are for besides the camera.
+/// Use of the pointer's buttons besides the camera.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Grip {
     /// Nothing: the primary button turns the camera, the others move it.
@@ -75,7 +75,7 @@ pub(super) enum Grip {
     Stroke,
 }
 
-/// What happened in a view.
+/// Events in a view.
 pub(super) struct SceneOutput {
     /// The pane's response.
     pub response: Response,
@@ -83,21 +83,21 @@ pub(super) struct SceneOutput {
     pub size: [u32; 2],
     /// The pointer in physical pixels of the picture.
     pub pointer: Option<DVec2>,
-    /// Whether the camera was moved by the pointer.
+    /// True where the camera was moved by the pointer.
     pub moved: bool,
-    /// Whether a fit was asked for (double-click).
+    /// True where a fit was asked for (double-click).
     pub fit: bool,
     rect: Rect,
 }
 
 impl SceneOutput {
-    /// Where a point of the world appears on the screen.
+    /// Place of a point of the world on the screen.
     pub(super) fn on_screen(&self, camera: &Camera, p_in_world: DVec3) -> Option<Pos2> {
         place_on_screen(camera, self.rect, self.size, p_in_world)
     }
 }
 
-/// Where a point of the world appears in `rect`, which shows a picture of `size` physical pixels.
+/// Place of a point of the world in `rect`, which shows a picture of `size` physical pixels.
 fn place_on_screen(camera: &Camera, rect: Rect, size: [u32; 2], p_in_world: DVec3) -> Option<Pos2> {
     let (px, _) = camera.project(p_in_world, size)?;
     let scale = vec2(rect.width() / size[0].max(1) as f32, rect.height() / size[1].max(1) as f32);
@@ -145,7 +145,7 @@ impl SceneView {
         SceneOutput { response, size, pointer, moved, fit, rect }
     }
 
-    /// Where a point of the world appeared on the screen when the view was last shown.
+    /// Place of a point of the world on the screen when the view was last shown.
     pub(super) fn on_screen(&self, p_in_world: DVec3) -> Option<Pos2> {
         let (rect, size) = self.last?;
         place_on_screen(&self.camera, rect, size, p_in_world)

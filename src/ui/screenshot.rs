@@ -9,7 +9,7 @@ use crate::app::command::{Command, TasksCommand};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::folders;
 
-/// What becomes of a picture of the window.
+/// Use of a picture of the window.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Shot {
     /// The part that is wanted, points; `None` = all of it.

@@ -80,7 +80,7 @@ pub(super) fn pressed(
     actions
 }
 
-/// Whether an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
+/// True where an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
 pub(super) fn fits_pane(action: Action, over: Option<Pane>) -> bool {
     action != Action::PlaySteps || over.is_some_and(|pane| matches!(pane.kind(), Kind::Steps | Kind::Scene(_)))
 }
@@ -98,7 +98,7 @@ mod tests {
         }
     }
 
-    /// What the toolkit calls the modifiers of a shortcut.
+    /// Modifiers of a shortcut, as the toolkit calls them.
     fn modifiers(s: crate::app::action::Shortcut) -> Modifiers {
         Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
     }

@@ -50,7 +50,7 @@ pub struct Palette {
     pub strong: Color32,
     /// Captions and units.
     pub weak: Color32,
-    /// What is selected or running.
+    /// Color of what is selected or running.
     pub accent: Color32,
     /// Text on the accent.
     pub on_accent: Color32,

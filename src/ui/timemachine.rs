@@ -3,6 +3,7 @@
 mod plot;
 mod table;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Color32, ComboBox, Layout, Pos2, Rect, RichText, Shape, Slider, Stroke, Ui, UiBuilder, pos2, vec2,
@@ -43,8 +44,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         ui.set_min_size(full.size());
         row(ui, Rect::from_min_size(full.min, vec2(full.width(), ROW)), |ui| header(cx, ui));
         let body = Rect::from_min_max(pos2(full.left(), full.top() + ROW + 2.0), full.max);
-        let lookup = cx.state.inspection();
-        match (lookup, cx.state.inspected()) {
+        let lookup = results::inspection(cx.state);
+        match (lookup, results::inspected(cx.state)) {
             (Lookup::Failed(err), _) => {
                 let (why, own) = (err.why.clone(), cx.state.inspect.start.is_some());
                 let action = own.then(|| (Action::OwnStarts.name(), Action::OwnStarts.tooltip()));
@@ -118,7 +119,7 @@ pub(super) fn pose_text(grasp_from_object: PlanarPose) -> String {
     format!("{}, y {}, z {} mm", units::text_deg(lab), mm(y_m), mm(z_m))
 }
 
-/// What is looked at: imprint, registration, start.
+/// Choice of imprint, registration and start.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
@@ -130,16 +131,16 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     }
     ui.add_space(4.0);
-    let engine = cx.state.settings.pose_engine;
-    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(engine.label());
+    let registration = cx.state.settings.registration;
+    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(registration.label());
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
-            if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
+            if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
+                cx.out.push(prefer(move |s| s.registration = e.into()).into());
             }
         }
     });
-    combo.response.accessible_name("Registration of the steps").on_hover_text(engine.by.description());
+    combo.response.accessible_name("Registration of the steps").on_hover_text(registration.by.description());
     ui.add_space(4.0);
     match inspect.start.map(PoseBits::get) {
         Some(start) => {
@@ -161,7 +162,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// One button per start; the winner is marked.
 fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let Some(shown) = cx.state.inspected() else { return };
+    let Some(shown) = results::inspected(cx.state) else { return };
     ui.label(caption("start", cx.p));
     let inspection = shown.inspection.clone();
     /// More do not fit beside each other: they are chosen in the curves.
@@ -190,7 +191,7 @@ fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// What is drawn on a button of the transport.
+/// Icon on a button of the transport.
 #[derive(Clone, Copy)]
 enum Icon {
     First,
@@ -203,15 +204,15 @@ enum Icon {
 
 impl Icon {
     /// Twelve points across. Drawn, because no font of the program has all of them.
-    fn paint(self, ui: &Ui, at: Pos2, color: Color32) {
+    fn paint(self, ui: &Ui, center: Pos2, color: Color32) {
         let painter = ui.painter();
         let bar = |x: f32, width: f32| {
-            painter.rect_filled(Rect::from_center_size(at + vec2(x, 0.0), vec2(width, 10.0)), 0.0, color);
+            painter.rect_filled(Rect::from_center_size(center + vec2(x, 0.0), vec2(width, 10.0)), 0.0, color);
         };
         // Points to the right for 1, to the left for -1.
         let triangle = |x: f32, side: f32| {
             let corners = [vec2(-4.0 * side, -5.0), vec2(4.0 * side, 0.0), vec2(-4.0 * side, 5.0)];
-            let corners = corners.map(|c| at + vec2(x, 0.0) + c).to_vec();
+            let corners = corners.map(|c| center + vec2(x, 0.0) + c).to_vec();
             painter.add(Shape::convex_polygon(corners, color, Stroke::NONE));
         };
         match self {

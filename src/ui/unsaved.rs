@@ -65,7 +65,7 @@ pub(super) fn question(cx: &mut Cx<'_>, ctx: &egui::Context) {
     }
 }
 
-/// Which pairs, and why not.
+/// Pairs that are not saved, and why.
 fn said(cx: &Cx<'_>, ui: &mut egui::Ui) {
     let doc = &cx.state.document;
     let first = doc.unsaved.first().map_or("", String::as_str);

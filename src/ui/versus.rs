@@ -4,6 +4,7 @@ mod choose;
 mod figures;
 mod space;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
@@ -26,9 +27,9 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::subject::Subject;
 
-/// What the comparison remembers.
+/// Memory of the comparison.
 pub(super) struct Memory {
-    /// Where the line of the wipe stands, as a share of the picture's width.
+    /// Position of the wipe's line, as a share of the picture's width.
     wipe: f32,
     /// The 3D view.
     space: space::Space,
@@ -70,14 +71,14 @@ fn color(p: &Palette, versus: &Versus, letter: Letter) -> Color32 {
     }
 }
 
-/// Whether the key is held that shows B in the place of A.
+/// True while the key is held that shows B in the place of A.
 fn flickers(ui: &Ui) -> bool {
     let held = ui.input(|i| i.key_down(egui::Key::F) && i.modifiers.is_none());
     held && !ui.ctx().egui_wants_keyboard_input()
 }
 
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    let versus = cx.state.versus();
+    let versus = cx.state.settings.compared();
     let held = egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
         let held = header(cx, ui, &versus);
         figures::show(cx, ui, &versus);
@@ -108,11 +109,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         for (letter, rect) in parts {
             let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
             child.set_clip_rect(rect.intersect(ui.clip_rect()));
-            let found = match versus.mode {
+            let drawn = match versus.mode {
                 VersusMode::Difference => difference(cx, &mut child, &versus, *finger),
                 _ => picture(cx, &mut child, memory, &versus, letter, *finger, flipped),
             };
-            histogram = found.or(histogram);
+            histogram = drawn.or(histogram);
         }
     }
     let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
@@ -123,7 +124,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     bar::color_bar(cx, &mut child, pane, histogram.as_ref());
 }
 
-/// What is compared, and how; whether the button is held that shows B in the place of A.
+/// Choice of what is compared, and how; true while the button is held that shows B in the place of A.
 fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
     let mut held = false;
     ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
@@ -163,7 +164,7 @@ fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> Canvas
     output
 }
 
-/// What stands where there is no picture.
+/// Placeholder for a picture.
 fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
     match lookup {
         Lookup::Failed(err) => failed(cx, ui, err),
@@ -189,7 +190,7 @@ fn picture(
 ) -> Option<Histogram> {
     let letter = if flipped { Letter::B } else { letter };
     let subject = letter.of(versus);
-    let lookup = cx.state.subject(subject, finger);
+    let lookup = results::subject(cx.state, subject, finger);
     let Some(depth) = lookup.shown() else {
         instead(cx, ui, lookup);
         return None;
@@ -222,7 +223,7 @@ fn paint(
     finger: PadId,
     depth: &DepthMap,
 ) -> Option<Histogram> {
-    let recipe = cx.state.subject_key(subject, finger).ok()?;
+    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = (map_of(cx.state), range_of(cx.state));
     let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
@@ -251,7 +252,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
         memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
     }
     let right = clip.with_min_x(x);
-    if let Some(depth) = cx.state.subject(&versus.b, finger).shown() {
+    if let Some(depth) = results::subject(cx.state, &versus.b, finger).shown() {
         let painter = output.painter.with_clip_rect(right);
         let part = CanvasOutput {
             response: output.response.clone(),
@@ -272,26 +273,26 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
 /// A minus B.
 fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> Option<Histogram> {
     for subject in [&versus.a, &versus.b] {
-        let lookup = cx.state.subject(subject, finger);
+        let lookup = results::subject(cx.state, subject, finger);
         if lookup.shown().is_none() {
             instead(cx, ui, lookup);
             return None;
         }
     }
-    let lookup = cx.state.subjects_compared(&versus.a, &versus.b, finger);
-    let Some(found) = lookup.shown() else {
-        instead(cx, ui, lookup.map(|found| &found.error));
+    let lookup = results::subjects_compared(cx.state, &versus.a, &versus.b, finger);
+    let Some(compared) = lookup.shown() else {
+        instead(cx, ui, lookup.map(|compared| &compared.error));
         return None;
     };
     let label = format!("A minus B {}", cx.state.finger_name(finger));
-    let output = canvas(cx, ui, &label, found.error.size());
+    let output = canvas(cx, ui, &label, compared.error.size());
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let keys = [&versus.a, &versus.b].map(|subject| cx.state.subject_key(subject, finger));
+    let keys = [&versus.a, &versus.b].map(|subject| results::subject_key(cx.state, subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
     let range = Range::symmetric(cx.shared.views.error_m());
     let key = (VersusKey { a, b }, range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
-        (depth_image(&found.error, ColorMap::Diverging, range), Histogram::of(found.error.as_slice()))
+        (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
     });
     output.paint(picture.texture.id(), Color32::WHITE);
     let histogram = picture.histogram.clone();
@@ -303,7 +304,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     histogram
 }
 
-/// What lies over every picture: GelSlim's window, cross-hair, the values under the pointer.
+/// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
 fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) {
     if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
         output.dashed_rect(link.window, Color32::from_gray(235));
@@ -312,8 +313,8 @@ fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) 
         readout(cx, output, versus, finger, px);
         hover(cx, finger, px);
     }
-    if let Some(at) = cx.state.selection.hover.filter(|h| h.finger == finger) {
-        output.crosshair(at.at_px, Color32::WHITE);
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger) {
+        output.crosshair(point.at_px, Color32::WHITE);
     }
 }
 
@@ -321,7 +322,7 @@ fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) 
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let value = |subject: &Subject| {
-        let depth = cx.state.subject(subject, finger).shown()?;
+        let depth = results::subject(cx.state, subject, finger).shown()?;
         depth.get(x, y).copied().filter(|v| v.is_finite()).map(f64::from)
     };
     let (a, b) = (value(&versus.a), value(&versus.b));

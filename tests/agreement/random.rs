@@ -19,6 +19,7 @@ use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
 use serde::Serialize;
 use serde_json::Value;
 use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::export;
 use touch2touch::app::library::Place;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -121,7 +122,8 @@ impl Both {
 
     /// The words of *Copy command*, with what they write in the home of the verbs.
     fn words(&self, pane: Pane) -> Vec<String> {
-        let words = self.studio.state.equivalent_words(pane, 0.004).unwrap_or_else(|| panic!("{pane:?}: no command"));
+        let words =
+            export::equivalent_words(&self.studio.state, pane, 0.004).unwrap_or_else(|| panic!("{pane:?}: no command"));
         let mut out = false;
         let placed = words.into_iter().skip(1).map(|word| {
             let placed = if std::mem::replace(&mut out, word == "--out") { self.at(&word) } else { word };

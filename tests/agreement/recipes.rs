@@ -4,6 +4,7 @@
 use std::path::Path;
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::settings::prefer;
+use touch2touch::app::{export, recipe, results};
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -125,7 +126,7 @@ pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
     let change = prefer(move |s| {
         s.runtime = EngineChoice::Rten;
         s.generate = generate.clone();
-        (s.shift, s.mask.choice, s.pose_engine) = (shift, mask, registration);
+        (s.shift, s.mask.choice, s.registration) = (shift, mask, registration);
     });
     studio.send(change.into());
 }
@@ -135,7 +136,7 @@ pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
 fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     let (state, mut compared) = (&studio.state, 0);
     let said = |pane| {
-        let words = state.equivalent_words(pane, 0.004).unwrap();
+        let words = export::equivalent_words(state, pane, 0.004).unwrap();
         // What it writes goes where the test's files are.
         let out = home.join("predictions").display().to_string();
         let words = words[1..].iter().map(|word| if word == "predictions" { &out } else { word });
@@ -143,7 +144,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     };
     let (poses, name) = (said(Pane::Metrics), state.pair_name());
     let made = {
-        let words = state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(state, ImprintSource::Predicted).words(Stage::Pose).list();
         let case = home.join(format!("{}.t2tcase", file_name(state)));
         let begin = ["case", "make", path, "--pair", name, "--out", case.to_str().unwrap(), "--json"];
         let done = run(&begin.into_iter().chain(words.iter().map(String::as_str)).collect::<Vec<_>>(), home);
@@ -154,7 +155,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     for source in ImprintSource::iter() {
         let case = cases.iter().find(|case| case["imprint"] == source.key());
         let angle = case.map_or(&Value::Null, |case| &case["angle_deg"]);
-        let shown = state.pose(source).ready();
+        let shown = results::pose(state, source).ready();
         assert_eq!(*angle, optional(shown.map(|pose| pose.angle_rad.to_degrees())), "{name} {source:?}: {case:?}");
         let in_case = made.as_ref().map_or(&[][..], |made| made["angles_deg"].as_array().unwrap());
         let in_case = in_case.iter().find(|of| of[0] == source.key());
@@ -168,7 +169,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     }
     let generated = said(Pane::Generate);
     for finger in state.rig().pads() {
-        let Lookup::Ready(found) = state.comparison(finger) else { continue };
+        let Lookup::Ready(found) = results::comparison(state, finger) else { continue };
         let key = state.finger_name(finger).to_string();
         let rows = generated["pairs"].as_array().unwrap();
         let row = rows.iter().find(|row| row["finger"] == key.as_str()).unwrap();
@@ -241,7 +242,7 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
         recipe.generator.get_or_insert_with(|| (model("generator"), GenerateConfig::default()));
         put(&mut studio, &recipe);
-        let words = studio.state.equivalent_words(Pane::Results, 0.004).unwrap();
+        let words = export::equivalent_words(&studio.state, Pane::Results, 0.004).unwrap();
         studio.send(EvaluateCommand::Start.into());
         let shown = studio.state.table.result.clone().expect("the table was made");
         let said = json(&words[1..].iter().map(String::as_str).collect::<Vec<_>>(), other.path());

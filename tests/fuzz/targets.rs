@@ -399,7 +399,12 @@ fn read_review(dir: &Path, _: &Path) -> Outcome {
 }
 
 fn recipe() -> KeptKey {
-    KeptKey::new("ab".repeat(32), "cd".repeat(32), EngineKind::Rten, &GenerateConfig::default())
+    KeptKey {
+        input: "ab".repeat(32),
+        bundle: "cd".repeat(32),
+        engine: EngineKind::Rten,
+        config: GenerateConfig::default(),
+    }
 }
 
 /// Where a prediction of [`recipe`] is kept: a store says so by writing one.

@@ -11,10 +11,10 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{Marks, Provenance, paint_where};
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::{ByImprint, FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
+use touch2touch_work::io::predicted_id::PredictedId;
 
 use super::touch_file;
 

@@ -25,7 +25,7 @@ use touch2touch_core::units::angle_error;
 
 /// Pairs that are prepared, then timed, at a time: their cameras must fit into memory.
 const CHUNK: usize = 504;
-/// How far each pair is moved from the grasp it was made from.
+/// Largest turn and shift of each pair from the grasp it was made from.
 const JITTER_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 const JITTER_M: f64 = 1e-3;
 
@@ -88,9 +88,9 @@ struct Report {
     points_to_pose: Stage,
     /// Imprints, cameras and masks of both fingers to pose.
     depth_to_pose: Stage,
-    /// What the times leave out.
+    /// Work that the times leave out.
     excluded: &'static str,
-    /// How the pairs were made.
+    /// Origin of the pairs.
     made: String,
 }
 
@@ -121,7 +121,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             .map(|i| pair(&grasps[i % count], i, args.seed))
             .collect::<anyhow::Result<_>>()?;
         let begin = Instant::now();
-        let found: Vec<f64> = chunk
+        let errors: Vec<f64> = chunk
             .par_iter()
             .map(|p| {
                 let report = register(&p.points, &tools[p.grasp.tool], args.engine, false);
@@ -129,9 +129,9 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             })
             .collect();
         points_seconds += begin.elapsed().as_secs_f64();
-        points_errors.extend(found);
+        points_errors.extend(errors);
         let begin = Instant::now();
-        let found: Vec<f64> = chunk
+        let errors: Vec<f64> = chunk
             .par_iter()
             .map(|p| {
                 let points = contact_points(&p.grasp.imprints, &p.cameras, &p.grasp.masks).unwrap_or_default();
@@ -140,7 +140,7 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             })
             .collect();
         depth_seconds += begin.elapsed().as_secs_f64();
-        depth_errors.extend(found);
+        depth_errors.extend(errors);
     }
     let stage = |seconds: f64, errors: &[f64]| Stage {
         seconds,

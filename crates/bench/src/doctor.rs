@@ -47,7 +47,7 @@ pub(super) struct DoctorArgs {
     /// Poses are not known.
     #[arg(long)]
     no_poses: bool,
-    /// Which engine runs the generator.
+    /// Engine that runs the generator.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
     #[command(flatten)]
@@ -56,14 +56,14 @@ pub(super) struct DoctorArgs {
 
 #[derive(Serialize)]
 struct Row {
-    /// How it was stored.
+    /// Way in which it was stored.
     kind: String,
     sets: usize,
     /// Sets where that was said, and nothing else.
     named: usize,
     /// Sets where something was said.
     noticed: usize,
-    /// What was said otherwise.
+    /// Other causes that were named.
     otherwise: Vec<String>,
 }
 
@@ -88,8 +88,8 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     let conditions = Condition::iter().count() * args.sound as usize;
     let output = Output::new(args.json.common(), "judging", kinds.len() * args.sets as usize + conditions);
     let models = Models::new(None);
-    let found = (!args.no_generator).then(|| bundles::find(&[]).take(BundleKind::Generator, None, &Rig::lab()));
-    let bundle = found.transpose()?;
+    let bundle = (!args.no_generator).then(|| bundles::find(&[]).take(BundleKind::Generator, None, &Rig::lab()));
+    let bundle = bundle.transpose()?;
     let config = bundle.as_ref().and_then(|bundle| Some(bundle.generator.as_ref()?.defaults));
     let generator: Option<Generator<'_>> = bundle
         .as_ref()
@@ -164,10 +164,10 @@ fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
     };
     let all = tools();
     let mut set = Set { pairs: Vec::new(), tools: Default::default() };
-    for at in 0..u64::from(args.pairs) {
-        let pick = (at + u64::from(number) * u64::from(args.pairs)) as usize % all.len();
-        let spec: ToolSpec = condition.tool(&all[pick], at);
-        let seed = args.seed.wrapping_mul(0x9e37_79b9) ^ (u64::from(number) << 32) ^ at;
+    for index in 0..u64::from(args.pairs) {
+        let pick = (index + u64::from(number) * u64::from(args.pairs)) as usize % all.len();
+        let spec: ToolSpec = condition.tool(&all[pick], index);
+        let seed = args.seed.wrapping_mul(0x9e37_79b9) ^ (u64::from(number) << 32) ^ index;
         let mut sample = condition.simulate(&spec, random_grasp(seed), seed, &config);
         if args.no_poses {
             sample.grasp_from_object = None;

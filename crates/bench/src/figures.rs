@@ -1,4 +1,4 @@
-//! What is said about an engine: errors, times and flags over all cases and over each stratum.
+//! Figures of an engine: errors, times and flags over all cases and over each stratum.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ pub(super) const GROSS_DEG: f64 = 20.0;
 #[derive(Clone, Debug)]
 pub(super) struct Outcome {
     pub(super) stratum: Stratum,
-    /// Whether the tool is one straight bar, along which a pose is free.
+    /// True where the tool is one straight bar, along which a pose is free.
     pub(super) straight: bool,
     /// Degrees; NaN without a pose.
     pub(super) error_deg: f64,
@@ -27,9 +27,9 @@ pub(super) struct Outcome {
     pub(super) first_ms: f64,
     /// Nearest-surface questions; 0 if the engine does not say.
     pub(super) lookups: f64,
-    /// Whether the engine said that a direction of the pose is free; `None` if it cannot tell.
+    /// True where the engine said that a direction of the pose is free; `None` if it cannot tell.
     pub(super) flagged: Option<bool>,
-    /// Which part of the engine answered, if it says.
+    /// Part of the engine that answered, if it says.
     pub(super) rung: Option<String>,
 }
 
@@ -47,7 +47,8 @@ pub(super) struct AngleMetrics {
     /// Points to pose, one thread: median and 95th percentile over the cases of each case's median repetition.
     pub(super) median_ms: Option<f64>,
     pub(super) p95_ms: Option<f64>,
-    /// The same of each case's fastest repetition: the engine without disturbance by other programs.
+    /// Times of each case's fastest repetition, median and 95th percentile: the engine without disturbance by other
+    /// programs.
     best_median_ms: Option<f64>,
     best_p95_ms: Option<f64>,
     /// Median over the cases of the first call, which finds nothing in the processor's cache.
@@ -60,7 +61,7 @@ pub(super) struct AngleMetrics {
     flagged_missed: usize,
     /// Other tools that were.
     flagged_false: usize,
-    /// How many cases each part of the engine answered.
+    /// Number of cases that each part of the engine answered.
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub(super) rungs: BTreeMap<String, usize>,
 }
@@ -129,9 +130,9 @@ pub(super) fn quantile(values: impl Iterator<Item = f64>, q: f64) -> Option<f64>
     let mut values: Vec<f64> = values.filter(|v| v.is_finite()).collect();
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
-    let at = q * last as f64;
-    let low = values[at.floor() as usize];
-    Some(low + (values[at.ceil() as usize] - low) * at.fract())
+    let rank = q * last as f64;
+    let low = values[rank.floor() as usize];
+    Some(low + (values[rank.ceil() as usize] - low) * rank.fract())
 }
 
 #[cfg(test)]

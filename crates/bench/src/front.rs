@@ -12,12 +12,12 @@ use touch2touch_work::canvas::{Drawing, Drawn, Paper};
 pub(super) struct FrontPoint {
     pub(super) name: String,
     pub(super) peer: bool,
-    /// What the picture shows: the mean processor time of a pose where it is known of all engines, else the median of
-    /// the clock. On a busy machine the clock charges long runs for other programs' work.
+    /// Time that the picture shows, milliseconds: the mean processor time of a pose where it is known of all engines,
+    /// else the median of the clock. On a busy machine the clock charges long runs for other programs' work.
     pub(super) ms: f64,
     pub(super) mean_deg: f64,
     pub(super) median_deg: f64,
-    /// Whether no other engine is at least as fast and as accurate in the mean, and better in one of the two.
+    /// True where no other engine is at least as fast and as accurate in the mean, and better in one of the two.
     pub(super) on_front: bool,
 }
 
@@ -38,7 +38,7 @@ pub(super) fn front(rows: &[EngineRow]) -> Vec<FrontPoint> {
     pareto(points.collect())
 }
 
-/// Whether the system told the processor time of every engine.
+/// True where the system told the processor time of every engine.
 pub(super) fn uses_processor_time(rows: &[EngineRow]) -> bool {
     rows.iter().all(|row| row.cpu_mean_ms.is_some_and(|ms| ms > 0.0))
 }
@@ -62,12 +62,12 @@ const FRONT: RGBColor = RGBColor(60, 150, 90);
 /// Height of the letters.
 const LETTERS: f64 = 16.0;
 
-/// What stands around the picture.
+/// Texts around the picture.
 pub(super) struct Axis<'a> {
     pub(super) title: &'a str,
-    /// Of the axis of time.
+    /// Title of the axis of time.
     pub(super) time: &'a str,
-    /// Behind the numbers of the axis of the error.
+    /// Unit behind the numbers of the axis of the error.
     pub(super) unit: &'a str,
     /// The colors in words.
     pub(super) legend: &'a [(RGBColor, &'a str)],
@@ -163,7 +163,8 @@ impl Drawing for Picture<'_> {
             if p.name == self.default {
                 discs.splice(2..2, [(mean, 10.0, color), (mean, 8.0, WHITE)]);
             }
-            let disc = |(at, radius, color): (_, _, RGBColor)| Circle::new(at, paper.wide(radius), color.filled());
+            let disc =
+                |(center, radius, color): (_, _, RGBColor)| Circle::new(center, paper.wide(radius), color.filled());
             chart.draw_series(discs.into_iter().map(disc))?;
         }
 
@@ -181,16 +182,16 @@ impl Drawing for Picture<'_> {
             labels.take(chart.backend_coord(&pair[0]), chart.backend_coord(&pair[1]), 2);
         }
         for (p, color) in colored() {
-            let at = chart.backend_coord(&(p.ms, p.mean_deg));
+            let point = chart.backend_coord(&(p.ms, p.mean_deg));
             let label = if p.name == self.default { format!("{} (default)", p.name) } else { p.name.clone() };
             let style = paper.letters(LETTERS, color);
             let (w, h) = paper.area.estimate_text_size(&label, &style)?;
-            let [left, top, right, bottom] = labels.place([w as i32, h as i32], at);
+            let [left, top, right, bottom] = labels.place([w as i32, h as i32], point);
             // A label that had to give way is joined to its point.
             let middle = (top + bottom) / 2;
-            if (middle - at.1).abs() > paper.px(10.0) {
-                let end = if left > at.0 { left } else { right };
-                paper.area.draw(&PathElement::new([at, (end, middle)], paper.stroke(MUTED, 0.7)))?;
+            if (middle - point.1).abs() > paper.px(10.0) {
+                let end = if left > point.0 { left } else { right };
+                paper.area.draw(&PathElement::new([point, (end, middle)], paper.stroke(MUTED, 0.7)))?;
             }
             // White behind the letters, where lines of other engines pass.
             paper.area.draw(&Rectangle::new([(left, top), (right, bottom)], WHITE.filled()))?;
@@ -215,7 +216,7 @@ impl Labels {
         self.taken.push([a.0.min(b.0) - m, a.1.min(b.1) - m, a.0.max(b.0) + m, a.1.max(b.1) + m]);
     }
 
-    /// Where a label fits beside its point without covering what is there already.
+    /// Place of a label beside its point that covers nothing that is there already.
     fn place(&mut self, [w, h]: [i32; 2], point: (i32, i32)) -> [i32; 4] {
         let (gap, step) = (13 * self.unit, 16 * self.unit);
         let mut places = (0..14).flat_map(|i: i32| {
@@ -224,14 +225,14 @@ impl Labels {
         });
         let first = [point.0 + gap, point.1 - h / 2, point.0 + gap + w, point.1 - h / 2 + h];
         let [left, top, right, bottom] = self.plot;
-        let at = places
+        let rectangle = places
             .find(|b| {
                 let inside = b[0] > left && b[2] < right && b[1] > top && b[3] < bottom;
                 inside && self.taken.iter().all(|t| b[2] < t[0] || b[0] > t[2] || b[3] < t[1] || b[1] > t[3])
             })
             .unwrap_or(first);
-        self.taken.push(at);
-        at
+        self.taken.push(rectangle);
+        rectangle
     }
 }
 

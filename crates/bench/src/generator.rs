@@ -27,9 +27,9 @@ use touch2touch_work::infer::generator::Generator;
 use touch2touch_work::infer::mask::MaskModel;
 use touch2touch_work::io::atomic;
 
-/// What everything is measured against.
+/// Sampler and steps that everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);
-/// How much worse than the reference the knee may be, and which share of its time it may take.
+/// Largest error of the knee, relative to the reference's, and the share of its time that it may take.
 const WORSE: f64 = 1.02;
 const SHARE: f64 = 0.1;
 
@@ -123,7 +123,7 @@ struct Knee {
     engine: EngineKind,
     /// By root mean square error alone: within 2 % of the reference in at most a tenth of its time.
     by_rmse: Option<String>,
-    /// The same for the mean angle error.
+    /// By the mean angle error alone, likewise.
     by_angle: Option<String>,
     /// For both at once.
     both: Option<String>,
@@ -149,12 +149,13 @@ struct Report {
 }
 
 pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
-    let found = bundles::find(&[]);
-    let bundle = found.take(BundleKind::Generator, args.bundle.as_deref(), &Rig::lab())?.open("Open the generator")?;
+    let available = bundles::find(&[]);
+    let bundle =
+        available.take(BundleKind::Generator, args.bundle.as_deref(), &Rig::lab())?.open("Open the generator")?;
     let spec = bundle.generator().ok_or_else(|| anyhow::anyhow!("{} is not a generator", bundle.name()))?;
     let (defaults, training_steps) = (spec.defaults, spec.schedule.training_steps());
     let mask_bundle =
-        found.take(BundleKind::Mask, args.mask_bundle.as_deref(), &Rig::lab())?.open("Open the mask model")?;
+        available.take(BundleKind::Mask, args.mask_bundle.as_deref(), &Rig::lab())?.open("Open the mask model")?;
     let engines = engines(args.engine)?;
     let machine = Machine::now();
     let configs = configs(args, defaults, training_steps);
@@ -173,10 +174,10 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
     let total: usize = (0..engines.len()).map(|e| subset(e).len()).sum();
     let output = Output::new(args.json.common(), "generating", total);
     let (mut rows, mut overhead, mut first) = (Vec::new(), Vec::new(), Vec::new());
-    for (at, &engine) in engines.iter().enumerate() {
-        let (found, mut generator) = timing::first(&bundle, engine, &cases[0], &defaults)?;
-        first.push(found);
-        rows.extend(measure(&mut generator, engine, &configs, &subset(at), &mut judge, &output)?);
+    for (index, &engine) in engines.iter().enumerate() {
+        let (wait, mut generator) = timing::first(&bundle, engine, &cases[0], &defaults)?;
+        first.push(wait);
+        rows.extend(measure(&mut generator, engine, &configs, &subset(index), &mut judge, &output)?);
         overhead.push(timing::overhead(&mut generator, engine, &cases, &defaults)?);
     }
     let knees = engines.iter().map(|&engine| knee(engine, &rows)).collect();
@@ -270,10 +271,10 @@ fn measure(
     let mut scores: Vec<Vec<Score>> = configs.iter().map(|_| Vec::new()).collect();
     for case in cases {
         output.step(&case.name);
-        for (at, config) in configs.iter().enumerate() {
+        for (index, config) in configs.iter().enumerate() {
             let (ms, imprints) = timed_run(generator, case, config)?;
-            times[at].push(ms);
-            scores[at].push(judge.score(case, &imprints)?);
+            times[index].push(ms);
+            scores[index].push(judge.score(case, &imprints)?);
         }
     }
     let rows = configs.iter().zip(times.iter().zip(&scores)).map(|(config, (ms, scores))| {

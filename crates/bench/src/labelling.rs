@@ -54,7 +54,7 @@ pub(super) struct LabellingArgs {
     json: JsonArgs,
 }
 
-/// What one source proposes on the imprints of one kind.
+/// Figures of what one source proposes on the imprints of one kind.
 #[derive(Serialize)]
 struct Row {
     imprint: &'static str,
@@ -62,9 +62,9 @@ struct Row {
     /// With the true contact, mean over fingers; `None` where nothing could be proposed.
     iou: Option<f64>,
     iou_worst: Option<f64>,
-    /// Of the poses registered from the proposed masks, degrees, mean.
+    /// Angle error of the poses registered from the proposed masks, degrees, mean.
     angle_error_deg: Option<f64>,
-    /// Between those and the poses registered from the true masks of the same imprints, degrees, mean.
+    /// Angle between those and the poses registered from the true masks of the same imprints, degrees, mean.
     apart_from_true_masks_deg: Option<f64>,
     /// Grasps without a pose.
     no_pose: usize,
@@ -72,7 +72,7 @@ struct Row {
     ms: Option<f64>,
 }
 
-/// What a stroke costs besides the screen.
+/// Cost of a stroke besides the screen.
 #[derive(Serialize)]
 struct Stroke {
     size: [usize; 2],
@@ -86,10 +86,10 @@ struct Stroke {
     largest_upload: f64,
 }
 
-/// What follows the end of a stroke on the imprints of both fingers until its pose is there, besides the screen.
+/// Work that follows the end of a stroke on the imprints of both fingers until its pose is there, besides the screen.
 #[derive(Serialize)]
 struct Follow {
-    /// What the strokes change: masks of the true contact, or all that is deeper than the threshold.
+    /// Masks that the strokes change: of the true contact, or of all that is deeper than the threshold.
     masks: &'static str,
     size: [usize; 2],
     strokes: usize,
@@ -131,12 +131,12 @@ struct Report {
     follows: Vec<Follow>,
     /// The IoU at which a mask is done.
     target: f64,
-    /// What a mask takes a person, by the way to begin.
+    /// Work of a person on a mask, by the way to begin.
     actions: Vec<actions::Row>,
 }
 
 /// Proposals of one source, by grasp.
-struct Found {
+struct Proposals {
     source: &'static str,
     ious: Vec<f64>,
     errors: Vec<Option<f64>>,
@@ -158,19 +158,19 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
     for &imprint in imprints {
         let recipe = args.model.recipe(imprint, &rig)?;
         let recipe = Recipe { mask_model: args.model.mask_model(false, &rig)?, ..recipe };
-        let mut found: Vec<Found> = Vec::new();
-        for (at, case) in cases.iter().enumerate() {
+        let mut sources: Vec<Proposals> = Vec::new();
+        for (index, case) in cases.iter().enumerate() {
             output.step(&case.name);
             let imprints = match imprint {
                 ImprintSource::Measured => measured(&case.sample),
                 ImprintSource::Predicted => {
-                    let made = recipe.generating()?.pair(&models, &case.sample, &JobCx::unwatched())?;
-                    imprints_of(&made, recipe.shift, &case.sample)?
+                    let generated = recipe.generating()?.pair(&models, &case.sample, &JobCx::unwatched())?;
+                    imprints_of(&generated, recipe.shift, &case.sample)?
                 }
             };
             // What is carried comes from the grasp of the same tool before, else from the next one.
             let same = |from: &&Case| std::sync::Arc::ptr_eq(&from.tool, &case.tool);
-            let from = cases[..at].iter().rev().find(same).or_else(|| cases[at + 1..].iter().find(same));
+            let from = cases[..index].iter().rev().find(same).or_else(|| cases[index + 1..].iter().find(same));
             let truth = true_masks(case)?;
             let true_pose = registered(case, &imprints, &truth);
             let proposed = proposals((&recipe, &models), case, from, (imprint, &imprints), &truth)?;
@@ -178,23 +178,25 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
                 persons.correct(&proposed, &imprints, &truth, args.simulation_seed);
             }
             for (source, masks, ms) in proposed {
-                let place = found.iter().position(|found| found.source == source).unwrap_or_else(|| {
-                    found.push(Found { source, ious: vec![], errors: vec![], apart: vec![], ms: vec![] });
-                    found.len() - 1
+                let place = sources.iter().position(|one| one.source == source).unwrap_or_else(|| {
+                    sources.push(Proposals { source, ious: vec![], errors: vec![], apart: vec![], ms: vec![] });
+                    sources.len() - 1
                 });
-                let one = &mut found[place];
+                let one = &mut sources[place];
                 for pad in lab::PADS {
                     if let (Some(mask), Some(truth)) = (&masks[pad], &truth[pad]) {
-                        one.ious.extend(agreement(mask, truth, Rig::lab().depth_px_per_mm()).map(|found| found.iou));
+                        one.ious.extend(
+                            agreement(mask, truth, Rig::lab().depth_px_per_mm()).map(|agreement| agreement.iou),
+                        );
                     }
                 }
-                let at = registered(case, &imprints, &masks);
-                one.errors.push(at.map(|at| apart_deg(at, case.truth)));
-                one.apart.extend(at.zip(true_pose).map(|(a, b)| apart_deg(a, b)));
+                let pose = registered(case, &imprints, &masks);
+                one.errors.push(pose.map(|pose| apart_deg(pose, case.truth)));
+                one.apart.extend(pose.zip(true_pose).map(|(a, b)| apart_deg(a, b)));
                 one.ms.push(ms);
             }
         }
-        rows.extend(found.into_iter().map(|found| row(imprint, &found)));
+        rows.extend(sources.iter().map(|one| row(imprint, one)));
     }
     let strokes = [([175, 140], 4.0), ([1024, 1024], 4.0), ([1024, 1024], 40.0)];
     let strokes = strokes.into_iter().filter(|_| !args.actions);
@@ -236,7 +238,7 @@ const WAYS: [(&str, Option<&str>, [usize; 2]); 7] = [
     ("another grasp's mask, carried, for all at once", Some("carried from another grasp"), [0, 0]),
 ];
 
-/// Who corrects the masks of each of [`WAYS`].
+/// Persons who correct the masks of each of [`WAYS`].
 #[derive(Default)]
 struct Persons(Vec<actions::Person>);
 
@@ -244,14 +246,14 @@ impl Persons {
     fn correct(&mut self, proposed: &[Proposed], imprints: &PerPad<DepthMap>, truth: &PerPad<Mask>, seed: u64) {
         self.0.extend((self.0.len()..WAYS.len()).map(|_| actions::Person::new(seed)));
         for (person, (_, source, [keys, keys_as_it_is])) in self.0.iter_mut().zip(WAYS) {
-            let found = proposed.iter().find(|(name, ..)| Some(*name) == source);
+            let proposal = proposed.iter().find(|(name, ..)| Some(*name) == source);
             for (pad, imprint) in imprints.entries() {
-                let mask = match (source, found) {
+                let mask = match (source, proposal) {
                     (None, _) => Some(Mask::filled(imprint.width(), imprint.height(), false)),
-                    (Some(_), found) => found.and_then(|(_, masks, _)| masks[pad].clone()),
+                    (Some(_), proposal) => proposal.and_then(|(_, masks, _)| masks[pad].clone()),
                 };
                 if let (Some(mask), Some(truth)) = (mask, &truth[pad]) {
-                    let ms = found.map_or(0.0, |(_, _, ms)| *ms);
+                    let ms = proposal.map_or(0.0, |(_, _, ms)| *ms);
                     person.correct(actions::Begin { mask, keys, keys_as_it_is, ms }, truth, imprint);
                 }
             }
@@ -280,12 +282,12 @@ fn true_masks(case: &Case) -> anyhow::Result<PerPad<Mask>> {
 fn registered(case: &Case, imprints: &PerPad<DepthMap>, masks: &PerPad<Mask>) -> Option<PlanarPose> {
     let points = contact_points(&case.sample, &imprints.as_ref(), &masks.as_ref()).ok()?;
     let method = RegistrationChoice::default().method();
-    pose(&points, &case.tool, &*method, Ask::default(), None).ok().map(|found| found.grasp_from_object)
+    pose(&points, &case.tool, &*method, Ask::default(), None).ok().map(|answer| answer.grasp_from_object)
 }
 
 type Proposed = (&'static str, PerPad<Mask>, f64);
 
-/// What each source proposes for a grasp, with the milliseconds that a finger took.
+/// Masks that each source proposes for a grasp, with the milliseconds that a finger took.
 fn proposals(
     (recipe, models): (&Recipe, &Models),
     case: &Case,
@@ -318,9 +320,9 @@ fn proposals(
         })?;
     }
     let within_m = MaskChoice::default().cad_distance_m;
-    let near_cad = |pose: PlanarPose, at: CadPose, pad, imprint: &DepthMap| -> anyhow::Result<Mask> {
+    let near_cad = |pose: PlanarPose, cad_pose: CadPose, pad, imprint: &DepthMap| -> anyhow::Result<Mask> {
         let distances = propose::cad_distances((imprint, of), (&case.sample, pad), &case.tool, pose.into())?;
-        Ok(propose::near_cad(&distances, within_m, at).mask)
+        Ok(propose::near_cad(&distances, within_m, cad_pose).mask)
     };
     each("CAD at the true pose", &mut |pad, imprint| near_cad(case.truth, CadPose::Truth, pad, imprint))?;
     if let Some(pose) = registered(case, imprints, &by_model) {
@@ -352,17 +354,17 @@ fn mean(values: &[f64]) -> Option<f64> {
     (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
 }
 
-fn row(imprint: ImprintSource, found: &Found) -> Row {
-    let errors: Vec<f64> = found.errors.iter().copied().flatten().collect();
+fn row(imprint: ImprintSource, proposals: &Proposals) -> Row {
+    let errors: Vec<f64> = proposals.errors.iter().copied().flatten().collect();
     Row {
         imprint: imprint.key(),
-        source: found.source.into(),
-        iou: mean(&found.ious),
-        iou_worst: found.ious.iter().copied().min_by(f64::total_cmp),
+        source: proposals.source.into(),
+        iou: mean(&proposals.ious),
+        iou_worst: proposals.ious.iter().copied().min_by(f64::total_cmp),
         angle_error_deg: mean(&errors),
-        apart_from_true_masks_deg: mean(&found.apart),
-        no_pose: found.errors.len() - errors.len(),
-        ms: quantile(found.ms.iter().copied(), 0.5),
+        apart_from_true_masks_deg: mean(&proposals.apart),
+        no_pose: proposals.errors.len() - errors.len(),
+        ms: quantile(proposals.ms.iter().copied(), 0.5),
     }
 }
 
@@ -373,19 +375,19 @@ fn stroke(size: [usize; 2], radius_px: f32) -> Stroke {
     let (mut moves, mut ends, mut largest) = (Vec::new(), Vec::new(), 0.0f64);
     let mut hand = DrawnMask::new(Mask::filled(width, height, false), Provenance::Nothing);
     for stroke in 0..STROKES {
-        let at = |i: usize| {
+        let point = |i: usize| {
             let t = i as f32 / MOVES as f32;
             let y = height as f32 * ((stroke as f32 + 0.5) / STROKES as f32 + 0.1 * (6.0 * t).sin());
             [width as f32 * t, y]
         };
         let paint = if stroke % 4 == 3 { Paint::Free } else { Paint::Contact };
-        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px }, at(0), paint);
+        let mut drawing = Drawing::begin(DrawTool::Brush { radius_px }, point(0), paint);
         let mut touched = Mask::filled(width, height, false);
         for i in 1..=MOVES {
             let shown = hand.mask.clone();
             let begin = Instant::now();
             let from = drawing.points.len();
-            drawing.move_to(at(i));
+            drawing.move_to(point(i));
             hand.draw_on(&drawing, &mut touched, Ground::new(&imprint), from, Provenance::hand("bench"));
             let upload = difference(&shown, &hand.mask);
             moves.push(begin.elapsed().as_secs_f64() * 1e3);
@@ -426,9 +428,9 @@ fn follow(
             size = Some(imprint_of_it.size());
             let mut hand = DrawnMask::new(mask.clone(), Provenance::Nothing);
             let mut touched = mask.map(|_| false);
-            let Some(at) = edge(mask, stroke) else { continue };
+            let Some(start) = edge(mask, stroke) else { continue };
             let paint = if stroke < STROKES_EACH / 2 { Paint::Contact } else { Paint::Free };
-            let drawing = Drawing::begin(DrawTool::Brush { radius_px: RADIUS_PX }, at, paint);
+            let drawing = Drawing::begin(DrawTool::Brush { radius_px: RADIUS_PX }, start, paint);
             hand.draw_on(&drawing, &mut touched, Ground::new(imprint_of_it), 0, Provenance::hand("bench"));
             *mask = (*hand.mask).clone();
             let parts = lab::PADS.into_iter().map(|pad| Some((imprint(pad)?, masks[pad].as_ref()))).collect();
@@ -437,19 +439,19 @@ fn follow(
             let since = |begin: Instant| begin.elapsed().as_secs_f64() * 1e3;
             let cloud_ms = since(begin);
             let register = |ask| pose(&lifted.contact_points(), &case.tool, &*method, ask, Some(case.truth));
-            let found = register(Ask { provisional: true, ..Ask::default() });
+            let answer = register(Ask { provisional: true, ..Ask::default() });
             let all_ms = since(begin);
-            let Ok(mut found) = found else { continue };
-            if !found.report.needs_no_proof() {
-                found = register(Ask::default())?;
+            let Ok(mut answer) = answer else { continue };
+            if !answer.report.needs_no_proof() {
+                answer = register(Ask::default())?;
                 proved.push(since(begin));
             }
             lifting.push(cloud_ms);
             registering.push(all_ms - cloud_ms);
             whole.push(all_ms);
             let begin = Instant::now();
-            let at = found.grasp_from_object;
-            if influence(&lifted, &case.sample, &case.tool, RegistrationChoice::default(), at).is_ok() {
+            let grasp_from_object = answer.grasp_from_object;
+            if influence(&lifted, &case.sample, &case.tool, RegistrationChoice::default(), grasp_from_object).is_ok() {
                 hanging.push(since(begin));
             }
         }

@@ -22,7 +22,7 @@ use touch2touch_core::cloud::{CloudError, lift};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::sample::DepthCamera;
 
-/// What is measured.
+/// Command line: the benchmark to run.
 #[derive(Debug, Parser)]
 #[command(
     name = "touch2touch-bench",
@@ -37,9 +37,9 @@ enum Benchmark {
     Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `touch2touch-bench registration`.
     Cases(cases::CasesArgs),
-    /// What proposed contact masks are worth on simulated grasps, what a stroke costs, and what a mask takes a person.
+    /// Worth of proposed contact masks on simulated grasps, cost of a stroke, and work of a person on a mask.
     Labelling(labelling::LabellingArgs),
-    /// How many data sets that are stored wrongly the doctor names rightly, and how many sound ones it doubts.
+    /// Number of data sets stored wrongly that the doctor names rightly, and of sound ones that it doubts.
     Doctor(doctor::DoctorArgs),
     /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),
@@ -77,7 +77,7 @@ fn contact_points(
     Ok(points)
 }
 
-/// Where and under what load the figures were taken: without it no time means anything.
+/// Machine and its load when the figures were taken: without it no time means anything.
 #[derive(Clone, Debug, Serialize)]
 struct Machine {
     /// The processor's name, where the system tells.
@@ -88,7 +88,7 @@ struct Machine {
     load_1min: Option<f64>,
     /// `linux x86_64`.
     system: String,
-    /// Whether the program was built without optimization, which makes its times meaningless.
+    /// True where the program was built without optimization, which makes its times meaningless.
     debug_build: bool,
 }
 

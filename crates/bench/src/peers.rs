@@ -20,7 +20,7 @@ const SCRIPT: &str = include_str!("../../../benches/peers.py");
 /// Surface points of a tool: as many as the lab's loop compares with.
 const MODEL_POINTS: usize = 5000;
 
-/// What Python had.
+/// Results of the libraries that Python had.
 pub(super) struct Peers {
     pub(super) rows: Vec<EngineRow>,
     /// Versions, and libraries that are missing.
@@ -119,21 +119,21 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
     let (mut error_deg, mut ms) = (vec![None; cases.len()], vec![None; cases.len()]);
     let mut offset_mm = vec![None; cases.len()];
     let mut outcomes = Vec::new();
-    for (found, &i) in row.poses.iter().zip(chosen) {
+    for (answer, &i) in row.poses.iter().zip(chosen) {
         let case = &cases[i];
         let number = |v: Option<f64>| v.unwrap_or(f64::NAN);
-        let pose = PlanarPose { theta_rad: number(found.theta_rad), y_m: number(found.y_m), z_m: number(found.z_m) };
+        let pose = PlanarPose { theta_rad: number(answer.theta_rad), y_m: number(answer.y_m), z_m: number(answer.z_m) };
         let error = angle_error(pose.theta_rad, case.truth.theta_rad).to_degrees();
-        (error_deg[i], ms[i]) = (Some(error).filter(|e| e.is_finite()), found.ms);
-        offset_mm[i] = found.theta_rad.map(|_| offset(pose, case.truth));
+        (error_deg[i], ms[i]) = (Some(error).filter(|e| e.is_finite()), answer.ms);
+        offset_mm[i] = answer.theta_rad.map(|_| offset(pose, case.truth));
         outcomes.push(Outcome {
             stratum: case.stratum,
             straight: case.straight,
             error_deg: error,
             position_mm: position_error_mm(pose, case.truth),
-            ms: number(found.ms),
-            best_ms: number(found.ms),
-            first_ms: number(found.ms),
+            ms: number(answer.ms),
+            best_ms: number(answer.ms),
+            first_ms: number(answer.ms),
             lookups: 0.0,
             flagged: None,
             rung: None,

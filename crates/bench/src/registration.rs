@@ -43,7 +43,7 @@ pub(super) struct RegistrationArgs {
     /// Only these engines, separated by commas.
     #[arg(long, value_delimiter = ',')]
     engines: Vec<Registration>,
-    /// Which contact masks.
+    /// Contact masks to register.
     #[arg(long, value_enum, default_value_t = Masks::Spoilt)]
     masks: Masks,
     #[command(flatten)]
@@ -109,7 +109,7 @@ struct Report {
     engines: Vec<EngineRow>,
     /// Time and mean error of each engine; `on_front` where no other is both faster and better.
     front: Vec<FrontPoint>,
-    /// What could not be measured, and why.
+    /// Notes on what could not be measured, and why.
     notes: Vec<String>,
     tools: Vec<ToolRow>,
     cases: Vec<CaseRow>,
@@ -165,9 +165,9 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
         output.note("asking Python for Open3D and small_gicp ...");
         let asked: Vec<usize> = pairs::spread(prepared.len(), Some(args.peer_limit)).collect();
         match peers::run(&args.python, &prepared, &set.tools, &asked) {
-            Ok(found) => {
-                report.engines.extend(found.rows);
-                report.notes.extend(found.notes);
+            Ok(peers) => {
+                report.engines.extend(peers.rows);
+                report.notes.extend(peers.notes);
             }
             Err(err) => report.notes.push(format!("Open3D and small_gicp were not run: {}", says(&err))),
         }
@@ -181,7 +181,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     Ok(true)
 }
 
-/// Whether the mesh is one straight bar: its outline is more than six times as long as wide, by second moments.
+/// True where the mesh is one straight bar: its outline is more than six times as long as wide, by second moments.
 pub(super) fn is_straight(mesh: &TriMesh) -> bool {
     let points = mesh.sample_surface(2000, 1);
     let mean = points.iter().sum::<DVec3>() / points.len().max(1) as f64;

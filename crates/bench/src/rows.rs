@@ -23,7 +23,7 @@ pub(super) struct Prepared {
 pub(super) struct EngineRow {
     pub(super) name: String,
     pub(super) label: String,
-    /// Whether it is another project's library.
+    /// True where it is another project's library.
     pub(super) peer: bool,
     #[serde(flatten)]
     pub(super) summary: Summary,

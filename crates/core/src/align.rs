@@ -54,14 +54,14 @@ pub(crate) const ANGLE_SCALE_M: f64 = 0.02;
 /// Fewest points a pose is computed from.
 pub const MIN_POINTS: usize = 32;
 
-/// What [`align`] may vary. The default is what the product uses.
+/// Settings of [`align`]. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct AlignConfig {
     /// Poses to start from, `grasp_from_object`: exactly these, and no ladder. Empty: the ladder chooses.
     pub starts: Vec<PlanarPose>,
     /// Rungs that the ladder may use, cheapest first. With one alone, its answer is taken as it is.
     pub rungs: Vec<Rung>,
-    /// What an answer must reach for the ladder to stop.
+    /// Tests that an answer must pass for the ladder to stop.
     pub accept: Accept,
     /// Points used for the answer; more are thinned evenly.
     pub points: usize,
@@ -77,7 +77,7 @@ pub struct AlignConfig {
     pub budget: usize,
     /// Share of the cost by which an answer may miss the best and still count as proved.
     pub gap: f64,
-    /// Where the pose is expected: what the ladder searches, and whether the answer was found there.
+    /// Box where the pose is expected: the ladder searches it, and the report says whether the answer was found there.
     pub prior: Prior,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
@@ -110,7 +110,7 @@ impl Default for AlignConfig {
     }
 }
 
-/// What an answer must reach to be believed without further search. Costs are shares of the squared kernel width,
+/// Tests that an answer must pass to be believed without further search. Costs are shares of the squared kernel width,
 /// so 0 to 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Accept {
@@ -118,9 +118,10 @@ pub struct Accept {
     pub cost: f64,
     /// Smallest share of points within the kernel's width after one start.
     pub inliers: f64,
-    /// The same when several starts or a grid agree on the answer: then it is the mask that is bad, not the search.
+    /// Greatest cost when several starts or a grid agree on the answer: then it is the mask that is bad, not the
+    /// search.
     pub cost_searched: f64,
-    /// The same.
+    /// Smallest share of points within the kernel's width in that case.
     pub inliers_searched: f64,
     /// Smallest eigenvalue of [`Observability`].
     pub weakest: f64,
@@ -151,7 +152,7 @@ impl Default for Prior {
 }
 
 impl Prior {
-    /// Whether the pose is in the box, widened by half to allow for error.
+    /// True where the pose is in the box, widened by half to allow for error.
     pub fn allows(&self, pose: PlanarPose) -> bool {
         super::units::wrap_angle(pose.theta_rad).abs() <= 1.5 * self.theta_rad
             && pose.y_m.abs() <= 1.5 * self.shift_m
@@ -221,13 +222,13 @@ pub enum Stop {
 }
 
 impl Stop {
-    /// Whether the pose is an end point rather than a way station.
+    /// True where the pose is an end point rather than a way station.
     pub fn converged(self) -> bool {
         self != Self::IterationLimit
     }
 }
 
-/// How much was searched for an answer: the rungs of the ladder, cheapest first.
+/// Rung of the ladder, cheapest first: how much was searched for an answer.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::Display, strum::EnumIter,
 )]
@@ -250,7 +251,7 @@ pub enum Rung {
     Certified,
 }
 
-/// Whether the answer of a rung was good enough to stop there.
+/// Verdict on the answer of a rung: whether it was good enough to stop there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
@@ -280,7 +281,7 @@ pub enum Verdict {
 /// One rung that was tried.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RungAttempt {
-    /// Which one.
+    /// Rung that was tried.
     pub rung: Rung,
     /// Cost per point of its answer, square meters; comparable between attempts with the same `points`.
     pub cost_m2: f64,
@@ -296,10 +297,10 @@ pub struct RungAttempt {
     pub verdict: Verdict,
 }
 
-/// What branch and bound has proved.
+/// Outcome of branch and bound.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Certificate {
-    /// Whether no pose in the box is cheaper by more than the gap. `false`: the budget was used up first.
+    /// True where no pose in the box is cheaper by more than the gap. `false`: the budget was used up first.
     pub certified: bool,
     /// Points that the costs are about: thinned, so that the proof takes milliseconds. The answer is then refined
     /// on all.
@@ -326,9 +327,9 @@ impl Certificate {
 pub struct Run {
     /// The start that was asked for, `grasp_from_object`. Only a registration that applies it wrongly differs.
     pub requested: PlanarPose,
-    /// Where it started, `grasp_from_object`.
+    /// Pose where it started, `grasp_from_object`.
     pub start: PlanarPose,
-    /// Where it ended, `grasp_from_object`.
+    /// Pose where it ended, `grasp_from_object`.
     pub end: PlanarPose,
     /// Cost per point there, square meters; comparable between the runs of one report.
     pub cost_m2: f64,
@@ -343,24 +344,24 @@ pub struct Run {
 pub struct AlignReport {
     /// The tool's pose in the hand.
     pub grasp_from_object: PlanarPose,
-    /// The same with all six degrees of freedom, from the registrations that find them. The planar pose is then the
-    /// nearest to it.
+    /// Pose with all six degrees of freedom, from the registrations that find them. The planar pose is then the nearest
+    /// to it.
     pub grasp_from_object_6dof: Option<DAffine3>,
-    /// Whether the winning run reached an end point.
+    /// True where the winning run reached an end point.
     pub converged: bool,
     /// Why the winning run ended.
     pub stop: Stop,
-    /// Where the winning run started, `grasp_from_object`.
+    /// Pose where the winning run started, `grasp_from_object`.
     pub start: PlanarPose,
     /// Every start with its end, in the order of the starts.
     pub runs: Vec<Run>,
     /// Position of the winner in `runs`.
     pub winner: usize,
-    /// Which rung of the ladder answered.
+    /// Rung of the ladder that answered.
     pub rung: Rung,
     /// Every rung that was tried, in order, with the reason why the search went on; empty for an engine without one.
     pub ladder: Vec<RungAttempt>,
-    /// What was proved, if branch and bound was asked.
+    /// Outcome of branch and bound, if it was asked.
     pub certificate: Option<Certificate>,
     /// Steps of all runs together.
     pub iterations: usize,
@@ -376,9 +377,9 @@ pub struct AlignReport {
     pub inlier_share: f64,
     /// Root mean square residual of those, meters.
     pub inlier_rms_m: f64,
-    /// Whether the pose is where the gripper can hold a tool.
+    /// True where the pose is where the gripper can hold a tool.
     pub within_prior: bool,
-    /// How well the points determine the pose; `None` if the engine had no field to tell from.
+    /// Observability: how well the points determine the pose; `None` if the engine had no field to tell from.
     pub observability: Option<Observability>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,
@@ -403,12 +404,12 @@ impl AlignReport {
         self.runs.iter().filter(|_| self.within_prior).filter(outside).min_by(cheapest)
     }
 
-    /// Whether the answer is the same with and without a proof: the ladder ended before it would ask for one.
+    /// True where the answer is the same with and without a proof: the ladder ended before it would ask for one.
     pub fn needs_no_proof(&self) -> bool {
         self.ladder.last().is_some_and(|end| end.verdict == Verdict::Accepted || end.rung < Rung::Grid)
     }
 
-    /// Whether the points leave a direction of the pose open (a straight rod slides, a disc turns).
+    /// True where the points leave a direction of the pose open (a straight rod slides, a disc turns).
     pub fn is_degenerate(&self) -> bool {
         self.observability.is_some_and(|o| o.degenerate)
     }
@@ -417,13 +418,13 @@ impl AlignReport {
 /// One state on the way.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TraceStep {
-    /// Which start (position in [`AlignReport::runs`]).
+    /// Start of the run (position in [`AlignReport::runs`]).
     pub run: usize,
     /// Number of the step within the run; 0 is the start as applied.
     pub iteration: usize,
     /// The pose, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
-    /// The same with all six degrees of freedom where the registration has them.
+    /// Pose with all six degrees of freedom where the registration has them.
     pub grasp_from_object_6dof: Option<DAffine3>,
     /// Cost per point, square meters; comparable only at the same kernel width and number of points.
     pub cost_m2: f64,
@@ -435,7 +436,7 @@ pub struct TraceStep {
     pub points: usize,
 }
 
-/// What became of a point at the final pose.
+/// Fate of a point at the final pose.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Fate {
@@ -460,7 +461,7 @@ pub struct PointFit {
     pub residual_m: f32,
     /// Weight in [0, 1].
     pub weight: f32,
-    /// What it counts as.
+    /// Fate of the point.
     pub fate: Fate,
 }
 

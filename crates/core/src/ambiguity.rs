@@ -1,4 +1,4 @@
-//! Whether a GelSlim image can tell where on the tool it is: a bare shaft looks the same all along.
+//! Ambiguity of a GelSlim image: whether it can tell where on the tool it is. A bare shaft looks the same all along.
 //!
 //! A tool whose picture does not change when it is moved along one direction leaves that position open, whatever model
 //! reads the picture: "cannot know", not "wrong". So the test is the definition: the difference image is compared with
@@ -16,23 +16,23 @@ use super::rig::lab;
 const COLUMNS: usize = 64;
 /// Directions tried in half a turn.
 const DIRECTIONS: usize = 60;
-/// How far the image is moved against itself, shares of its width: 3.4, 5.1 and 6.8 mm of a GelSlim's 18.
+/// Distances by which the image is moved against itself, shares of its width: 3.4, 5.1 and 6.8 mm of a GelSlim's 18.
 const MOVES: [f64; 3] = [0.19, 0.285, 0.38];
 /// A change (0: none, 1: nothing in common) up to this counts as none.
 const UNCHANGED: f64 = 0.3;
 /// Signal below which nothing touches the gel, levels of 255 (root mean square).
 const TOUCHED: f64 = 1.5;
 
-/// What a difference image leaves open.
+/// Ambiguity of a difference image: what it leaves open.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Ambiguity {
-    /// What was found.
+    /// Kind of touch.
     pub kind: TouchKind,
     /// The direction in which the picture changes least, radians in 0..π, from the image's x towards its y (down).
     pub direction_rad: f64,
-    /// How much it changes when moved that way: 0 not at all, 1 nothing in common.
+    /// Change of the picture when it is moved that way: 0 none, 1 nothing in common.
     pub change: f64,
-    /// How strong the picture is, levels of 255 (root mean square).
+    /// Strength of the picture, levels of 255 (root mean square).
     pub signal: f64,
 }
 
@@ -71,8 +71,8 @@ impl Ambiguity {
     }
 }
 
-/// What a difference image (signed, 0..255 scale, any size) leaves open. `None` for an image without finite pixels.
-/// Takes a few milliseconds.
+/// Ambiguity of a difference image (signed, 0..255 scale, any size). `None` for an image without finite pixels. Takes a
+/// few milliseconds.
 pub fn ambiguity(difference: &RgbGrid) -> Option<Ambiguity> {
     let [width, height] = difference.size();
     if width < 2 || height < 2 || difference.as_slice().iter().flatten().all(|v| !v.is_finite()) {
@@ -117,15 +117,15 @@ fn level(values: &mut [f64]) {
 /// Binomial smoothing over five pixels along each axis: markers and noise fade, ridges stay.
 fn blur(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     const TAPS: [f64; 5] = [1.0 / 16.0, 4.0 / 16.0, 6.0 / 16.0, 4.0 / 16.0, 1.0 / 16.0];
-    let at = |k: usize, step: isize, n: usize| (k as isize + step).clamp(0, n as isize - 1) as usize;
+    let index = |k: usize, step: isize, n: usize| (k as isize + step).clamp(0, n as isize - 1) as usize;
     let tap = |f: &dyn Fn(isize) -> f64| (-2..=2).zip(TAPS).map(|(step, w)| w * f(step)).sum::<f64>();
     let pass = |of: &[f64], across: bool| -> Vec<f64> {
         (0..of.len())
             .map(|i| {
                 let (x, y) = (i % width, i / width);
                 tap(&|step| match across {
-                    true => of[y * width + at(x, step, width)],
-                    false => of[at(y, step, height) * width + x],
+                    true => of[y * width + index(x, step, width)],
+                    false => of[index(y, step, height) * width + x],
                 })
             })
             .collect()
@@ -133,7 +133,7 @@ fn blur(values: &[f64], width: usize, height: usize) -> Vec<f64> {
     pass(&pass(values, true), false)
 }
 
-/// How different the planes are from themselves moved by `distance` pixels: 0 the same, 1 nothing in common.
+/// Change of the planes when they are moved by `distance` pixels: 0 none, 1 nothing in common.
 fn moved(planes: &[Vec<f64>], rows: usize, direction: f64, distance: f64) -> f64 {
     let (dy, dx) = direction.sin_cos();
     let (dx, dy) = (dx * distance, dy * distance);

@@ -16,12 +16,12 @@ pub(crate) fn gaussian(image: &Grid<f64>, sigma_px: f64) -> Grid<f64> {
     let [width, height] = image.size();
     let along_x = Grid::from_fn(width, height, |x, y| {
         let row = image.row(y);
-        let at = |x: usize| row[x.min(width - 1)];
-        (1..=radius).fold(half[0] * row[x], |sum, i| sum + half[i] * (at(x + i) + row[x.saturating_sub(i)]))
+        let pixel = |x: usize| row[x.min(width - 1)];
+        (1..=radius).fold(half[0] * row[x], |sum, i| sum + half[i] * (pixel(x + i) + row[x.saturating_sub(i)]))
     });
     Grid::from_fn(width, height, |x, y| {
-        let at = |y: usize| along_x[(x, y.min(height - 1))];
-        (1..=radius).fold(half[0] * at(y), |sum, i| sum + half[i] * (at(y + i) + at(y.saturating_sub(i))))
+        let pixel = |y: usize| along_x[(x, y.min(height - 1))];
+        (1..=radius).fold(half[0] * pixel(y), |sum, i| sum + half[i] * (pixel(y + i) + pixel(y.saturating_sub(i))))
     })
 }
 

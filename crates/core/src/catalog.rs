@@ -11,8 +11,8 @@ use super::noise::{Noise, Stream};
 
 pub use shape::{Bar, ToolSpec};
 
-/// How far beyond the grasp an ambiguous pair's pattern begins, meters: out of the GelSlim's 18 mm, within the bubble's
-/// 74 mm.
+/// Length of shaft between the grasp and an ambiguous pair's pattern, meters: out of the GelSlim's 18 mm, within the
+/// bubble's 74 mm.
 const SHAFT_M: f64 = 0.018;
 /// Ends the name of a tool that was put on a bare shaft.
 const SHAFT_SUFFIX: &str = "_on_shaft";

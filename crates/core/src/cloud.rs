@@ -14,9 +14,9 @@ pub enum CloudError {
     /// Two images that must cover the same pixels do not.
     #[error("the {what} is {} x {} pixels, the imprint {} x {}: they must be equal", .size[0], .size[1], .imprint[0], .imprint[1])]
     Size {
-        /// Which image differs.
+        /// Name of the image that differs.
         what: &'static str,
-        /// Its width and height.
+        /// Width and height of that image.
         size: [usize; 2],
         /// The imprint's width and height.
         imprint: [usize; 2],
@@ -30,7 +30,7 @@ pub enum CloudError {
     /// Focal lengths or principal point cannot be a camera's, or the transform is not finite.
     #[error("the camera's {what} cannot be right: read them again from the source")]
     Camera {
-        /// Which part of the camera.
+        /// Part of the camera.
         what: &'static str,
     },
 }
@@ -105,7 +105,7 @@ pub fn project(camera: &DepthCamera, in_grasp: DVec3) -> Option<DVec2> {
     (u.is_finite() && v.is_finite()).then(|| DVec2::new(u, v))
 }
 
-/// Whether the camera can lift `imprint` at all.
+/// Checks that the camera can lift `imprint` at all.
 pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), CloudError> {
     same_size("reference depth", camera.depth_reference.size(), imprint)?;
     let size = imprint.size();
@@ -131,9 +131,9 @@ const JUMP_M: f64 = 0.002_5;
 /// The surface through points of neighboring pixels (`pixels` in row order, one per point), cut where it jumps. Its
 /// vertices are the points, in their order.
 pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
-    let at = |x: u16, y: u16| {
-        let found = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
-        points.get(found).filter(|p| p.is_finite()).map(|p| (found as u32, *p))
+    let vertex = |x: u16, y: u16| {
+        let index = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
+        points.get(index).filter(|p| p.is_finite()).map(|p| (index as u32, *p))
     };
     let mut triangles = Vec::new();
     let mut add = |corners: [Option<(u32, DVec3)>; 3]| {
@@ -145,7 +145,7 @@ pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
     };
     for &[x, y] in pixels {
         let (Some(right), Some(below)) = (x.checked_add(1), y.checked_add(1)) else { continue };
-        let (a, b, c, d) = (at(x, y), at(right, y), at(x, below), at(right, below));
+        let (a, b, c, d) = (vertex(x, y), vertex(right, y), vertex(x, below), vertex(right, below));
         add([a, c, b]);
         add([b, c, d]);
     }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// sRGB color of a value that is not a number: a mid gray that neither map contains.
 pub const NAN_COLOR: [f32; 3] = [0.42, 0.42, 0.42];
 
-/// How a scalar becomes a color.
+/// Color map: makes a color of a scalar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
 pub enum ColorMap {
     /// Dark blue to yellow, perceptually uniform, readable by the color-blind: depth and other amounts.

@@ -112,7 +112,7 @@ pub(crate) const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
 const CONTACT_SHARE: f32 = 0.6;
 
-/// What a contact mask is made of in the end.
+/// Basis that a contact mask is made from in the end.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum MaskBasis {
     /// The source that was asked.
@@ -131,7 +131,7 @@ pub enum MaskBasis {
 pub struct ContactMask {
     /// The pixels in contact.
     pub mask: Mask,
-    /// What it is made of.
+    /// Basis that it is made from.
     pub basis: MaskBasis,
     /// Share of the picture's pixels that the mask model says neither yes nor no of, 0..1; `None` for any other source.
     pub unsure: Option<f64>,
@@ -191,7 +191,7 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     }
 }
 
-/// How a value outside 0..255 becomes a byte.
+/// Cast of a value outside 0..255 to a byte.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum ByteCast {
     /// As numpy does it for the lab: modulo 256, so that a very deep pixel turns dark again.
@@ -288,8 +288,8 @@ mod tests {
         // A ramp of 12 mm, as a bubble that is held askew gives.
         let ramp = DepthMap::from_fn(175, 140, |x, y| 0.012 * (x as f32 / 349.0 + y as f32 / 279.0) + noise[(x, y)]);
         for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots, ramp] {
-            for found in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
-                assert_eq!((count(&found.mask), found.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
+            for contact in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
+                assert_eq!((count(&contact.mask), contact.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
             }
         }
         for none in [DepthMap::filled(175, 140, f32::NAN), DepthMap::filled(0, 0, 0.0)] {
@@ -306,8 +306,8 @@ mod tests {
         for i in (0..grainy.len()).step_by(23) {
             grainy.as_mut_slice()[i] = [0.0, f32::NAN, 0.03][i % 3];
         }
-        let found = without_grain(&grainy, 2);
-        let wrong = found.as_slice().iter().zip(clean.as_slice()).filter(|(a, b)| a != b).count();
+        let cleaned = without_grain(&grainy, 2);
+        let wrong = cleaned.as_slice().iter().zip(clean.as_slice()).filter(|(a, b)| a != b).count();
         assert_eq!(wrong, 0);
         assert!(without_grain(&DepthMap::filled(9, 9, f32::NAN), 2).as_slice().iter().all(|d| d.is_nan()));
         assert_eq!(without_grain(&clean, 0), clean);
@@ -319,12 +319,14 @@ mod tests {
         let none = Mask::filled(175, 140, false);
         for (rest, height) in [(0.0, 0.004), (-0.002, 0.005), (0.001, 0.012)] {
             let imprint = bump(rest, height);
-            let found = settled_model(&imprint, none.clone());
-            let MaskBasis::Depth(min_m) = found.basis else { panic!("{:?}", found.basis) };
-            assert_eq!(found.mask, threshold(&imprint, min_m));
-            assert!(found.mask[(80, 60)] && !found.mask[(5, 130)], "{min_m}");
-            assert!((100..3000).contains(&count(&found.mask)), "{}", count(&found.mask));
-            assert!(found.basis.note().is_some_and(|note| note.contains("mm")) && found.basis.key("unet") == "depth");
+            let contact = settled_model(&imprint, none.clone());
+            let MaskBasis::Depth(min_m) = contact.basis else { panic!("{:?}", contact.basis) };
+            assert_eq!(contact.mask, threshold(&imprint, min_m));
+            assert!(contact.mask[(80, 60)] && !contact.mask[(5, 130)], "{min_m}");
+            assert!((100..3000).contains(&count(&contact.mask)), "{}", count(&contact.mask));
+            assert!(
+                contact.basis.note().is_some_and(|note| note.contains("mm")) && contact.basis.key("unet") == "depth"
+            );
         }
         // What the model found stays; what is neither flat nor clearly deep stays without contact.
         let mut one = none.clone();

@@ -62,8 +62,8 @@ impl Index {
 pub struct Problem {
     /// The file or folder.
     pub file: PathBuf,
-    /// What is wrong with it.
+    /// Fault of the file, in words.
     pub what: String,
-    /// What to do about it.
+    /// Remedy, in words.
     pub hint: String,
 }

@@ -1,4 +1,4 @@
-//! How far a cloud lies from a model: signed distances of its points, and the same painted on the model's surface.
+//! Deviation of a cloud from a model: signed distances of its points, also painted on the model's surface.
 
 use glam::{DAffine3, DVec3};
 use kiddo::{ImmutableKdTree, SquaredEuclidean};
@@ -40,8 +40,8 @@ impl Nearest {
 
     /// The nearest point and its distance.
     fn of(&self, p: DVec3) -> Option<(DVec3, f64)> {
-        let found = self.tree.as_ref()?.query(&p.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
-        Some((DVec3::from_array(*self.points.get(found.item as usize)?), found.distance.sqrt()))
+        let nearest = self.tree.as_ref()?.query(&p.to_array()).nearest_one::<SquaredEuclidean<f64>>().execute();
+        Some((DVec3::from_array(*self.points.get(nearest.item as usize)?), nearest.distance.sqrt()))
     }
 }
 
@@ -164,9 +164,12 @@ mod tests {
         let cube = crate::align::testing::cuboid(DVec3::ZERO, DVec3::splat(0.01));
         let distance = MeshDistance::new(&cube).unwrap();
         let shift = DAffine3::from_translation(DVec3::new(0.0, 0.0, 0.002));
-        let found =
+        let distances =
             of_points(&[DVec3::new(0.0, 0.0, 0.01), DVec3::new(0.0, 0.0, 0.005), DVec3::NAN], &shift, &distance);
-        assert!((found[0] - 0.002).abs() < 1e-7 && (found[1] + 0.003).abs() < 1e-7 && found[2].is_nan(), "{found:?}");
+        assert!(
+            (distances[0] - 0.002).abs() < 1e-7 && (distances[1] + 0.003).abs() < 1e-7 && distances[2].is_nan(),
+            "{distances:?}"
+        );
         let (mesh, _) = scene(0.0);
         let bare = on_surface(&mesh, &[DVec3::NAN], 0.002);
         assert!(bare.mesh.triangles.len() == 2 && bare.values.iter().all(|v| v.is_nan()));

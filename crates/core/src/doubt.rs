@@ -1,4 +1,4 @@
-//! What is wrong with data that look right, found by trying: [`judge`].
+//! Doubts about data that look right, found by trying: [`judge`].
 //!
 //! Fingers swapped, pictures mirrored, another tool's CAD model, the untouched image in place of the touched one: nothing
 //! in a file shows it, and every figure that is computed from it looks like one. Each leaves a trace in a handful of pairs
@@ -29,13 +29,13 @@ pub use predictions::{Placed, likeness};
 /// A pair that is looked at.
 #[derive(Clone, Copy, Debug)]
 pub struct Felt<'a> {
-    /// Its tool, where known.
+    /// Name of its tool, where known.
     pub tool: Option<&'a str>,
-    /// What was felt, as it is stored.
+    /// Sample as it is stored.
     pub sample: &'a Sample,
 }
 
-/// What is wrong.
+/// Cause of a doubt.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Cause {
     /// It is stored so that it must be read otherwise.
@@ -75,11 +75,11 @@ impl Cause {
 /// A doubt about a data set: what seems wrong, by which figures, and what to do.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Doubt {
-    /// What it is.
+    /// Cause.
     pub cause: Cause,
     /// In words, with the figures that speak for it.
     pub what: String,
-    /// What to do.
+    /// Remedy, in words.
     pub hint: String,
 }
 
@@ -105,7 +105,7 @@ impl Doubt {
 /// generator.
 pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
 
-/// What is wrong with data of which these pairs are a handful. `tools` has the CAD models by tool, in meters.
+/// Doubts about data of which these pairs are a handful. `tools` has the CAD models by tool, in meters.
 ///
 /// A doubt of the imprints is taken for true before the images are looked at, and so on.
 pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
@@ -163,7 +163,7 @@ fn median(values: impl IntoIterator<Item = f64>) -> Option<f64> {
     (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
 }
 
-/// How much better pairs are under a reading than as they are stored.
+/// Gain of a reading: how much better pairs are under it than as they are stored.
 struct Gain {
     /// Mean of the score when read so.
     read: f64,
@@ -193,8 +193,8 @@ impl Gain {
         }
     }
 
-    /// Whether the reading explains the pairs: a mean score of at least `score`, by `gain` more than as stored, and nearly
-    /// all pairs agree.
+    /// True where the reading explains the pairs: a mean score of at least `score`, by `gain` more than as stored, and
+    /// nearly all pairs agree.
     fn explains(&self, score: f64, gain: f64) -> bool {
         self.read >= score && self.mean >= gain && self.better as f64 >= AGREED * self.decided as f64
     }

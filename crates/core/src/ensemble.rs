@@ -28,7 +28,7 @@ impl Spread {
         if images.iter().any(|image| image.size() != size) {
             return None;
         }
-        let at = |x: usize, y: usize| -> (f64, f64) {
+        let mean_and_std = |x: usize, y: usize| -> (f64, f64) {
             // Welford's update: one pass that does not lose a small spread in a large mean.
             let (mut n, mut mean, mut squares) = (0.0, 0.0, 0.0);
             for value in images.iter().map(|image| f64::from(image[(x, y)])).filter(|v| v.is_finite()) {
@@ -40,7 +40,7 @@ impl Spread {
             let std = if n > 1.0 { (squares / (n - 1.0)).max(0.0).sqrt() } else { f64::NAN };
             (if n > 0.0 { mean } else { f64::NAN }, std)
         };
-        let both = Grid::from_fn(size[0], size[1], at);
+        let both = Grid::from_fn(size[0], size[1], mean_and_std);
         Some(Self { mean: both.map(|v| v.0 as f32), std: both.map(|v| v.1 as f32), count: images.len() })
     }
 
@@ -60,8 +60,8 @@ impl Spread {
     }
 }
 
-/// How far the channels of one prediction are apart, per pixel, meters, through the same steps as the depth itself;
-/// `None` for a decoder of one channel.
+/// Spread of the channels of one prediction, per pixel, meters, through the same steps as the depth itself; `None` for
+/// a decoder of one channel.
 ///
 /// # Errors
 /// [`PostprocessError`] if the steps do not fit the picture.
@@ -127,7 +127,7 @@ impl AngleFan {
 /// A dial on which a fan is drawn: the mean points up, and what is a few degrees wide fills it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Dial {
-    /// What points up, radians.
+    /// Mean angle, which points up, radians.
     pub mean_rad: f64,
     /// The ends of the dial, as differences from the mean, radians.
     pub reach_rad: f64,
@@ -136,7 +136,7 @@ pub struct Dial {
 impl Dial {
     /// The dial shows at least this much to either side of the mean, radians.
     const LEAST: f64 = 0.0349;
-    /// How far its ends lean, radians.
+    /// Lean of its ends, radians.
     const LEAN: f64 = 1.05;
 
     /// For a fan and other angles beside it; `None` for a fan without a mean. An odd one does not press the others
@@ -155,7 +155,7 @@ impl Dial {
         d.sin().atan2(d.cos())
     }
 
-    /// How far a difference from the mean leans to the right of "up", radians.
+    /// Lean of a difference from the mean to the right of "up", radians.
     pub fn lean(&self, off: f64) -> f64 {
         (off / self.reach_rad).clamp(-1.0, 1.0) * Self::LEAN
     }

@@ -47,7 +47,7 @@ pub enum Group {
     CleanPictures,
     /// Pictures whose GelSlim image was cut off at black or white.
     ClippedPictures,
-    /// Of unknown tools.
+    /// Grasps of unknown tools.
     Unknown,
 }
 
@@ -105,7 +105,7 @@ pub struct SquaredError {
 /// The figures of one predicted image.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ImageScore {
-    /// Which finger's; 0 right, 1 left.
+    /// Finger: 0 right, 1 left.
     pub finger: usize,
     /// Against the measured imprint.
     pub error: SquaredError,
@@ -117,11 +117,11 @@ pub struct ImageScore {
     pub ssim_peak: Option<f64>,
     /// As `ssim`, against the simulator's imprint without camera noise.
     pub ssim_noise_free: Option<f64>,
-    /// Where the scale was assumed: of the pictures as they are.
+    /// Figures of the pictures as they are, where the scale was assumed.
     pub unstretched: Option<Unstretched>,
-    /// Whether the classifier names the right tool; `None` without one, or for a tool it does not know.
+    /// True where the classifier names the right tool; `None` without one, or for a tool it does not know.
     pub tool_right: Option<bool>,
-    /// What the classifier's last layer sees of the imprint.
+    /// Features of the imprint: the input of the classifier's last layer.
     #[serde(skip)]
     pub features: Vec<f32>,
 }
@@ -131,11 +131,11 @@ pub struct ImageScore {
 pub struct GraspScore {
     /// The pair's name.
     pub pair: String,
-    /// Its tool, without the shaft it may have been put on.
+    /// Name of its tool, without the shaft it may have been put on.
     pub tool: Option<String>,
-    /// Its column group.
+    /// Column group.
     pub group: Group,
-    /// What the image figures mean.
+    /// Scale of the images, which says what their figures mean.
     #[serde(skip)]
     pub scale: Scale,
     /// One per finger that was compared.
@@ -147,8 +147,8 @@ pub struct GraspScore {
     /// Reasons to look at its masks, of the measured imprints.
     #[serde(default)]
     pub doubt: Doubt,
-    /// How far predictions with different seeds are apart: the mean over the pixels of their standard deviation, of the
-    /// finger with the most, meters; `None` where fewer than two are kept.
+    /// Spread of predictions with different seeds: the mean over the pixels of their standard deviation, of the finger
+    /// with the most, meters; `None` where fewer than two are kept.
     #[serde(default)]
     pub seed_spread_m: Option<f64>,
 }
@@ -158,11 +158,11 @@ pub struct GraspScore {
 pub struct Scores {
     /// The row's name.
     pub method: String,
-    /// Whether these are the measured imprints themselves.
+    /// True where these are the measured imprints themselves.
     pub upper_bound: bool,
     /// One per grasp it was given.
     pub grasps: Vec<GraspScore>,
-    /// What the classifier sees of the measured imprints, to compare sets with: by group, without order.
+    /// Features of the measured imprints, to compare sets with: by group, without order.
     #[serde(skip)]
     pub measured_features: Vec<(Group, Vec<f32>)>,
 }
@@ -282,8 +282,8 @@ fn estimate(
         })
         .collect();
     drawn.sort_by(f64::total_cmp);
-    let at = |share: f64| drawn[((drawn.len() - 1) as f64 * share).round() as usize];
-    Some(Estimate { value, interval: (drawn.len() >= 20).then(|| [at(0.025), at(0.975)]) })
+    let quantile = |share: f64| drawn[((drawn.len() - 1) as f64 * share).round() as usize];
+    Some(Estimate { value, interval: (drawn.len() >= 20).then(|| [quantile(0.025), quantile(0.975)]) })
 }
 
 /// The squared error over the pixels that are finite in both images; `None` if the sizes differ or none is.

@@ -43,9 +43,9 @@ pub enum FieldError {
 pub struct FieldSample {
     /// Signed distance, meters, negative inside the silhouette.
     pub distance: f64,
-    /// Its derivative by y and z; length about 1 outside.
+    /// Derivative of the distance by y and z; length about 1 outside.
     pub gradient: DVec2,
-    /// Whether the point lies on the stored grid. Off it, the distance to the grid is added.
+    /// True where the point lies on the stored grid. Off it, the distance to the grid is added.
     pub on_grid: bool,
 }
 
@@ -106,8 +106,8 @@ impl DistanceField {
     /// The stored value of a cell, meters, and its center `(y, z)`; `None` outside the grid.
     pub fn cell(&self, column: usize, row: usize) -> Option<(DVec2, f32)> {
         (column < self.columns && row < self.rows).then(|| {
-            let at = self.origin + DVec2::new(column as f64, row as f64) * CELL_M;
-            (at, self.values[row * self.columns + column])
+            let center = self.origin + DVec2::new(column as f64, row as f64) * CELL_M;
+            (center, self.values[row * self.columns + column])
         })
     }
 
@@ -123,9 +123,9 @@ impl DistanceField {
         }
         let (column, row) = (grid.x as usize, grid.y as usize);
         let (fx, fy) = (grid.x - column as f64, grid.y - row as f64);
-        let at = row * self.columns + column;
-        let low = &self.values[at..at + 2];
-        let high = &self.values[at + self.columns..at + self.columns + 2];
+        let index = row * self.columns + column;
+        let low = &self.values[index..index + 2];
+        let high = &self.values[index + self.columns..index + self.columns + 2];
         let (a, b, c, d) = (f64::from(low[0]), f64::from(low[1]), f64::from(high[0]), f64::from(high[1]));
         let (ab, cd) = (b - a, d - c);
         let (near, far) = (a + ab * fx, c + cd * fx);
@@ -220,7 +220,7 @@ impl Raster {
         values
     }
 
-    /// Which cell centers lie in or on a projected triangle.
+    /// Cells whose center lies in or on a projected triangle, row by row.
     fn fill(&self, triangles: &[[DVec2; 3]]) -> Vec<bool> {
         /// Centers this close to an edge (in cells) count as inside, so that shared edges leave no gaps.
         const TOUCH: f64 = 1e-9;
@@ -313,9 +313,9 @@ impl Sweep {
     }
 
     #[inline]
-    fn offer(&mut self, at: usize, center: DVec2, id: u32, segments: &[Segment]) {
+    fn offer(&mut self, index: usize, center: DVec2, id: u32, segments: &[Segment]) {
         let squared = (segments[id as usize].nearest(center) - center).length_squared();
-        let cell = &mut self.cells[at];
+        let cell = &mut self.cells[index];
         if squared < cell.squared {
             *cell = SweepCell { squared, owner: id };
         }
@@ -326,9 +326,9 @@ impl Sweep {
         let (column, row) = (point.x.round() as usize, point.y.round() as usize);
         for r in row.saturating_sub(1)..=(row + 1).min(self.rows - 1) {
             for c in column.saturating_sub(1)..=(column + 1).min(self.columns - 1) {
-                let at = (r + 1) * self.stride + c + 1;
-                if self.cells[at].squared > 0.0 {
-                    self.offer(at, DVec2::new(c as f64, r as f64), id, segments);
+                let index = (r + 1) * self.stride + c + 1;
+                if self.cells[index].squared > 0.0 {
+                    self.offer(index, DVec2::new(c as f64, r as f64), id, segments);
                 }
             }
         }
@@ -349,8 +349,8 @@ impl Sweep {
         for row in 0..self.rows {
             let start = (row + 1) * s + 1;
             for column in 0..self.columns {
-                let at = start + column;
-                self.ask(at, column, row, [at - 1, at - s - 1, at - s, at - s + 1], segments);
+                let index = start + column;
+                self.ask(index, column, row, [index - 1, index - s - 1, index - s, index - s + 1], segments);
             }
             for column in (0..self.columns).rev() {
                 self.ask(start + column, column, row, [start + column + 1], segments);
@@ -359,8 +359,8 @@ impl Sweep {
         for row in (0..self.rows).rev() {
             let start = (row + 1) * s + 1;
             for column in (0..self.columns).rev() {
-                let at = start + column;
-                self.ask(at, column, row, [at + 1, at + s + 1, at + s, at + s - 1], segments);
+                let index = start + column;
+                self.ask(index, column, row, [index + 1, index + s + 1, index + s, index + s - 1], segments);
             }
             for column in 0..self.columns {
                 self.ask(start + column, column, row, [start + column - 1], segments);
@@ -371,13 +371,13 @@ impl Sweep {
     #[inline]
     fn ask<const N: usize>(
         &mut self,
-        at: usize,
+        index: usize,
         column: usize,
         row: usize,
         neighbors: [usize; N],
         segments: &[Segment],
     ) {
-        let cell = self.cells[at];
+        let cell = self.cells[index];
         if cell.squared <= 0.0 {
             return;
         }
@@ -387,7 +387,7 @@ impl Sweep {
             let id = self.cells[neighbor].owner;
             if id != NONE && id != last && id != own {
                 last = id;
-                self.offer(at, DVec2::new(column as f64, row as f64), id, segments);
+                self.offer(index, DVec2::new(column as f64, row as f64), id, segments);
             }
         }
     }

@@ -15,11 +15,11 @@ const EXAMPLES: usize = 5;
 pub struct Finding {
     /// The file or folder.
     pub file: PathBuf,
-    /// What is wrong with it.
+    /// Fault of the file, in words.
     pub what: String,
-    /// What to do about it.
+    /// Remedy, in words.
     pub hint: String,
-    /// How often it was found.
+    /// Number of times it was found.
     pub count: usize,
     /// The first files it was found in, `file` among them; each once.
     pub examples: Vec<PathBuf>,
@@ -29,15 +29,15 @@ pub struct Finding {
 #[derive(Clone, Debug, Default)]
 pub struct Findings {
     list: Vec<Finding>,
-    /// Where each kind is in `list`.
+    /// Position of each kind in `list`.
     kinds: HashMap<String, usize>,
 }
 
 impl Findings {
-    /// Adds a problem; whether it is the first of its kind.
+    /// Adds a problem; true where it is the first of its kind.
     pub fn add(&mut self, problem: Problem) -> bool {
-        let at = *self.kinds.entry(kind(&problem)).or_insert(self.list.len());
-        let Some(finding) = self.list.get_mut(at) else {
+        let index = *self.kinds.entry(kind(&problem)).or_insert(self.list.len());
+        let Some(finding) = self.list.get_mut(index) else {
             let Problem { file, what, hint } = problem;
             self.list.push(Finding { examples: vec![file.clone()], file, what, hint, count: 1 });
             return true;
@@ -68,7 +68,7 @@ impl Extend<Problem> for Findings {
     }
 }
 
-/// What two problems have in common that differ only in file, finger or numbers.
+/// Text that two problems have in common that differ only in file, finger or numbers.
 fn kind(problem: &Problem) -> String {
     let part = |name: Option<&std::ffi::OsStr>| name.map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let mut text = format!("{} {}", problem.what, problem.hint);
@@ -146,21 +146,21 @@ mod tests {
             ["its other half is missing: no a_1 in gelslims", "its other half is missing: no b_22 in gelslims"],
             ["0.31 % of pixels (3 NaN, 0 infinite)", "22.00 % of pixels (1200 NaN, 7 infinite)"],
         ] {
-            let found = grouped(&[("/d/a_1.pt", a), ("/d/b_22.pt", b)]);
-            assert_eq!(found.len(), 1, "{found:#?}");
-            assert_eq!((found[0].count, found[0].examples.len(), found[0].what.as_str()), (2, 2, a));
+            let findings = grouped(&[("/d/a_1.pt", a), ("/d/b_22.pt", b)]);
+            assert_eq!(findings.len(), 1, "{findings:#?}");
+            assert_eq!((findings[0].count, findings[0].examples.len(), findings[0].what.as_str()), (2, 2, a));
         }
     }
 
     #[test]
     fn what_is_wrong_makes_a_kind() {
-        let found = grouped(&[
+        let findings = grouped(&[
             ("a.pt", "key \"K\" is missing"),
             ("a.pt", "key \"theta\" is missing"),
             ("b.pt", "key \"K\" is missing"),
             ("b.pt", "key \"K\" holds a list"),
         ]);
-        assert_eq!(found.iter().map(|f| f.count).collect::<Vec<_>>(), [2, 1, 1]);
+        assert_eq!(findings.iter().map(|f| f.count).collect::<Vec<_>>(), [2, 1, 1]);
     }
 
     #[test]

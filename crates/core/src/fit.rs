@@ -25,7 +25,8 @@ pub use validate::{folds, left_out};
 
 /// Deviation of the targets' blur before places are compared, pixels: the sensor's grain has no place.
 const GRAIN_PX: f64 = 1.0;
-/// What is finer in the mean residual is the sensor's own pattern and is believed at once; the rest only as pairs add up.
+/// Deviation of the blur that parts the mean residual, pixels: what is finer is the sensor's own pattern and is
+/// believed at once; the rest only as pairs add up.
 const PATTERN_PX: f64 = 3.0;
 /// Deviation of the blur of the gain map, pixels.
 const GAIN_PX: f64 = 4.0;
@@ -35,9 +36,9 @@ const GAIN_PRIOR: f64 = 0.1;
 /// A prediction with what was measured.
 #[derive(Clone, Copy, Debug)]
 pub struct FitPair<'a> {
-    /// What the generator drew, meters, at the decoder's size and in its orientation.
+    /// Depth picture that the generator drew, meters, at the decoder's size and in its orientation.
     pub prediction: &'a DepthMap,
-    /// What was measured, likewise; where it is not finite nothing is learnt.
+    /// Measured picture, likewise; where it is not finite nothing is learnt.
     pub target: &'a DepthMap,
     /// The pad, counted from 0.
     pub pad: usize,
@@ -52,17 +53,17 @@ pub enum FitError {
     /// Pictures of several sizes.
     #[error("pair {case} has a picture of {found:?} pixels instead of {expected:?}")]
     Size {
-        /// Which case, counted from 0.
+        /// Case, counted from 0.
         case: usize,
-        /// Its size.
+        /// Size of its picture, `[width, height]`, pixels.
         found: [usize; 2],
-        /// That of the first.
+        /// Size of the first picture.
         expected: [usize; 2],
     },
     /// A prediction that is not finite.
     #[error("the prediction of pair {case} has values that are not finite")]
     NotFinite {
-        /// Which case, counted from 0.
+        /// Case, counted from 0.
         case: usize,
     },
 }
@@ -90,14 +91,16 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         response: None,
         parts: CorrectionParts::ALL,
     };
-    let mut found: Vec<Option<Correction>> =
+    let mut corrections: Vec<Option<Correction>> =
         (0..pads).map(|pad| cases.iter().any(|case| case.pad == pad).then(|| start(pad))).collect();
     let placed: Vec<DepthMap> = cases
         .iter()
-        .map(|case| found[case.pad].as_ref().map_or_else(|| case.prediction.clone(), |c| c.placed(case.prediction)))
+        .map(|case| {
+            corrections[case.pad].as_ref().map_or_else(|| case.prediction.clone(), |c| c.placed(case.prediction))
+        })
         .collect();
     let line = line(placed.iter().zip(cases.iter().map(|case| case.target)));
-    for one in found.iter_mut().flatten() {
+    for one in corrections.iter_mut().flatten() {
         one.line = line;
     }
     let on_line: Vec<Pixels> = placed
@@ -105,7 +108,7 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         .map(|image| image.as_slice().iter().map(|&v| f64::from(v) * line[0] + line[1]).collect())
         .collect();
     let targets: Vec<Pixels> = cases.iter().zip(&on_line).map(|(case, own)| filled(case.target, own)).collect();
-    for (pad, one) in found.iter_mut().enumerate() {
+    for (pad, one) in corrections.iter_mut().enumerate() {
         let Some(one) = one else { continue };
         let own: Vec<usize> = (0..cases.len()).filter(|&i| cases[i].pad == pad).collect();
         shared(one, &own, &on_line, &targets);
@@ -115,25 +118,25 @@ pub fn closed_form(cases: &[FitPair<'_>], pads: usize) -> Result<Vec<Option<Corr
         .zip(&placed)
         .zip(&targets)
         .map(|((case, placed), target)| {
-            let Some(one) = &found[case.pad] else { return Grid::filled(size[0], size[1], 0.0) };
-            let made = one.weighed(placed, &one.leveled(placed));
+            let Some(one) = &corrections[case.pad] else { return Grid::filled(size[0], size[1], 0.0) };
+            let weighed = one.weighed(placed, &one.leveled(placed));
             let width = size[0];
-            Grid::from_fn(size[0], size[1], |x, y| target[y * width + x] - f64::from(made[(x, y)]))
+            Grid::from_fn(size[0], size[1], |x, y| target[y * width + x] - f64::from(weighed[(x, y)]))
         })
         .collect();
     let response: Option<Arc<Response>> = response::response(&on_line, &missing).map(Arc::new);
-    for one in found.iter_mut().flatten() {
+    for one in corrections.iter_mut().flatten() {
         one.response.clone_from(&response);
     }
-    Ok(found)
+    Ok(corrections)
 }
 
 fn check(cases: &[FitPair<'_>]) -> Result<[usize; 2], FitError> {
     let expected = cases.first().ok_or(FitError::NoPairs)?.prediction.size();
     for (case, one) in cases.iter().enumerate() {
-        for found in [one.prediction.size(), one.target.size()] {
-            if found != expected || found.contains(&0) {
-                return Err(FitError::Size { case, found, expected });
+        for size in [one.prediction.size(), one.target.size()] {
+            if size != expected || size.contains(&0) {
+                return Err(FitError::Size { case, found: size, expected });
             }
         }
         if one.prediction.as_slice().iter().any(|v| !v.is_finite()) {
@@ -166,7 +169,7 @@ fn line<'a>(pairs: impl Iterator<Item = (&'a DepthMap, &'a DepthMap)>) -> [f64; 
     [gain, (y - gain * x) / n]
 }
 
-/// What the pictures of one pad share: mean, mean residual, and gain of the deviation.
+/// Parts of a correction that the pictures of one pad share: mean, mean residual, and gain of the deviation.
 fn shared(one: &mut Correction, own: &[usize], on_line: &[Pixels], targets: &[Pixels]) {
     let [width, height] = one.mean.size();
     let n = own.len() as f64;

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 /// A rigid motion in the y-z plane: rotate by `theta_rad` about +x, then move by `(0, y_m, z_m)`.
 ///
-/// Which frames it joins is said by the name that holds it (`grasp_from_object`, `object_from_grasp`).
+/// The name that holds it says which frames it joins (`grasp_from_object`, `object_from_grasp`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PlanarPose {
     /// Rotation about +x, radians, right-handed (y towards z).
@@ -43,12 +43,12 @@ impl PlanarPose {
         rotate(self.theta_rad, yz) + DVec2::new(self.y_m, self.z_m)
     }
 
-    /// The same motion in space.
+    /// Transform in space of the same motion, meters.
     pub fn to_affine(self) -> DAffine3 {
         DAffine3::from_rotation_translation(DQuat::from_rotation_x(self.theta_rad), DVec3::new(0.0, self.y_m, self.z_m))
     }
 
-    /// Whether every number is finite.
+    /// True where every number is finite.
     pub fn is_finite(self) -> bool {
         self.theta_rad.is_finite() && self.y_m.is_finite() && self.z_m.is_finite()
     }

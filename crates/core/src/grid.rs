@@ -75,7 +75,7 @@ impl<T> Grid<T> {
         self.data.len()
     }
 
-    /// Whether the image has no pixel.
+    /// True where the image has no pixel.
     pub fn is_empty(&self) -> bool {
         self.data.is_empty()
     }

@@ -12,10 +12,11 @@ use super::pose::{Registration, RegistrationChoice, ToolModel, register_from};
 
 /// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
-/// The same with registrations that ask a tree for every point and iteration: 651 runs must take about a second.
+/// Contact points per run with registrations that ask a tree for every point and iteration: 651 runs must take about a
+/// second.
 const MAP_POINTS_COSTLY: usize = 96;
 
-/// Where every start of a grid leads; `None` if `cancelled` said so meanwhile.
+/// Basin map: where every start of a grid leads; `None` if `cancelled` said so meanwhile.
 ///
 /// Costly registrations get fewer points, evenly thinned; [`Basin::points`] and [`Basin::offered`] say so.
 pub fn basin_map(
@@ -32,12 +33,12 @@ pub fn basin_map(
     basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, false), cancelled)
 }
 
-/// Whether the registration compares with the silhouette's field rather than with model points.
+/// True where the registration compares with the silhouette's field rather than with model points.
 pub(crate) fn uses_field(engine: Registration) -> bool {
     matches!(engine, Registration::DistanceField | Registration::Certified)
 }
 
-/// What contact points are compared with at any step of a run, prepared once per tool.
+/// Model that contact points are compared with at any step of a run, prepared once per tool.
 #[derive(Clone, Debug)]
 pub struct Counterparts {
     model: Option<ModelPoints>,

@@ -34,7 +34,6 @@ mod noise;
 pub mod picture;
 pub mod pose;
 pub mod postprocess;
-pub mod predicted_id;
 pub mod read_as;
 pub mod resample;
 pub mod rig;

@@ -1,4 +1,4 @@
-//! What the science asks of nalgebra, with its refusals: nothing is decomposed that is not finite.
+//! Linear algebra that the science asks of nalgebra, with its refusals: nothing is decomposed that is not finite.
 
 use nalgebra::allocator::Allocator;
 use nalgebra::{DefaultAllocator, DimDiff, DimSub, Matrix6, OMatrix, OVector, U1, Vector6};
@@ -17,13 +17,13 @@ where
     if m.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let found = m.try_symmetric_eigen(f64::EPSILON, MOST_ROUNDS)?;
-    let mut order: Vec<usize> = (0..found.eigenvalues.len()).collect();
-    order.sort_by(|&i, &j| found.eigenvalues[i].total_cmp(&found.eigenvalues[j]));
-    let (mut values, mut vectors) = (found.eigenvalues.clone(), found.eigenvectors.clone());
+    let eigen = m.try_symmetric_eigen(f64::EPSILON, MOST_ROUNDS)?;
+    let mut order: Vec<usize> = (0..eigen.eigenvalues.len()).collect();
+    order.sort_by(|&i, &j| eigen.eigenvalues[i].total_cmp(&eigen.eigenvalues[j]));
+    let (mut values, mut vectors) = (eigen.eigenvalues.clone(), eigen.eigenvectors.clone());
     for (to, from) in order.into_iter().enumerate() {
-        values[to] = found.eigenvalues[from];
-        vectors.set_column(to, &found.eigenvectors.column(from));
+        values[to] = eigen.eigenvalues[from];
+        vectors.set_column(to, &eigen.eigenvectors.column(from));
     }
     Some((values, vectors))
 }
@@ -65,8 +65,8 @@ mod tests {
             let h: Matrix6<f64> = j * j.transpose() + 0.1 * Matrix6::identity();
             for free in [&[0, 1, 2, 3, 4, 5][..], &[0, 4, 5], &[3]] {
                 let kept = Vector6::from_fn(|i, _| if free.contains(&i) { x[i] } else { 0.0 });
-                let found = solve_symmetric(h.lower_triangle(), h * kept, free).unwrap();
-                prop_assert!((found - kept).amax() < 1e-9);
+                let solution = solve_symmetric(h.lower_triangle(), h * kept, free).unwrap();
+                prop_assert!((solution - kept).amax() < 1e-9);
             }
         }
     }

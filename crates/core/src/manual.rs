@@ -56,17 +56,17 @@ pub enum PoseAxis {
 }
 
 impl PoseAxis {
-    /// What one step adds, meters or radians.
+    /// Size of one step, meters or radians.
     pub fn step(self) -> f64 {
         if self.is_turn() { STEP_RAD } else { STEP_M }
     }
 
-    /// Whether it turns.
+    /// True for a turn.
     pub(crate) fn is_turn(self) -> bool {
         matches!(self, Self::Theta | Self::Pitch | Self::Yaw)
     }
 
-    /// Whether it leaves the plane of the registration.
+    /// True where it leaves the plane of the registration.
     pub fn leaves_plane(self) -> bool {
         matches!(self, Self::X | Self::Pitch | Self::Yaw)
     }
@@ -87,12 +87,12 @@ impl ManualPose {
         DAffine3::from_rotation_translation(turn, DVec3::new(self.x_m, self.planar.y_m, self.planar.z_m))
     }
 
-    /// Whether every number is finite.
+    /// True where every number is finite.
     pub fn is_finite(self) -> bool {
         self.planar.is_finite() && self.x_m.is_finite() && self.pitch_rad.is_finite() && self.yaw_rad.is_finite()
     }
 
-    /// Whether it lies in the plane of the registration.
+    /// True where it lies in the plane of the registration.
     pub fn is_planar(self) -> bool {
         self.x_m == 0.0 && self.pitch_rad == 0.0 && self.yaw_rad == 0.0
     }
@@ -118,7 +118,7 @@ pub struct AcceptedPose {
     /// `grasp_from_object`.
     #[serde(flatten)]
     pub pose: ManualPose,
-    /// Whether a person set it, rather than took over what a registration answered.
+    /// True where a person set it, rather than took over what a registration answered.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_hand: bool,
 }
@@ -131,13 +131,13 @@ impl From<PlanarPose> for AcceptedPose {
 }
 
 impl AcceptedPose {
-    /// Whether an older reader, which knows planar poses only, understands all of it.
+    /// True where an older reader, which knows planar poses only, understands all of it.
     pub fn is_plain(self) -> bool {
         !self.by_hand && self.pose.is_planar()
     }
 }
 
-/// How far apart two planar poses are.
+/// Difference of two planar poses.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PoseDifference {
     /// Size of the difference of the angles, radians.
@@ -153,7 +153,7 @@ impl PoseDifference {
     }
 }
 
-/// What a pose costs, whoever made it.
+/// Cost of a pose, whoever made it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ManualCost {
     /// Root mean square distance of the points to the tool's outline in the plane, those inside counted as zero,
@@ -172,7 +172,7 @@ pub struct ManualCost {
 /// Points looked at: as many as the registration uses, so that a drag is answered within a frame.
 const COST_POINTS: usize = 512;
 
-/// What `pose` costs, for at most 512 of the contact points (meters, grasp frame), spread evenly; points that are not
+/// Cost of `pose`, for at most 512 of the contact points (meters, grasp frame), spread evenly; points that are not
 /// finite are left out. `kernel_m` is the width of the Geman-McClure kernel.
 pub fn cost(
     points: &[DVec3],
@@ -255,12 +255,12 @@ mod tests {
         let mut points: Vec<DVec3> =
             cross_contacts(3000, truth, 1e-4, 3).iter().map(|p| DVec3::new(0.003, p.x, p.y)).collect();
         points.push(DVec3::NAN);
-        let at = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
-        let best = at(truth.into());
+        let cost_of = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
+        let best = cost_of(truth.into());
         assert!(best.inlier_share > 0.99 && best.outline_rms_m < 2e-4 && best.surface_rms_m < 2e-4, "{best:?}");
         for axis in PoseAxis::iter() {
             let by = if axis.is_turn() { 0.15 } else { 0.003 };
-            let moved = at(ManualPose::from(truth).moved(axis, by));
+            let moved = cost_of(ManualPose::from(truth).moved(axis, by));
             assert!(moved.surface_rms_m > best.surface_rms_m, "{axis:?}: {moved:?}");
             if !axis.leaves_plane() {
                 assert!(moved.cost_m2 > 2.0 * best.cost_m2, "{axis:?}: {moved:?}");

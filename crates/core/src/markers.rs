@@ -1,4 +1,4 @@
-//! Which of several GelSlims took a picture, seen in the lattice of markers on its gel.
+//! Markers: the lattice on a GelSlim's gel tells which of several sensors took a picture.
 //!
 //! Each gel has its own lattice, which stays where it is while the picture around it changes. What is left of a
 //! difference image without its smooth part shows the markers' edges; pictures of one sensor have them in the same
@@ -39,7 +39,7 @@ fn standardized(image: &Grid<f64>) -> Option<Grid<f32>> {
     (deviation > 1e-9).then(|| image.map(|v| ((v - mean) / deviation) as f32))
 }
 
-/// How alike two signatures are, -1..1.
+/// Likeness of two signatures, -1..1.
 pub fn likeness(a: &Grid<f32>, b: &Grid<f32>) -> f64 {
     if a.size() != b.size() {
         return 0.0;
@@ -48,7 +48,7 @@ pub fn likeness(a: &Grid<f32>, b: &Grid<f32>) -> f64 {
         / a.len().max(1) as f64
 }
 
-/// What the signatures of one sensor have in common: their median, pixel by pixel. `None` without any.
+/// Template: what the signatures of one sensor have in common, their median, pixel by pixel. `None` without any.
 pub fn template(signatures: &[&Grid<f32>]) -> Option<Grid<f32>> {
     let [width, height] = signatures.first()?.size();
     let mut column = vec![0.0f32; signatures.len()];
@@ -62,7 +62,7 @@ pub fn template(signatures: &[&Grid<f32>]) -> Option<Grid<f32>> {
     standardized(&median)
 }
 
-/// Which of two sensors took each picture: 0 or 1; all 0 where one sensor took all of them.
+/// Sensor of two that took each picture: 0 or 1; all 0 where one sensor took all of them.
 pub fn two_groups(signatures: &[Grid<f32>]) -> Vec<usize> {
     let n = signatures.len();
     let one = vec![0; n];
@@ -81,8 +81,8 @@ pub fn two_groups(signatures: &[Grid<f32>]) -> Vec<usize> {
         for (group, kept) in templates.iter_mut().enumerate() {
             let own: Vec<&Grid<f32>> =
                 signatures.iter().zip(&next).filter(|(_, g)| **g == group).map(|(s, _)| s).collect();
-            if let Some(found) = template(&own) {
-                *kept = found;
+            if let Some(template) = template(&own) {
+                *kept = template;
             }
         }
         if next == groups {

@@ -33,7 +33,7 @@ impl TriMesh {
         (0..self.triangles.len()).map(|i| triangle_area(self.corners(i))).sum()
     }
 
-    /// Whether every edge belongs to exactly two triangles, once in each direction.
+    /// True where every edge belongs to exactly two triangles, once in each direction.
     pub fn is_watertight(&self) -> bool {
         let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.triangles.len() * 3);
         for t in &self.triangles {

@@ -1,4 +1,4 @@
-//! How good a prediction, a mask or a pose is. Every range is explicit, and every special case has a name.
+//! Metrics of predictions, masks and poses. Every range is explicit, and every special case has a name.
 //!
 //! Sums run in f64. Pixels that are not finite in either image are left out of the error metrics.
 

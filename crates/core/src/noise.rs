@@ -5,8 +5,8 @@ use rand_chacha::rand_core::{RngCore, SeedableRng};
 
 use super::grid::Grid;
 
-/// What a stream of random numbers is for. Streams of one seed are independent of each other, so that adding a
-/// draw to one effect does not change the others.
+/// Stream of random numbers by its purpose. Streams of one seed are independent of each other, so that adding a draw to
+/// one effect does not change the others.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stream {
     Grasp = 1,

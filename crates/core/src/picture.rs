@@ -39,8 +39,8 @@ pub(crate) fn difference_gain(image: &RgbGrid) -> f32 {
     if sizes.is_empty() {
         return 1.0;
     }
-    let at = (sizes.len() - 1) * 995 / 1000;
-    let (_, p99, _) = sizes.select_nth_unstable_by(at, f32::total_cmp);
+    let rank = (sizes.len() - 1) * 995 / 1000;
+    let (_, p99, _) = sizes.select_nth_unstable_by(rank, f32::total_cmp);
     if *p99 > 1e-6 { 120.0 / *p99 } else { 1.0 }
 }
 

@@ -11,7 +11,7 @@ mod choice;
 pub use super::tool::{ToolError, ToolModel};
 pub use choice::{RegistrationChoice, Rejection};
 
-/// Which registration answers.
+/// Registration that answers.
 #[derive(
     Clone,
     Copy,
@@ -35,7 +35,7 @@ pub enum Registration {
     /// Robust registration on the distance field of the tool's silhouette.
     #[default]
     DistanceField,
-    /// The same with a proof by branch and bound.
+    /// Robust registration on the distance field, with a proof by branch and bound.
     Certified,
     /// The lab's planar point-to-point loop.
     LabIcp,
@@ -77,7 +77,7 @@ impl Registration {
         }
     }
 
-    /// What it does, in one line.
+    /// Description of its method, in one line.
     pub fn description(self) -> &'static str {
         match self {
             Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
@@ -123,7 +123,7 @@ pub fn register(
     register_with(&*engine.into().method(), points, tool, Ask { record, ..Ask::default() })
 }
 
-/// The same from one start, `grasp_from_object`, instead of the engine's own.
+/// Registers from one start, `grasp_from_object`, instead of the engine's own.
 ///
 /// # Errors
 /// As [`register`], and for a start that is not finite.
@@ -137,7 +137,7 @@ pub(crate) fn register_from(
     register_with(&*engine.into().method(), points, tool, Ask { starts: Some(&[start]), record, ..Ask::default() })
 }
 
-/// The same with a registration of other settings.
+/// Registers with a registration of any settings.
 ///
 /// # Errors
 /// As [`register`], and for settings that make no sense.

@@ -35,7 +35,7 @@ const LUMA: [f64; 3] = [0.2989, 0.587, 0.114];
 /// A spread below this share of the values' size is rounding, not information (see [`Shift::PaperMeanStd`]).
 const RELATIVE_NO_SPREAD: f64 = 1e-6;
 
-/// How three channels become one.
+/// Reduction of three channels to one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reduction {
@@ -46,7 +46,7 @@ pub enum Reduction {
     Luma,
 }
 
-/// How the decoder's [-1, 1] becomes meters.
+/// Mapping of the decoder's [-1, 1] to meters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Mapping {
@@ -70,7 +70,7 @@ pub struct ShiftStats {
     pub gt_std: f64,
 }
 
-/// What happens to the meters.
+/// Shift: what is done with the meters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shift {
     /// Nothing.
@@ -87,7 +87,7 @@ pub enum Shift {
 )]
 #[serde(rename_all = "snake_case")]
 pub enum ShiftMode {
-    /// What the released script saves: `(depth + max) / 2`.
+    /// The released script's result: `(depth + max) / 2`.
     Raw,
     /// [`ShiftMode::Raw`] with the paper's mean-and-deviation shift.
     PaperShift,
@@ -109,7 +109,7 @@ impl ShiftMode {
     /// All modes that need no data set, in the order shown.
     pub const ALL: [ShiftMode; 3] = [ShiftMode::Raw, ShiftMode::PaperShift, ShiftMode::ExactInverse];
 
-    /// What the user reads.
+    /// Name on screen.
     pub fn label(self) -> &'static str {
         match self {
             ShiftMode::Raw => "Raw (released script)",
@@ -126,9 +126,9 @@ impl ShiftMode {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(from = "[f64; 2]", into = "[f64; 2]")]
 pub struct DepthRange {
-    /// What -1 means.
+    /// Depth that -1 stands for.
     pub min_m: f64,
-    /// What 1 means.
+    /// Depth that 1 stands for.
     pub max_m: f64,
 }
 
@@ -145,7 +145,7 @@ impl From<DepthRange> for [f64; 2] {
 }
 
 impl DepthRange {
-    /// Whether the range is finite and not empty.
+    /// True where the range is finite and not empty.
     pub fn is_valid(self) -> bool {
         self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
     }
@@ -186,7 +186,7 @@ pub enum PostprocessError {
     /// Not three channels of one size.
     #[error("a color picture needs 3 channels of one size, the prediction has {count}; correct the model's manifest")]
     NotColor {
-        /// Its channels.
+        /// Number of its channels.
         count: usize,
     },
     /// A correction for pictures of another size.
@@ -200,26 +200,26 @@ pub enum PostprocessError {
 /// The steps from a decoder's picture to a depth map in the raw orientation of the lab's files.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthChain {
-    /// What -1 and 1 mean. Values outside are clamped, as the lab does.
+    /// Depths that -1 and 1 stand for. Values outside are clamped, as the lab does.
     pub range: DepthRange,
-    /// How they become meters.
+    /// Mapping to meters.
     pub mapping: Mapping,
-    /// How channels become one.
+    /// Reduction of the channels to one.
     pub reduction: Reduction,
-    /// What happens to the meters.
+    /// Shift of the meters.
     pub shift: Shift,
-    /// What a fit to the pad's pairs adds.
+    /// Correction that a fit to the pad's pairs adds.
     pub correction: Option<Arc<Correction>>,
     /// `[width, height]` of the result, pixels.
     pub size: [usize; 2],
-    /// How it is resized.
+    /// Resampling to that size.
     pub resampling: Resampling,
     /// Rotation to the raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,
-    /// Where the model draws the color sensor's window, whichever pad it is on: its center, shares of the result's width and
-    /// height. `None` of a model that draws each pad's where it lies.
+    /// Center of the color sensor's window where the model draws it, whichever pad it is on: shares of the result's
+    /// width and height. `None` of a model that draws each pad's where it lies.
     pub window: Option<[f64; 2]>,
-    /// How far the decoder's picture is moved to the right and down, shares of its width and height; see
+    /// Shift of the decoder's picture to the right and down, shares of its width and height; see
     /// [`DepthChain::placed`]. A correction with an offset of its own takes the place of this one.
     pub offset: [f64; 2],
 }
@@ -279,7 +279,7 @@ impl DepthChain {
         self
     }
 
-    /// Whether the picture is moved to the rig's window: a fit counts its own offset from where the model draws.
+    /// True where the picture is moved to the rig's window: a fit counts its own offset from where the model draws.
     fn moved(&self) -> bool {
         self.offset != [0.0; 2] && !self.correction.as_ref().is_some_and(|fit| fit.has(CorrectionPart::Offset))
     }
@@ -427,7 +427,7 @@ fn signed(value: f64) -> String {
 }
 
 impl ShiftStats {
-    /// Whether the predictions' deviation is as good as zero beside their mean and the range that ends at `max_m`.
+    /// True where the predictions' deviation is as good as zero beside their mean and the range that ends at `max_m`.
     pub fn has_no_spread(&self, max_m: f64) -> bool {
         let size = self.pred_mean.abs().max(max_m.abs());
         self.pred_std.is_nan() || self.pred_std <= RELATIVE_NO_SPREAD * size

@@ -14,7 +14,7 @@ use super::turn::Turn;
 /// Largest factor, and one over the smallest.
 const MOST: f64 = 1e4;
 
-/// How a picture is laid down anew; each is its own inverse.
+/// Way in which a picture is laid down anew; each is its own inverse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Lay {
@@ -27,7 +27,7 @@ pub enum Lay {
 }
 
 impl Lay {
-    /// The same as a turn.
+    /// Turn that lays it so.
     pub fn turn(self) -> Turn {
         match self {
             Self::MirrorColumns => Turn { quarters: 0, mirrored: true },
@@ -45,7 +45,7 @@ impl Lay {
     }
 }
 
-/// Which pictures of a depth sensor.
+/// Pictures of a depth sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Depths {
     /// The imprints.
@@ -54,7 +54,7 @@ pub enum Depths {
     Whole,
 }
 
-/// Which of the two images of a color sensor.
+/// Images of a color sensor: one of the two, or both.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Images {
@@ -66,7 +66,7 @@ pub enum Images {
     Both,
 }
 
-/// How a difference is stored in place of the touched image.
+/// Form of a difference that is stored in place of the touched image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumString, strum::IntoStaticStr)]
 #[strum(serialize_all = "kebab-case")]
 pub enum Stored {
@@ -178,7 +178,7 @@ pub fn parse_list(text: &str) -> Result<Vec<ReadAs>, String> {
     keys.map(str::parse).collect()
 }
 
-/// What is read so already, read so once more: what is its own opposite ends instead.
+/// Readings after `more` is added to those known: what is its own opposite ends instead.
 pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
     let own_opposite = !matches!(
         more,
@@ -190,7 +190,7 @@ pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
     );
     let mut all = known.to_vec();
     match known.iter().rposition(|one| own_opposite && *one == more) {
-        Some(at) => drop(all.remove(at)),
+        Some(index) => drop(all.remove(index)),
         None => all.push(more),
     }
     all
@@ -206,7 +206,7 @@ fn clip(text: &str) -> String {
 }
 
 impl ReadAs {
-    /// What is wrong with data that must be read so.
+    /// Fault of data that must be read so, in words.
     pub fn mistake(self) -> String {
         let imprints = |depths: Depths| match depths {
             Depths::Imprints => "the imprints",
@@ -447,7 +447,7 @@ mod tests {
         assert_eq!(also(&[half], half), [half, half]);
     }
 
-    /// What can be compared of a sample.
+    /// Numbers of a sample that can be compared.
     fn felt(sample: &Sample) -> Vec<f32> {
         let mut all = vec![sample.grasp_from_object.unwrap().theta_rad as f32];
         for touch in sample.pads.iter().flatten() {

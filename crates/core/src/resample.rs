@@ -13,7 +13,7 @@ use super::grid::{Grid, RgbGrid};
 /// The sharpness of [`Resampling::Bicubic`]; PyTorch and OpenCV use -0.75.
 const BICUBIC_A: f64 = -0.75;
 
-/// How an image is resized.
+/// Method by which an image is resized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -65,9 +65,9 @@ pub fn moved(image: &Grid<f32>, by: [f64; 2]) -> Grid<f32> {
         };
         let last = length.saturating_sub(1);
         let tap = |i: usize| {
-            let at = (i as f64 - by).clamp(0.0, last as f64);
-            let first = at as usize;
-            (first, (first + 1).min(last), at - first as f64)
+            let source = (i as f64 - by).clamp(0.0, last as f64);
+            let first = source as usize;
+            (first, (first + 1).min(last), source - first as f64)
         };
         (0..length).map(tap).collect()
     };
@@ -97,7 +97,7 @@ pub fn nearest_mask(mask: &Grid<bool>, width: usize, height: usize) -> Grid<bool
     Grid::from_fn(width, height, |x, y| mask[(pick(x, source_width, width), pick(y, source_height, height))])
 }
 
-/// What [`resize`] needs of a pixel: a weighted sum in f64.
+/// Pixel that [`resize`] can make a weighted sum of, in f64.
 trait Pixel: Copy {
     type Sum: Copy;
     const ZERO: Self::Sum;
@@ -243,8 +243,8 @@ mod tests {
         for case in cases {
             let kind: Resampling = serde_json::from_value(case["mode"].clone()).unwrap();
             let expected = grid(&case["output"]);
-            let found = kind.resize(&grid(&case["input"]), expected.width(), expected.height());
-            for (a, b) in found.as_slice().iter().zip(expected.as_slice()) {
+            let resized = kind.resize(&grid(&case["input"]), expected.width(), expected.height());
+            for (a, b) in resized.as_slice().iter().zip(expected.as_slice()) {
                 // torch computes weights in f32: about 1e-6 of the values' size (here up to 200).
                 assert!((a - b).abs() < 5e-4, "{kind:?} {:?}: {a} for {b}", expected.size());
             }

@@ -26,11 +26,11 @@ pub type Text = Cow<'static, str>;
 pub struct Rig {
     /// The name for people.
     pub name: Text,
-    /// What each pad carries, indexed by [`SensorId`]. The first one's pictures count as upright.
+    /// Sensors that each pad carries, indexed by [`SensorId`]. The first one's pictures count as upright.
     pub sensors: Vec<Sensor>,
     /// The pads (fingers), indexed by [`PadId`].
     pub pads: Vec<Pad>,
-    /// Where one sensor's view lies in another's.
+    /// Windows: where one sensor's view lies in another's.
     #[serde(default)]
     pub windows: Vec<Window>,
 }
@@ -39,7 +39,7 @@ pub struct Rig {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct SensorId(pub u8);
 
-/// What a sensor's picture holds.
+/// Kind of sensor, by what its picture holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -58,7 +58,7 @@ pub struct Sensor {
     pub key: Text,
     /// The name for people.
     pub name: Text,
-    /// What its picture holds.
+    /// Kind of picture.
     pub kind: SensorKind,
     /// Columns of the stored picture.
     pub width: usize,
@@ -66,7 +66,7 @@ pub struct Sensor {
     pub height: usize,
     /// Scale on the touched surface, pixels per meter.
     pub px_per_m: f64,
-    /// Which part of the camera's picture is stored; without it all of it is.
+    /// Part of the camera's picture that is stored; without it all of it is.
     #[serde(default)]
     pub crop: Crop,
     /// Turn that lays the stored picture as the first sensor's lies: 0 or 180 degrees.
@@ -74,7 +74,7 @@ pub struct Sensor {
     pub rotation_deg: u32,
 }
 
-/// Where the stored picture lies in the camera's full one, which the intrinsics belong to.
+/// Crop: place of the stored picture in the camera's full one, which the intrinsics belong to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Crop {
@@ -104,9 +104,9 @@ pub struct Window {
     pub of: SensorId,
     /// The sensor in whose pixels it is given.
     pub within: SensorId,
-    /// Its center, pixels from the center of the first one.
+    /// Center of the window, pixels from the center of the first one.
     pub center_px: [f64; 2],
-    /// Its width and height, pixels.
+    /// Width and height of the window, pixels.
     pub size_px: [f64; 2],
 }
 
@@ -184,12 +184,12 @@ impl Rig {
 
     /// The position of the sensor with this key.
     pub fn sensor_of_key(&self, key: &str) -> Option<SensorId> {
-        self.sensors.iter().position(|sensor| sensor.key == key).map(|at| SensorId(at as u8))
+        self.sensors.iter().position(|sensor| sensor.key == key).map(|index| SensorId(index as u8))
     }
 
     /// The first sensor of a kind.
     pub fn first(&self, kind: SensorKind) -> Option<SensorId> {
-        self.sensors.iter().position(|sensor| sensor.kind == kind).map(|at| SensorId(at as u8))
+        self.sensors.iter().position(|sensor| sensor.kind == kind).map(|index| SensorId(index as u8))
     }
 
     /// The first color sensor.
@@ -212,12 +212,12 @@ impl Rig {
         self.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3)
     }
 
-    /// Where `of` looks in the picture of `within`, if the rig says.
+    /// Window of `of` in the picture of `within`, if the rig says.
     pub fn window(&self, pad: PadId, of: SensorId, within: SensorId) -> Option<&Window> {
         self.windows.iter().find(|w| (w.pad, w.of, w.within) == (pad, of, within))
     }
 
-    /// Where the first color sensor looks in the picture of the first depth sensor.
+    /// Window of the first color sensor in the picture of the first depth sensor.
     pub fn color_window(&self, pad: PadId) -> Option<&Window> {
         self.window(pad, self.first(SensorKind::Color)?, self.first(SensorKind::Depth)?)
     }
@@ -230,21 +230,21 @@ impl Rig {
     /// The mean of [`Rig::window_share`] over the pads that have one: for a touch that does not say of which it is.
     pub fn mean_window_share(&self) -> Option<[f64; 2]> {
         let all: Vec<[f64; 2]> = self.pads().filter_map(|pad| self.window_share(pad)).collect();
-        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|at| at[i]).sum::<f64>() / all.len() as f64))
+        (!all.is_empty()).then(|| [0, 1].map(|i| all.iter().map(|share| share[i]).sum::<f64>() / all.len() as f64))
     }
 
-    /// Whether the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.
+    /// True where the pictures of the first color and the first depth sensor lie turned by 180 degrees to each other.
     pub fn turned(&self) -> bool {
         let turn = |sensor: Option<&Sensor>| sensor.map(|sensor| sensor.rotation_deg);
         turn(self.color()).zip(turn(self.depth())).is_some_and(|(color, depth)| color != depth)
     }
 
-    /// Which pixels of a depth picture of `size` (`[width, height]`, raw orientation; other sizes than the sensor's stand
-    /// for the same area) the pad's color sensor sees; `None` where the rig does not say.
+    /// Mask of the pixels of a depth picture of `size` (`[width, height]`, raw orientation; other sizes than the
+    /// sensor's stand for the same area) that the pad's color sensor sees; `None` where the rig does not say.
     pub fn seen_mask(&self, pad: PadId, size: [usize; 2]) -> Option<Mask> {
         let sensor = self.depth()?;
         let [cx, cy, width, height] = self.color_window(pad)?.rectangle();
-        let full = |at: usize, from: usize, to: usize| (at as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
+        let full = |index: usize, from: usize, to: usize| (index as f64 + 0.5) * to as f64 / from.max(1) as f64 - 0.5;
         Some(Grid::from_fn(size[0], size[1], |x, y| {
             let (x, y) = (full(x, size[0], sensor.width), full(y, size[1], sensor.height));
             (x - cx).abs() <= width / 2.0 && (y - cy).abs() <= height / 2.0

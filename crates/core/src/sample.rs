@@ -19,17 +19,18 @@ use super::upright::TurnReading;
 pub struct Sample {
     /// The sensors that felt it.
     pub rig: Arc<Rig>,
-    /// What each pad felt; none where the source has no such pad.
+    /// Touch on each pad; none where the source has no such pad.
     pub pads: PerPad<PadTouch>,
     /// The true in-hand pose, where known. Its inverse carries the lab's angle sign.
     pub grasp_from_object: Option<PlanarPose>,
-    /// Whether lengths are measured, or assumed because the source lost its scale.
+    /// Scale: whether lengths are measured, or assumed because the source lost its scale.
     pub scale: Scale,
-    /// How the source's images lay before they were laid upright; upright for whatever comes from a sensor.
+    /// Turn of the source's images before they were laid upright; upright for whatever comes from a sensor.
     pub laid: Turn,
-    /// How sure that is, where the colors of a picture told; `None` for whatever comes from a sensor.
+    /// Reading of that turn, with how sure it is, where the colors of a picture told; `None` for whatever comes from a
+    /// sensor.
     pub reading: Option<TurnReading>,
-    /// What is odd about its files and numbers: whoever answers from this sample says so.
+    /// Oddities of its files and numbers: whoever answers from this sample says so.
     pub notes: Vec<Problem>,
 }
 
@@ -48,7 +49,7 @@ impl Default for Sample {
     }
 }
 
-/// Where the meters of a sample come from.
+/// Scale: where the meters of a sample come from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Scale {
@@ -69,7 +70,7 @@ impl Scale {
     }
 }
 
-/// What one finger felt, with each sensor.
+/// Touch of one finger, with each of its sensors.
 #[derive(Clone, Debug, Default)]
 pub struct PadTouch {
     /// In the order of the rig's sensors.
@@ -78,7 +79,7 @@ pub struct PadTouch {
     pub lent: Option<Arc<DepthCamera>>,
 }
 
-/// What one sensor felt.
+/// Reading of one sensor.
 #[derive(Clone, Debug)]
 pub enum Reading {
     /// A color sensor's touch.
@@ -100,7 +101,7 @@ impl From<DepthTouch> for Reading {
 }
 
 impl Reading {
-    /// Its picture's columns and rows.
+    /// Columns and rows of its picture.
     pub fn size(&self) -> [usize; 2] {
         match self {
             Self::Color(touch) => touch.difference.size(),
@@ -135,11 +136,11 @@ impl PadTouch {
     /// Adds a reading, in place of an earlier one of the same sensor.
     pub fn set(&mut self, sensor: SensorId, reading: impl Into<Reading>) {
         self.readings.retain(|(of, _)| *of != sensor);
-        let at = self.readings.partition_point(|(of, _)| *of < sensor);
-        self.readings.insert(at, (sensor, reading.into()));
+        let index = self.readings.partition_point(|(of, _)| *of < sensor);
+        self.readings.insert(index, (sensor, reading.into()));
     }
 
-    /// What this sensor felt.
+    /// Reading of this sensor.
     pub fn reading(&self, sensor: SensorId) -> Option<&Reading> {
         self.readings.iter().find(|(of, _)| *of == sensor).map(|(_, reading)| reading)
     }
@@ -149,7 +150,7 @@ impl PadTouch {
         &self.readings
     }
 
-    /// What the first color sensor with a reading felt.
+    /// Reading of the first color sensor that has one.
     pub fn color(&self) -> Option<&ColorTouch> {
         self.readings.iter().find_map(|(_, reading)| match reading {
             Reading::Color(touch) => Some(touch),
@@ -165,7 +166,7 @@ impl PadTouch {
         })
     }
 
-    /// What the first depth sensor with a reading felt.
+    /// Reading of the first depth sensor that has one.
     pub fn depth(&self) -> Option<&DepthTouch> {
         self.readings.iter().find_map(|(_, reading)| match reading {
             Reading::Depth(touch) => Some(touch),
@@ -233,7 +234,7 @@ impl ColorTouch {
 pub struct DepthTouch {
     /// Reference depth minus current depth, meters, positive = pushed in. 175 x 140 px from the lab's files.
     pub imprint: DepthMap,
-    /// What is needed to lift the imprint to points in the grasp frame; `None` for image folders.
+    /// Camera that lifts the imprint to points in the grasp frame; `None` for image folders.
     pub camera: Option<DepthCamera>,
     /// The simulator's truth; `None` for measured data.
     pub truth: Option<DepthTruth>,
@@ -246,7 +247,7 @@ pub struct DepthCamera {
     pub depth_reference: DepthMap,
     /// Intrinsics of the full image.
     pub intrinsics: Intrinsics,
-    /// Which part of the full image is stored.
+    /// Part of the full image that is stored.
     pub crop: Crop,
     /// Camera frame to grasp frame.
     pub grasp_from_camera: DAffine3,
@@ -264,7 +265,7 @@ impl DepthCamera {
     }
 }
 
-/// What only a simulator knows.
+/// Truth that only a simulator knows.
 #[derive(Clone, Debug)]
 pub struct DepthTruth {
     /// The imprint before camera noise, meters.
@@ -274,7 +275,7 @@ pub struct DepthTruth {
 }
 
 impl Sample {
-    /// What a pad felt, if the source has it.
+    /// Touch on a pad, if the source has it.
     pub fn pad(&self, pad: PadId) -> Option<&PadTouch> {
         self.pads.get(pad)
     }

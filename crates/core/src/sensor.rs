@@ -30,7 +30,7 @@ impl Intrinsics {
         Some((p_in_camera.x * self.fx / p_in_camera.z + self.cx, p_in_camera.y * self.fy / p_in_camera.z + self.cy))
     }
 
-    /// Whether the numbers can be a camera's: finite, positive focal lengths.
+    /// True where the numbers can be a camera's: finite, positive focal lengths.
     pub fn is_plausible(&self) -> bool {
         [self.fx, self.fy, self.cx, self.cy].iter().all(|n| n.is_finite()) && self.fx > 1.0 && self.fy > 1.0
     }

@@ -5,7 +5,7 @@
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!
-//! What is modeled, and what not: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
+//! The model, and what it leaves out: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
 //! (see `membrane`), so it tents between bars and bulges beside them; its camera looks obliquely, hides what lies
 //! behind a bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs. There is no friction
 //! between membrane and tool, no light bouncing in the gel and no lens distortion.
@@ -101,7 +101,7 @@ fn bubble_touch(
     }
 }
 
-/// Where the camera really is, seen from where the sample says it is; nothing by default.
+/// Pose of the real camera, seen from where the sample says it is; the identity by default.
 fn calibration_error(config: &BubbleConfig, finger: PadId, seed: u64) -> DAffine3 {
     if config.calibration_m == 0.0 && config.calibration_rad == 0.0 {
         return DAffine3::IDENTITY;

@@ -3,8 +3,8 @@
 
 use std::borrow::Cow;
 
-/// Whether a character says something to the terminal instead of being shown: control characters, and those that turn the
-/// order of the letters after them.
+/// True where a character says something to the terminal instead of being shown: control characters, and those that
+/// turn the order of the letters after them.
 pub(crate) fn is_unprintable(c: char) -> bool {
     c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }

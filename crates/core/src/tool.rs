@@ -56,8 +56,8 @@ impl ToolModel {
         &self.surface
     }
 
-    /// What a registration needs of the tool in a form of its own: made at the first request for the type `T`, kept
-    /// with the tool, and shared by all threads. The tool does not know what it keeps.
+    /// Form of the tool that a registration needs of its own: made at the first request for the type `T`, kept with the
+    /// tool, and shared by all threads. The tool does not know what it keeps.
     ///
     /// `make` must depend on the tool alone; whoever asks for one type always passes the same function.
     pub fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Self) -> T) -> Arc<T> {
@@ -98,9 +98,9 @@ mod tests {
     #[test]
     fn what_is_derived_is_made_once_for_each_type_on_any_thread() {
         let tool = ToolModel::new(cross()).unwrap();
-        let made = AtomicUsize::new(0);
+        let calls = AtomicUsize::new(0);
         let count = |tool: &ToolModel| {
-            made.fetch_add(1, Ordering::Relaxed);
+            calls.fetch_add(1, Ordering::Relaxed);
             Count(tool.surface().len())
         };
         std::thread::scope(|scope| {
@@ -108,11 +108,11 @@ mod tests {
                 scope.spawn(|| assert_eq!(*tool.derived(count), Count(SURFACE_POINTS)));
             }
         });
-        assert_eq!(made.load(Ordering::Relaxed), 1);
+        assert_eq!(calls.load(Ordering::Relaxed), 1);
         // While one is made another may be asked for, of the same tool.
         let nested = tool.derived(|tool| tool.derived(count).0.to_string());
         assert_eq!(*nested, SURFACE_POINTS.to_string());
-        assert_eq!(made.load(Ordering::Relaxed), 1);
+        assert_eq!(calls.load(Ordering::Relaxed), 1);
         assert_eq!(ToolModel::new(cross()).unwrap().derived(|_| Count(7)).0, 7, "another tool has its own");
     }
 }

@@ -41,7 +41,7 @@ pub fn scale_to_meters(size: f64) -> Option<f64> {
     [1.0, 1e-3, 1e-2, 0.0254, 1e-6, 1e3].into_iter().find(|scale| is_tool_length(size * scale))
 }
 
-/// Whether a hand-held tool can be so long, meters.
+/// True where a hand-held tool can be so long, meters.
 pub fn is_tool_length(meters: f64) -> bool {
     (0.004..=0.4).contains(&meters)
 }

@@ -1,10 +1,10 @@
-//! Which way up a GelSlim image is, seen in the colors of its lights.
+//! Orientation of a GelSlim image: which way up it is, seen in the colors of its lights.
 //!
 //! Pictures made for training are often turned by a quarter or mirrored, both images of a pair alike. The sensor's
 //! three lights stay where they are in the sensor, so the colors tell. A light brightens the slopes that face it:
 //! without its gray part, the difference image is a linear function of the gel's slope, and the known directions of
 //! the lights give the slope back. The slope of a surface has no curl. Read in a wrong quarter turn or mirrored, the
-//! same colors give a field that is nearly all curl. TurnReading an image upside down turns the surface inside out; a
+//! same colors give a field that is nearly all curl. Reading an image upside down turns the surface inside out; a
 //! touched gel is dented, with sharp convex rims, so the slope's divergence is skewed to one side.
 
 use super::blur::gaussian;
@@ -29,10 +29,10 @@ const TOUCHED: f64 = 0.55;
 /// By how much the right reading must be more consistent than the best wrong one.
 const CLEARER: f64 = 0.05;
 
-/// How a picture lies, and how sure that is.
+/// Turn in which a picture lies, and how sure that is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TurnReading {
-    /// How it lies.
+    /// Turn.
     pub turn: Turn,
     /// Share of the slope that is free of curl in this reading, 0..1. Right readings of published images have .69 to .95.
     pub consistency: f64,
@@ -41,19 +41,20 @@ pub struct TurnReading {
 }
 
 impl TurnReading {
-    /// Whether it is little more than a guess: no published pair is read so.
+    /// True where it is little more than a guess: no published pair is read so.
     pub fn is_guess(self) -> bool {
         self.consistency < GUESSED || self.margin < GUESSED_MARGIN
     }
 
-    /// Whether both thresholds are passed at which no reading of a simulated touch is wrong.
+    /// True where both thresholds are passed at which no reading of a simulated touch is wrong.
     pub fn is_sure(self) -> bool {
         self.consistency >= CONSISTENT && self.margin >= CLEARER
     }
 }
 
-/// How a square difference image (signed, any scale) lies, by the directions of the nominal sensor's lights: the best
-/// reading, sure or not. On 36 published pairs it is right for all, where the sure ones alone leave some unread.
+/// Best reading of the turn in which a square difference image (signed, any scale) lies, by the directions of the
+/// nominal sensor's lights, sure or not. On 36 published pairs it is right for all, where the sure ones alone leave
+/// some unread.
 ///
 /// `None` where there is nothing to read: nothing touched, not square, values that are not numbers, no color.
 pub fn best(difference: &RgbGrid) -> Option<TurnReading> {
@@ -145,8 +146,8 @@ mod tests {
             let difference = &touch.pad(lab::RIGHT).unwrap().color().unwrap().difference;
             let square = resample::bilinear_rgb(difference, SIDE, SIDE);
             for turn in Turn::all() {
-                match best(&turn.apply(&square)).filter(|found| found.is_sure()).map(|found| found.turn) {
-                    Some(found) if found == turn => right += 1,
+                match best(&turn.apply(&square)).filter(|reading| reading.is_sure()).map(|reading| reading.turn) {
+                    Some(read) if read == turn => right += 1,
                     Some(_) => wrong += 1,
                     None => silent += 1,
                 }
@@ -163,6 +164,6 @@ mod tests {
         assert_eq!(best(&Grid::filled(427, 320, [3.0; 3])), None);
         assert_eq!(best(&Grid::filled(0, 0, [3.0; 3])), None);
         let gray = Grid::from_fn(128, 128, |x, y| [((x * 31 + y * 17) % 97) as f32; 3]);
-        assert!(best(&gray).is_none_or(|found| !found.is_sure()));
+        assert!(best(&gray).is_none_or(|reading| !reading.is_sure()));
     }
 }

@@ -3,13 +3,13 @@
 use crate::image;
 use crate::random::Random;
 
-/// How far pairs are varied.
+/// Ranges in which pairs are varied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Augment {
     /// Largest shift of the picture, pixels; simulated pairs are not shifted.
     pub shift: f64,
-    /// How far the imprint moves when the picture moves by one pixel: rows, columns. The picture sees a part of the
-    /// imprint, magnified.
+    /// Shift of the imprint when the picture moves by one pixel: rows, columns. The picture sees a part of the imprint,
+    /// magnified.
     pub imprint_per_picture: [f64; 2],
     /// Standard deviation of the mixing of colors.
     pub colors: f64,
@@ -89,13 +89,13 @@ impl Augment {
     }
 }
 
-/// What varying a pair needs to know of all pairs.
+/// Figures of all pairs that varying one of them needs.
 pub(crate) struct Set<'a> {
     /// Mean imprint of the pair's pad.
     pub(crate) mean: &'a [f32],
     /// Spread of the input by color.
     pub(crate) deviation: [f32; 3],
-    /// How the clipped pictures of the set are clipped.
+    /// Clippings of the clipped pictures of the set.
     pub(crate) clippings: &'a [Clipping],
 }
 
@@ -109,7 +109,7 @@ fn mix(planes: &mut [Vec<f32>], mixing: &[f64]) {
     }
 }
 
-/// Which side of each color was cut off.
+/// Clipping: the side of each color that was cut off.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Clipping([Option<Side>; 3]);
 
@@ -120,7 +120,7 @@ enum Side {
 }
 
 impl Clipping {
-    /// How a picture is clipped: a color without any negative value, or without any positive one, lost that side.
+    /// Clipping of a picture: a color without any negative value, or without any positive one, lost that side.
     pub(crate) fn of(picture: &[f32]) -> Self {
         let side = |plane: &[f32]| {
             let low = plane.iter().copied().fold(f32::INFINITY, f32::min);
@@ -135,7 +135,7 @@ impl Clipping {
         Self(std::array::from_fn(|_| planes.next().flatten()))
     }
 
-    /// Whether any color is clipped.
+    /// True where any color is clipped.
     pub(crate) fn any(self) -> bool {
         self.0.iter().any(Option::is_some)
     }
@@ -198,7 +198,7 @@ mod tests {
 
     #[test]
     fn the_imprint_moves_with_the_picture() {
-        let dot = |at: usize| (0..SIDE * SIDE).map(|i| f32::from(u8::from(i == at))).collect::<Vec<_>>();
+        let dot = |index: usize| (0..SIDE * SIDE).map(|i| f32::from(u8::from(i == index))).collect::<Vec<_>>();
         let augment = Augment { imprint_per_picture: [1.0, 1.0], shift: 3.0, ..Augment::none() };
         let set = Set { mean: &[0.0; SIDE * SIDE], deviation: [1.0; 3], clippings: &[] };
         let picture = dot(8 * SIDE + 8).repeat(3);

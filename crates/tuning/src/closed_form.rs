@@ -2,7 +2,7 @@
 
 use crate::image;
 
-/// What lies behind the decoder: where each pad's sensor looks, and what it has of its own.
+/// Placement behind the decoder: where each pad's sensor looks, and what it has of its own.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
     /// Factor and offset of the decoder's picture, in units.
@@ -59,8 +59,8 @@ impl Placement {
         placement
     }
 
-    /// What the pad's imprints have in common beside the prediction. Its fine part is taken whole; of the smooth part,
-    /// which a few pairs may share by chance, n of n + 1.
+    /// Residual that the pad's imprints have in common beside the prediction, in units. Its fine part is taken whole;
+    /// of the smooth part, which a few pairs may share by chance, n of n + 1.
     fn mean_residual(&self, pad: usize, side: usize, compared: &[Compared]) -> Vec<f32> {
         let mut mean = vec![0.0; side * side];
         let own: Vec<&Compared> = compared.iter().filter(|pair| pair.pad == pad).collect();
@@ -94,9 +94,9 @@ fn search(side: usize, own: &[&Compared], measured: &[Vec<f32>]) -> [f64; 2] {
         let reach = if round == 0 { (REACH * side as f64 / stride).round() as i32 } else { 1 };
         for (down, right) in (-reach..=reach).flat_map(|down| (-reach..=reach).map(move |right| (down, right))) {
             let shift = [center[0] + f64::from(down) * stride, center[1] + f64::from(right) * stride];
-            let found = error(shift);
-            if found < best.1 {
-                best = (shift, found);
+            let unexplained = error(shift);
+            if unexplained < best.1 {
+                best = (shift, unexplained);
             }
         }
     }
@@ -141,7 +141,7 @@ impl Line {
         clear.then(|| [factor, (self.y - factor * self.x) / self.count])
     }
 
-    /// What the line leaves of y.
+    /// Squared residual of y that the line leaves.
     fn unexplained(&self) -> f64 {
         let [xx, xy, yy] = self.centered();
         if xx > 0.0 && xy > 0.0 { yy - xy * xy / xx } else { yy }
@@ -170,23 +170,27 @@ mod tests {
                 Compared { pad: i % 2, predicted, measured }
             })
             .collect();
-        let found = Placement::fitted(2, SIDE, &compared);
-        for (found, true_shift) in found.shift.iter().zip(shifts) {
-            assert!(found.iter().zip(true_shift).all(|(f, t)| (f64::from(*f) - t).abs() <= 0.25), "{found:?}");
+        let placement = Placement::fitted(2, SIDE, &compared);
+        for (shift, true_shift) in placement.shift.iter().zip(shifts) {
+            assert!(shift.iter().zip(true_shift).all(|(f, t)| (f64::from(*f) - t).abs() <= 0.25), "{shift:?}");
         }
         // The measured images are blurred a little, which flattens them.
-        assert!((found.line[0] - 0.8).abs() < 0.1 && (found.line[1] - 0.1).abs() < 0.01, "{:?}", found.line);
+        assert!(
+            (placement.line[0] - 0.8).abs() < 0.1 && (placement.line[1] - 0.1).abs() < 0.01,
+            "{:?}",
+            placement.line
+        );
         let error = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt();
         let nothing = vec![0.0; SIDE * SIDE];
-        assert!(error(&found.field[0], &fields[0]) < 0.5 * error(&nothing, &fields[0]));
+        assert!(error(&placement.field[0], &fields[0]) < 0.5 * error(&nothing, &fields[0]));
     }
 
     #[test]
     fn pads_without_pairs_and_flat_predictions_stay() {
         let flat = Compared { pad: 1, predicted: vec![0.5; SIDE * SIDE], measured: vec![0.25; SIDE * SIDE] };
-        let found = Placement::fitted(2, SIDE, &[flat]);
-        assert_eq!((found.line, found.shift.clone()), ([1.0, 0.0], vec![[0.0; 2]; 2]));
-        assert_eq!(found.field[0], vec![0.0; SIDE * SIDE]);
-        assert!(found.field[1].iter().all(|v| (v + 0.125).abs() < 1e-6));
+        let placement = Placement::fitted(2, SIDE, &[flat]);
+        assert_eq!((placement.line, placement.shift.clone()), ([1.0, 0.0], vec![[0.0; 2]; 2]));
+        assert_eq!(placement.field[0], vec![0.0; SIDE * SIDE]);
+        assert!(placement.field[1].iter().all(|v| (v + 0.125).abs() < 1e-6));
     }
 }

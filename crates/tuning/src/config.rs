@@ -3,7 +3,7 @@
 use crate::augment::Augment;
 use crate::error::{Error, Result};
 
-/// Which networks learn.
+/// Networks that learn.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Trained {
     /// Encoder, denoiser and decoder.
@@ -13,7 +13,7 @@ pub enum Trained {
     Encoder,
 }
 
-/// How the generator is tuned.
+/// Settings of the tuning of a generator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Config {
     /// Steps of the whole plan; the rates follow it.
@@ -22,7 +22,7 @@ pub struct Config {
     pub batch: usize,
     /// Decides order, variations and noise.
     pub seed: u64,
-    /// Which networks learn. Line, shift and field always do.
+    /// Networks that learn. Line, shift and field always do.
     pub trained: Trained,
     /// Rate of the networks.
     pub network_rate: f32,
@@ -39,7 +39,7 @@ pub struct Config {
     pub anchor: f32,
     /// Steps of rising rates.
     pub warm_up: usize,
-    /// What is left of the rates at the end.
+    /// Share of the rates that is left at the end.
     pub rest: f32,
     /// Longest gradient.
     pub clip: f32,
@@ -48,7 +48,7 @@ pub struct Config {
     /// Share of simulated pairs in a batch, where there are pairs of both kinds. An eighth keeps what the bundle knows of
     /// simulated touches but for 0.2 dB, and costs the sensor as little; a quarter keeps all of it for another 0.2 dB.
     pub simulated: f64,
-    /// How pairs are varied.
+    /// Ranges in which pairs are varied.
     pub augment: Augment,
     /// Threads; `None` for as many as there are cores, four at most. The result does not depend on it.
     pub threads: Option<usize>,

@@ -7,15 +7,15 @@ pub enum Error {
     /// A graph's file cannot be read.
     #[error("{network}: not an ONNX file that can be tuned: {why}")]
     Onnx {
-        /// Which network.
+        /// Name of the network.
         network: &'static str,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// The network lacks a weight of the architecture.
     #[error("{network}: the weight \"{weight}\" is missing: this is not the architecture that can be tuned")]
     Missing {
-        /// Which network.
+        /// Name of the network.
         network: &'static str,
         /// The weight's name.
         weight: String,
@@ -23,7 +23,7 @@ pub enum Error {
     /// The network has a weight that the architecture lacks.
     #[error("{network}: the weight \"{weight}\" has no place in the architecture that can be tuned")]
     Unknown {
-        /// Which network.
+        /// Name of the network.
         network: &'static str,
         /// The weight's name.
         weight: String,
@@ -31,31 +31,31 @@ pub enum Error {
     /// A weight has another shape than its neighbors ask for.
     #[error("{network}: the weight \"{weight}\" has the shape {found:?} where {expected:?} is needed")]
     Shape {
-        /// Which network.
+        /// Name of the network.
         network: &'static str,
         /// The weight's name.
         weight: String,
-        /// As in the file.
+        /// Shape in the file.
         found: Vec<usize>,
-        /// As the architecture asks for.
+        /// Shape that the architecture asks for.
         expected: Vec<usize>,
     },
-    /// What is given beside the networks does not fit them.
+    /// A value that is given beside the networks does not fit them.
     #[error("{what}: {why}")]
     Start {
-        /// Which value.
+        /// Name of the value.
         what: &'static str,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// A setting is out of its range.
     #[error("the setting \"{setting}\" is {found}; it must be {must}")]
     Config {
-        /// Its name.
+        /// Name of the setting.
         setting: &'static str,
-        /// Its value.
+        /// Value that was given.
         found: String,
-        /// What is allowed.
+        /// Range that is allowed.
         must: &'static str,
     },
     /// There is nothing to learn from.
@@ -64,17 +64,17 @@ pub enum Error {
     /// An imprint with its mask cannot be learned from.
     #[error("mask {index}: {why}")]
     Mask {
-        /// Its place among the masks, from 0.
+        /// Index of the mask, from 0.
         index: usize,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// A pair cannot be learned from.
     #[error("pair {index}: {why}")]
     Pair {
-        /// Its place among the pairs, from 0.
+        /// Index of the pair, from 0.
         index: usize,
-        /// What is wrong.
+        /// Reason.
         why: String,
     },
     /// The loss left the numbers; the weights are those of the step before.
@@ -91,5 +91,5 @@ pub enum Error {
     State(&'static str),
 }
 
-/// What may go wrong, as the crate's functions return it.
+/// Result of the crate's functions, with its error.
 pub type Result<T> = std::result::Result<T, Error>;

@@ -1,4 +1,4 @@
-//! What tests share: a tiny generator with random weights, and touches with a known placement.
+//! Fixtures that tests share: a tiny generator with random weights, and touches with a known placement.
 
 use crate::augment::Augment;
 use crate::closed_form::Placement;

@@ -1,6 +1,6 @@
 //! Square images as slices: [`shifted`], [`boxed`], [`blurred`].
 
-/// Where a pixel of a moved line reads.
+/// Tap: where a pixel of a moved line reads.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Tap {
     /// The first of two neighbors.
@@ -22,10 +22,10 @@ pub(crate) fn taps(side: usize, shift: f64) -> Vec<Tap> {
     let last = (side - 1) as f64;
     let tap = |i: usize| {
         let wanted = i as f64 - shift;
-        let at = wanted.clamp(0.0, last);
-        let low = (at.floor() as usize).min(side - 2);
-        let inside = if wanted == at { 1.0 } else { 0.0 };
-        Tap { low, part: (at - low as f64) as f32, inside }
+        let held = wanted.clamp(0.0, last);
+        let low = (held.floor() as usize).min(side - 2);
+        let inside = if wanted == held { 1.0 } else { 0.0 };
+        Tap { low, part: (held - low as f64) as f32, inside }
     };
     (0..side).map(tap).collect()
 }

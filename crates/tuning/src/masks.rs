@@ -18,17 +18,17 @@ use crate::trainer::{Descent, Objective, PARTS, Plan, StepReport, Trainer, threa
 /// A mask network as its bundle describes it: where tuning begins.
 #[derive(Clone, Debug)]
 pub struct MaskStart {
-    /// Its ONNX file.
+    /// ONNX file of the network.
     pub file: Vec<u8>,
     /// `[columns, rows]` of imprints and masks.
     pub size: [usize; 2],
     /// Meters at 0 and 1 of the network's input.
     pub range_m: [f32; 2],
-    /// What becomes of values between and beyond them.
+    /// Cast of values between and beyond them.
     pub cast: Cast,
 }
 
-/// How the unit interval reaches the network.
+/// Cast of the unit interval before it reaches the network.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Cast {
     /// As it is, held at 0 and 1.
@@ -59,15 +59,15 @@ impl MaskStart {
 pub struct MaskTouch {
     /// Meters, row by row; NaN where nothing was measured, which the network sees as 0 m.
     pub imprint_m: Vec<f32>,
-    /// Which pixels are contact.
+    /// Contact: true where a pixel touches.
     pub contact: Vec<bool>,
-    /// Which pixels count; all without it.
+    /// Pixels that count; all without it.
     pub counted: Option<Vec<bool>>,
-    /// Whether a network predicted the imprint: then it is not drawn shallower, because predictions have one depth.
+    /// True where a network predicted the imprint: then it is not drawn shallower, because predictions have one depth.
     pub predicted: bool,
 }
 
-/// How a mask network is tuned. The defaults are for some twenty masks and ten minutes.
+/// Settings of the tuning of a mask network. The defaults are for some twenty masks and ten minutes.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaskConfig {
     /// Steps of the whole plan; the rates follow it.
@@ -84,11 +84,11 @@ pub struct MaskConfig {
     pub anchor: f32,
     /// Steps of rising rates.
     pub warm_up: usize,
-    /// What is left of the rates at the end.
+    /// Share of the rates that is left at the end.
     pub rest: f32,
     /// Longest gradient.
     pub clip: f32,
-    /// Which other sensors the imprints are varied to.
+    /// Other sensors that the imprints are varied to.
     pub sensors: Sensors,
     /// Threads; `None` for as many as there are cores, four at most. The result does not depend on it.
     pub threads: Option<usize>,
@@ -168,21 +168,22 @@ impl Objective for Recipe {
     fn part(&self, step: usize, part: usize) -> Part {
         let c = &self.config;
         let parts = self.parts(step);
-        let mut made = Part::default();
+        let mut items = Part::default();
         for place in part * c.batch / parts..(part + 1) * c.batch / parts {
             let touch = &self.touches[dealt(c.seed, &self.all, step * c.batch + place, 0)];
             let random = &mut Random::new(c.seed, Purpose::Variation, step, place);
             let varied = c.sensors.vary(touch, self.start.size, random);
             let bit = |&v: &bool| f32::from(u8::from(v));
-            made.inputs
+            items
+                .inputs
                 .extend(varied.imprint_m.iter().map(|&m| self.start.scaled(if m.is_finite() { m } else { 0.0 })));
-            made.masks.extend(varied.contact.iter().map(bit));
+            items.masks.extend(varied.contact.iter().map(bit));
             match &varied.counted {
-                Some(counted) => made.counted.extend(counted.iter().map(bit)),
-                None => made.counted.extend(vec![1.0; varied.contact.len()]),
+                Some(counted) => items.counted.extend(counted.iter().map(bit)),
+                None => items.counted.extend(vec![1.0; varied.contact.len()]),
             }
         }
-        made
+        items
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {
@@ -245,8 +246,8 @@ impl MaskTuner {
             .with(|name| params.get(&format!("{MASK}{name}")).map(|entry| entry.values.to_vec()).unwrap_or_default())
     }
 
-    /// What the network says of imprints (meters, as in [`MaskTouch::imprint_m`]) now: the probability of contact of each
-    /// pixel.
+    /// Probability of contact of each pixel of imprints (meters, as in [`MaskTouch::imprint_m`]), by the network as it
+    /// is now.
     ///
     /// # Errors
     /// [`Error::Mask`] with the place of an imprint that has another size.
@@ -254,7 +255,7 @@ impl MaskTuner {
         self.ask(self.trainer.average(), imprints)
     }
 
-    /// What it said before the first step.
+    /// Probability of contact of each pixel, by the network before the first step.
     ///
     /// # Errors
     /// As [`MaskTuner::probabilities`].
@@ -309,8 +310,8 @@ fn check(touches: &[MaskTouch], [width, height]: [usize; 2]) -> Result<()> {
         let counted = touch.counted.as_ref().map_or(pixels, Vec::len);
         let sizes =
             [("imprint", touch.imprint_m.len()), ("mask", touch.contact.len()), ("map of what counts", counted)];
-        if let Some((what, found)) = sizes.into_iter().find(|(_, found)| *found != pixels) {
-            return Err(Error::Mask { index, why: format!("its {what} has {found} values instead of {pixels}") });
+        if let Some((what, length)) = sizes.into_iter().find(|(_, length)| *length != pixels) {
+            return Err(Error::Mask { index, why: format!("its {what} has {length} values instead of {pixels}") });
         }
         if touch.imprint_m.iter().all(|v| !v.is_finite()) {
             return Err(Error::Mask { index, why: "its imprint holds no measurement".into() });

@@ -77,7 +77,7 @@ impl Onnx {
     /// Decodes a file; each floating-point initializer becomes a weight.
     ///
     /// # Errors
-    /// What is wrong with the file, for a reader.
+    /// Fault of the file, in words for a reader.
     pub fn parse(bytes: Vec<u8>) -> Result<Self, String> {
         let mut initializers = Vec::new();
         let mut nodes = Vec::new();
@@ -86,15 +86,17 @@ impl Onnx {
             let (7, Value::Message(graph)) = (number, graph) else { continue };
             for (number, value) in fields(&bytes, graph)? {
                 match (number, value) {
-                    (1, Value::Message(at)) => nodes.push(node(&bytes, at)?),
-                    (5, Value::Message(at)) => initializers.push(initializer(&bytes, at)?),
+                    (1, Value::Message(range)) => nodes.push(node(&bytes, range)?),
+                    (5, Value::Message(range)) => initializers.push(initializer(&bytes, range)?),
                     _ => {}
                 }
             }
         }
         let names = layer_names(&initializers, &nodes);
-        let weights: Vec<Weight> =
-            initializers.into_iter().filter_map(|found| weight(found, &names).transpose()).collect::<Decoded<_>>()?;
+        let weights: Vec<Weight> = initializers
+            .into_iter()
+            .filter_map(|initializer| weight(initializer, &names).transpose())
+            .collect::<Decoded<_>>()?;
         let mut seen = BTreeSet::new();
         match weights.iter().find(|weight| !seen.insert(weight.name.clone())) {
             Some(twice) => Err(format!("two weights are called \"{}\"", twice.name)),
@@ -141,13 +143,13 @@ impl Onnx {
 }
 
 /// The weight that an initializer is; `None` for whole numbers (shapes, indices).
-fn weight(found: Initializer, names: &BTreeMap<String, String>) -> Decoded<Option<Weight>> {
-    let precision = match found.element {
+fn weight(initializer: Initializer, names: &BTreeMap<String, String>) -> Decoded<Option<Weight>> {
+    let precision = match initializer.element {
         1 => Precision::Single,
         10 => Precision::Half,
         _ => return Ok(None),
     };
-    let Initializer { name, dims, raw, .. } = found;
+    let Initializer { name, dims, raw, .. } = initializer;
     let name = names.get(&name).cloned().unwrap_or(name);
     let place = raw.ok_or_else(|| format!("the weight \"{name}\" does not lie in the file as raw data"))?;
     let values = dims.iter().try_fold(1usize, |product, &dim| product.checked_mul(dim));
@@ -202,11 +204,11 @@ fn layer(node: &str) -> String {
 }
 
 /// NodeProto: 1 = input, 2 = output, 3 = name, 4 = `op_type`.
-fn node(bytes: &[u8], at: Range<usize>) -> Decoded<Node> {
+fn node(bytes: &[u8], range: Range<usize>) -> Decoded<Node> {
     let mut node = Node::default();
-    for (number, value) in fields(bytes, at)? {
-        let Value::Message(at) = value else { continue };
-        let text = || String::from_utf8_lossy(&bytes[at.clone()]).into_owned();
+    for (number, value) in fields(bytes, range)? {
+        let Value::Message(range) = value else { continue };
+        let text = || String::from_utf8_lossy(&bytes[range.clone()]).into_owned();
         match number {
             1 => node.inputs.push(text()),
             2 => node.outputs.push(text()),
@@ -219,24 +221,24 @@ fn node(bytes: &[u8], at: Range<usize>) -> Decoded<Node> {
 }
 
 /// TensorProto: 1 = dims, 2 = `data_type`, 8 = name, 9 = `raw_data`.
-fn initializer(bytes: &[u8], at: Range<usize>) -> Decoded<Initializer> {
-    let mut found = Initializer::default();
-    for (number, value) in fields(bytes, at)? {
+fn initializer(bytes: &[u8], range: Range<usize>) -> Decoded<Initializer> {
+    let mut initializer = Initializer::default();
+    for (number, value) in fields(bytes, range)? {
         match (number, value) {
-            (1, Value::Number(dim)) => found.dims.push(size(dim)?),
+            (1, Value::Number(dim)) => initializer.dims.push(size(dim)?),
             (1, Value::Message(packed)) => {
-                let mut at = packed.start;
-                while at < packed.end {
-                    found.dims.push(size(varint(bytes, &mut at, packed.end)?)?);
+                let mut position = packed.start;
+                while position < packed.end {
+                    initializer.dims.push(size(varint(bytes, &mut position, packed.end)?)?);
                 }
             }
-            (2, Value::Number(element)) => found.element = element,
-            (8, Value::Message(at)) => found.name = String::from_utf8_lossy(&bytes[at]).into_owned(),
-            (9, Value::Message(at)) => found.raw = Some(at),
+            (2, Value::Number(element)) => initializer.element = element,
+            (8, Value::Message(range)) => initializer.name = String::from_utf8_lossy(&bytes[range]).into_owned(),
+            (9, Value::Message(range)) => initializer.raw = Some(range),
             _ => {}
         }
     }
-    Ok(found)
+    Ok(initializer)
 }
 
 fn size(number: u64) -> Decoded<usize> {
@@ -250,9 +252,9 @@ enum Value {
 }
 
 /// The fields of the message that lies at a place: their numbers and values.
-fn fields(bytes: &[u8], at: Range<usize>) -> Decoded<Vec<(u64, Value)>> {
-    let Range { start: mut here, end } = at;
-    let mut found = Vec::new();
+fn fields(bytes: &[u8], range: Range<usize>) -> Decoded<Vec<(u64, Value)>> {
+    let Range { start: mut here, end } = range;
+    let mut fields = Vec::new();
     while here < end {
         let key = varint(bytes, &mut here, end)?;
         let value = match key & 7 {
@@ -265,9 +267,9 @@ fn fields(bytes: &[u8], at: Range<usize>) -> Decoded<Vec<(u64, Value)>> {
             5 => skip(&mut here, 4, end).map(|_| Value::Fixed)?,
             _ => return Err("unknown wire type".to_owned()),
         };
-        found.push((key >> 3, value));
+        fields.push((key >> 3, value));
     }
-    Ok(found)
+    Ok(fields)
 }
 
 fn skip(here: &mut usize, length: usize, end: usize) -> Decoded<Range<usize>> {

@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use crate::params::Params;
 
-/// How fast one array learns.
+/// Rate at which one array learns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Rate {
     /// Step size at the height of the ramp.
@@ -23,7 +23,7 @@ pub struct Ramp {
     pub warm_up: usize,
     /// All steps.
     pub steps: usize,
-    /// What is left at the end.
+    /// Share of the rates that is left at the end.
     pub rest: f32,
 }
 
@@ -104,7 +104,7 @@ pub struct Average {
     pub(crate) values: Params,
 }
 
-/// How much of the mean is kept at most.
+/// Largest share of the mean that a step keeps.
 const KEPT: f32 = 0.95;
 
 impl Average {

@@ -10,9 +10,9 @@ pub struct Pair {
     pub picture: Vec<f32>,
     /// The imprint as the decoder draws it (its turn included), `side` × `side`, 0..1 over [`crate::Start::unit_m`].
     pub imprint: Vec<f32>,
-    /// Which pad was touched; `None` for a simulated pair, whose imprint lies where the bundle expects it.
+    /// Pad that was touched; `None` for a simulated pair, whose imprint lies where the bundle expects it.
     pub frame: Option<usize>,
-    /// How much it counts; 1 for an ordinary pair.
+    /// Weight in the loss; 1 for an ordinary pair.
     pub weight: f32,
 }
 

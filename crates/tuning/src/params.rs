@@ -16,11 +16,11 @@ pub struct Params {
 /// A named array.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Its name.
+    /// Name of the array.
     pub name: String,
-    /// Its shape, slowest axis first.
+    /// Shape, slowest axis first.
     pub shape: Vec<usize>,
-    /// Its values.
+    /// Values, as many as the shape has places.
     pub values: Arc<Vec<f32>>,
 }
 
@@ -52,12 +52,12 @@ impl Params {
         self.entries.iter_mut().map(|entry| &mut entry.values)
     }
 
-    /// How many arrays there are.
+    /// Number of arrays.
     pub fn len(&self) -> usize {
         self.entries.len()
     }
 
-    /// Whether there is none.
+    /// True without an array.
     pub fn is_empty(&self) -> bool {
         self.entries.is_empty()
     }
@@ -90,7 +90,7 @@ impl Leaves<'_> {
         self.tensors[*place.unwrap_or_else(|| panic!("no weight is called \"{name}\""))].clone()
     }
 
-    /// Whether there is a weight of this name.
+    /// True where there is a weight of this name.
     pub fn has(&self, name: &str) -> bool {
         self.params.places.contains_key(name)
     }

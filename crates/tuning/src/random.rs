@@ -12,14 +12,14 @@ pub(crate) struct Random {
     spare: Option<f64>,
 }
 
-/// What a stream is for; streams of different purposes have nothing to do with each other.
+/// Purpose of a stream; streams of different purposes have nothing to do with each other.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// Decisions about a whole batch.
     Batch = 1,
     /// The order of the pairs.
     Order = 2,
-    /// How a pair is varied.
+    /// Variation of a pair.
     Variation = 3,
     /// Noise that sampling begins with.
     Noise = 4,
@@ -50,7 +50,7 @@ impl Random {
         2.0 * self.uniform() - 1.0
     }
 
-    /// Whether something of this probability happens.
+    /// True with this probability.
     pub(crate) fn happens(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }

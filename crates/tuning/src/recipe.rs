@@ -16,7 +16,7 @@ use crate::trainer::{Objective, PARTS};
 pub(crate) const LINE: &str = "line";
 /// The shift of each pad, `[pads, 2]`, pixels.
 pub(crate) const SHIFT: &str = "shift";
-/// What each pad's imprints have beside the touch, `[pads, side · side]`.
+/// Field of each pad: what its imprints have beside the touch, `[pads, side · side]`.
 pub(crate) const FIELD: &str = "field";
 
 /// The generator's objective over a set of pairs.
@@ -31,11 +31,11 @@ pub(crate) struct Recipe {
     /// Mean imprint by pad; the last is that of simulated pairs.
     means: Vec<Vec<f32>>,
     clippings: Vec<Clipping>,
-    /// How simulated pairs are varied.
+    /// Ranges in which simulated pairs are varied.
     still: Augment,
 }
 
-/// What is fixed about the generator.
+/// Constants of the generator.
 #[derive(Clone, Debug)]
 pub(crate) struct Model {
     pub(crate) sizes: Sizes,
@@ -162,7 +162,7 @@ impl Objective for Recipe {
         let (first, end) = (part * c.batch / parts, (part + 1) * c.batch / parts);
         let two = Random::new(c.seed, Purpose::Batch, step, 0).happens(c.second);
         let latent = self.model.sizes.latent();
-        let mut made = Part {
+        let mut items = Part {
             pictures: Vec::new(),
             imprints: Vec::new(),
             pads: Vec::new(),
@@ -178,19 +178,19 @@ impl Objective for Recipe {
             // Moving a simulated picture moves its markers too, by which the network tells one finger from the other.
             let augment = if pair.frame.is_none() { &self.still } else { &c.augment };
             let (picture, imprint) = augment.vary(&pair.picture, &pair.imprint, &set, random);
-            made.pictures.extend(self.model.standardized(&picture));
-            made.imprints.extend(imprint);
-            made.pads.push(pair.frame);
-            made.weights.push(pair.weight / sum);
+            items.pictures.extend(self.model.standardized(&picture));
+            items.imprints.extend(imprint);
+            items.pads.push(pair.frame);
+            items.weights.push(pair.weight / sum);
             let random = &mut Random::new(c.seed, Purpose::Noise, step, place);
             let zeros = random.happens(0.5);
             let noise = random.normals(latent);
-            made.noise.extend(if zeros { vec![0.0; latent] } else { noise });
-            if let Some(second) = &mut made.second {
+            items.noise.extend(if zeros { vec![0.0; latent] } else { noise });
+            if let Some(second) = &mut items.second {
                 second.extend(random.normals(latent));
             }
         }
-        made
+        items
     }
 
     fn loss(&self, leaves: &Leaves<'_>, part: Part) -> Tensor {

@@ -14,7 +14,7 @@ const MAGIC: &[u8; 8] = b"t2t-tune";
 const VERSION: u32 = 1;
 const DIGEST: usize = 32;
 
-/// What a run began from, as a digest: a state only goes on where it came from.
+/// Origin of a run, as a digest: a state only goes on where it came from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Origin([u8; DIGEST]);
 

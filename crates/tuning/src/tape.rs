@@ -22,7 +22,7 @@ struct Node {
     place: usize,
 }
 
-/// What was computed, in order.
+/// Tape: the backward steps of what was computed, in order.
 #[derive(Default)]
 pub(crate) struct Tape {
     steps: RefCell<Vec<Option<Backward>>>,
@@ -53,7 +53,7 @@ impl Tensor {
         Self { shape: shape.to_vec(), values, node: None }
     }
 
-    /// The same array as a leaf of a tape: its slope is kept.
+    /// Array as a leaf of a tape: its slope is kept.
     #[must_use]
     pub(crate) fn tracked(mut self, tape: &Rc<Tape>) -> Self {
         self.node = Some(Node { tape: tape.clone(), place: tape.push(None) });
@@ -68,17 +68,17 @@ impl Tensor {
         values: Vec<f32>,
         backward: impl FnOnce(Vec<f32>, [Slot; N], &mut Slopes) + 'static,
     ) -> Self {
-        let mut made = Self::new(shape, values);
+        let mut tensor = Self::new(shape, values);
         if let Some(tape) = inputs.iter().find_map(|input| input.node.as_ref()).map(|node| node.tape.clone()) {
             let slots = inputs.map(|input| Slot(input.node.as_ref().map(|node| node.place)));
             let step: Backward = Box::new(move |slope, slopes| backward(slope, slots, slopes));
             let place = tape.push(Some(step));
-            made.node = Some(Node { tape, place });
+            tensor.node = Some(Node { tape, place });
         }
-        made
+        tensor
     }
 
-    /// The same values in another shape.
+    /// Values in another shape.
     #[must_use]
     pub(crate) fn reshaped(mut self, shape: &[usize]) -> Self {
         assert_eq!(shape.iter().product::<usize>(), self.values.len(), "{:?} as {shape:?}", self.shape);
@@ -86,19 +86,19 @@ impl Tensor {
         self
     }
 
-    /// The same values, no longer followed.
+    /// Values, no longer followed.
     #[must_use]
     pub(crate) fn detached(mut self) -> Self {
         self.node = None;
         self
     }
 
-    /// Its shape, slowest axis first.
+    /// Shape, slowest axis first.
     pub fn shape(&self) -> &[usize] {
         &self.shape
     }
 
-    /// Its shape as so many numbers.
+    /// Shape as so many numbers.
     ///
     /// # Panics
     /// If it has another number of axes.
@@ -106,12 +106,12 @@ impl Tensor {
         self.shape.as_slice().try_into().unwrap_or_else(|_| panic!("{D} axes of {:?}", self.shape))
     }
 
-    /// Its values.
+    /// Values, as many as the shape has places.
     pub fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// Its values, shared.
+    /// Values, shared.
     pub(crate) fn shared(&self) -> Arc<Vec<f32>> {
         self.values.clone()
     }
@@ -123,7 +123,7 @@ impl Tensor {
     }
 }
 
-/// Where the slope along an input goes; nowhere, if the input is not followed.
+/// Place of the slope along an input; none, if the input is not followed.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Slot(Option<usize>);
 
@@ -144,7 +144,7 @@ impl Slopes {
         }
     }
 
-    /// Whether the slope along an input is wanted.
+    /// True where the slope along an input is wanted.
     pub(crate) fn wants(&self, slot: Slot) -> bool {
         slot.0.is_some()
     }

@@ -14,15 +14,15 @@ use crate::tape::{Tensor, backward};
 /// Parts of a batch. Fixed: their number decides the order of additions, and so the last bits.
 pub(crate) const PARTS: usize = 4;
 
-/// What is to be made small.
+/// Objective: the loss that is to be made small.
 pub(crate) trait Objective: Sync {
     /// A part of a batch, ready to be run.
     type Part: Send;
 
-    /// How fast an array learns; `None` for one that stays as it is.
+    /// Rate at which an array learns; `None` for one that stays as it is.
     fn rate(&self, name: &str) -> Option<Rate>;
 
-    /// How many parts the batch of a step has.
+    /// Number of parts of the batch of a step.
     fn parts(&self, step: usize) -> usize;
 
     /// A part of the batch of a step, counted from 0. Depends on nothing but its arguments.
@@ -51,7 +51,7 @@ pub trait Descent {
     fn to_bytes(&self) -> Vec<u8>;
 }
 
-/// What a step did.
+/// Report of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Steps done, this one included.
@@ -60,11 +60,11 @@ pub struct StepReport {
     pub loss: f32,
     /// The length of its gradient.
     pub gradient: f32,
-    /// How long it took.
+    /// Duration of the step, seconds.
     pub seconds: f64,
 }
 
-/// How the descent is run.
+/// Plan of the descent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plan {
     /// Rates over time, and the number of steps.
@@ -100,7 +100,7 @@ impl<O: Objective> Trainer<O> {
         Self { objective, plan, rates, params: start.clone(), start, average, optimizer, step: 0, workers }
     }
 
-    /// What is made small.
+    /// Objective that is made small.
     pub(crate) fn objective(&self) -> &O {
         &self.objective
     }

@@ -24,7 +24,7 @@ pub struct Start {
     pub decoder: Vec<u8>,
     /// The noise that the denoiser was trained on.
     pub schedule: NoiseSchedule,
-    /// How the studio samples with this bundle; used for predictions, not for tuning.
+    /// Sampler of the studio with this bundle; used for predictions, not for tuning.
     pub sampler: Sampler,
     /// Mean of the input by color.
     pub mean: [f32; 3],
@@ -49,7 +49,7 @@ pub struct NoiseSchedule {
     pub beta_end: f64,
 }
 
-/// How latents are drawn, by DDIM with trailing spacing.
+/// Sampler of latents: DDIM with trailing spacing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sampler {
     /// Denoising steps.
@@ -129,8 +129,8 @@ impl Tuner {
         }
     }
 
-    /// What the generator draws now (running mean of the weights), in units, for validation; as many pictures at a time
-    /// as there are threads.
+    /// Predictions of the generator as it is now (running mean of the weights), in units, for validation; as many
+    /// pictures at a time as there are threads.
     ///
     /// # Errors
     /// [`Error::Pair`] with the place of a picture that has another size or values that are not numbers, or is of an

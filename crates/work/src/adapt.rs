@@ -56,7 +56,7 @@ const MOST_TOUCHES: usize = 1500;
 /// Hex digits of a picture's digest that are kept: enough to tell any two apart.
 const DIGITS: usize = 16;
 
-/// What is fitted, to what, and how it is tried.
+/// Request for a fit: the generator, the pairs, the trial, and the tuning.
 #[derive(Clone, Debug)]
 pub struct AdaptSetup {
     /// The generator, which stays as it is, with how it generates; and how contact and pose are found where the data have
@@ -66,10 +66,10 @@ pub struct AdaptSetup {
     pub pairs: Vec<PairId>,
     /// In how many parts the pairs are left out in turn; whole tools where three are known. 0 tries nothing.
     pub folds: usize,
-    /// Whether and how long the networks themselves are tuned after the closed form: once for each part that is left out,
-    /// and once for all.
+    /// Tuning of the networks themselves after the closed form: once for each part that is left out, and once for all;
+    /// `None` tunes nothing.
     pub tuning: Option<Tuning>,
-    /// Where a run of tuning that is stopped is kept, to go on from there when the same is asked for again.
+    /// Folder in which a run of tuning that is stopped is kept, to go on from there when the same is asked for again.
     pub unfinished: Option<PathBuf>,
     /// The folder of the new bundle; `None` only tries.
     pub out: Option<PathBuf>,
@@ -207,7 +207,7 @@ fn shown(touch: &FitTouch, after: &DepthMap) -> HeldBack {
     }
 }
 
-/// What to be careful about.
+/// Warnings about the fit, in words.
 fn warnings(
     setup: &AdaptSetup,
     pairs: usize,
@@ -257,7 +257,7 @@ fn warnings(
 struct Tuned {
     graphs: BTreeMap<Role, Vec<u8>>,
     corrections: Vec<Option<Correction>>,
-    /// What networks that were tuned without it make of each touch, meters, on the decoder's grid.
+    /// Prediction of each touch by networks that were tuned without it, meters, on the decoder's grid.
     left_out: Vec<Option<DepthMap>>,
     steps: u32,
     curves: Vec<Curve>,

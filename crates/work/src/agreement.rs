@@ -1,4 +1,4 @@
-//! How far the masks of two people agree: [`compare_labels`].
+//! Agreement between the masks of two people: [`compare_labels`].
 
 use serde::Serialize;
 
@@ -18,7 +18,7 @@ pub struct Compared {
     pub tool: Option<String>,
     /// The finger.
     pub finger: String,
-    /// How far they agree.
+    /// Agreement of the two masks.
     #[serde(flatten)]
     pub agreement: Agreement,
 }

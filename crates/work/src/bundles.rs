@@ -6,6 +6,7 @@ use std::sync::Arc;
 use super::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
+use crate::io::model_id::current;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::fit::FitSource;
@@ -15,17 +16,17 @@ use touch2touch_core::sample::Sample;
 /// A model bundle that was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BundleInfo {
-    /// Its identity: the digest of its manifest and files.
+    /// Identity: the digest of what decides its results ([`Bundle::hash`]).
     pub id: Arc<str>,
     /// The name on screen.
     pub name: String,
-    /// What it does.
+    /// Kind of the bundle.
     pub kind: BundleKind,
-    /// Where it lies.
+    /// Origin: a folder, or the program.
     pub origin: Origin,
-    /// What can be chosen, if it is a generator.
+    /// Choices that a generator offers; `None` for another kind.
     pub generator: Option<GeneratorInfo>,
-    /// Whether the program trained it, on masks that people corrected.
+    /// True where the program trained it, on masks that people corrected.
     pub trained: bool,
 }
 
@@ -35,11 +36,11 @@ pub(super) const TRAINED: &str = "trained";
 /// The choices that a generator's bundle leaves.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneratorInfo {
-    /// What it recommends.
+    /// Settings that the bundle recommends.
     pub defaults: GenerateConfig,
     /// The steps of its training: no more can be taken.
     pub training_steps: usize,
-    /// Whether it was trained for guidance.
+    /// True where it was trained for guidance.
     pub guided: bool,
     /// The sensors between which it predicts.
     pub sensors: SensorPair,
@@ -47,10 +48,10 @@ pub struct GeneratorInfo {
     pub fit: Option<FitSource>,
 }
 
-/// What a bundle does.
+/// Kind of a bundle, by its task.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum BundleKind {
-    /// What one sensor felt to what another would have felt.
+    /// Touch of one sensor to the touch that another would have felt.
     Generator,
     /// Imprint to contact mask.
     Mask,
@@ -70,7 +71,7 @@ impl BundleKind {
 }
 
 impl BundleInfo {
-    /// What is known of an opened bundle.
+    /// Description of an opened bundle.
     pub fn of(bundle: &Bundle) -> Self {
         Self {
             id: bundle.hash().into(),
@@ -86,13 +87,16 @@ impl BundleInfo {
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
-                fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
+                fit: spec.fit.as_ref().map(|fit| {
+                    let from_sha256 = current(&fit.source.from_sha256);
+                    FitSource { from_sha256, ..fit.source.clone() }
+                }),
             }),
             trained: bundle.provenance().get(TRAINED).is_some(),
         }
     }
 
-    /// Where the bundle, if it is a generator, starts and ends in `rig`; `None` for another kind of bundle.
+    /// Sensors of `rig` at which the bundle starts and ends, if it is a generator; `None` for another kind of bundle.
     ///
     /// # Errors
     /// [`Misfit`].
@@ -112,18 +116,18 @@ impl BundleInfo {
         Err(TaskError::new(what, why))
     }
 
-    /// Whether it was fitted to a rig.
+    /// True where it was fitted to a rig.
     pub fn is_fitted(&self) -> bool {
         self.fit().is_some()
     }
 
-    /// Whether it was made with the program from another one, for one's own data: then it is used where it is named or
-    /// chosen.
+    /// True where it was made with the program from another one, for one's own data: then it is used where it is named
+    /// or chosen.
     pub fn is_own(&self) -> bool {
         self.is_fitted() || self.trained
     }
 
-    /// What it was fitted to, where it was.
+    /// Source of the fit, where it was fitted.
     pub fn fit(&self) -> Option<&FitSource> {
         self.generator.as_ref()?.fit.as_ref()
     }
@@ -133,7 +137,7 @@ impl BundleInfo {
         self.fit()?.misgiving(sample)
     }
 
-    /// Whether it can be used with the sensors of `rig`.
+    /// True where it can be used with the sensors of `rig`.
     pub fn fits(&self, rig: &Rig) -> bool {
         self.ends(rig).is_none_or(|ends| ends.is_ok())
     }
@@ -166,10 +170,16 @@ impl BundleInfo {
 /// The bundles that are there, and what is wrong with those that were refused.
 #[derive(Clone, Debug, Default)]
 pub struct FoundBundles {
-    /// Those that can be used, in the order in which they are taken.
+    /// Usable bundles, in the order in which they are taken.
     pub bundles: Vec<BundleInfo>,
-    /// What is wrong with the others.
+    /// Faults of the others.
     pub problems: Vec<Problem>,
+}
+
+/// The bundle that a stored identity names, also as builds before this one wrote it.
+pub fn by_id<'a>(bundles: &'a [BundleInfo], id: &str) -> Option<&'a BundleInfo> {
+    let id = current(id);
+    bundles.iter().find(|bundle| *bundle.id == *id)
 }
 
 /// All bundles there are: those of the user, those in the program, and those in `folders`.

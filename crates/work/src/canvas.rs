@@ -16,7 +16,7 @@ pub(crate) const FAMILY: &str = "sans-serif";
 /// Pixels of the drawing per pixel of the PNG along one side: their mean smooths edges, which the backend does not.
 const FINE: usize = 2;
 
-/// What can be drawn, with the error of the backend that it is drawn on.
+/// Result of drawing, with the error of the backend that it is drawn on.
 pub type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;
 
 /// Something to be drawn.
@@ -43,7 +43,7 @@ pub trait Drawing {
 pub struct Raster {
     /// Left, top, width and height, units.
     pub place: [f64; 4],
-    /// Its pixels, sRGB.
+    /// Pixels, sRGB.
     pub pixels: Grid<[u8; 3]>,
 }
 
@@ -65,7 +65,7 @@ impl<B: DrawingBackend> Paper<'_, B> {
         (units * self.scale).round() as i32
     }
 
-    /// The same for a width, of which something stays.
+    /// Pixels of a width in units, at least one, so that something of it stays.
     pub fn wide(&self, units: f64) -> u32 {
         self.px(units).max(1).unsigned_abs()
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
-use super::bundles::{self, BundleInfo, FoundBundles};
+use super::bundles::{self, BundleInfo, FoundBundles, by_id};
 use super::error::TaskError;
 use super::feel::{Touch, feel};
 use super::job::JobCx;
@@ -65,10 +65,10 @@ struct CaseLabels {
     note: String,
 }
 
-/// What an imprint led to.
+/// Results from one imprint of the case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CaseResult {
-    /// Which imprint.
+    /// Imprint: measured or predicted.
     pub imprint: ImprintSource,
     /// By finger, the hash of the imprint (meters, 32-bit floats) and of its contact mask.
     pub fingers: BTreeMap<String, [String; 2]>,
@@ -93,7 +93,7 @@ pub struct Case {
     pub built_in: Option<String>,
     /// The pair.
     pub pair: String,
-    /// How the results are made.
+    /// Recipe of the results.
     pub recipe: Recipe<ModelName>,
     labels: CaseLabels,
     /// Hashes of the files in it.
@@ -103,7 +103,7 @@ pub struct Case {
     beside: BTreeMap<String, String>,
     /// The results.
     pub results: Vec<CaseResult>,
-    /// How the studio showed it: preferences and camera, as it keeps them.
+    /// View in the studio: preferences and camera, as it keeps them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub view: Option<serde_json::Value>,
 }
@@ -111,19 +111,19 @@ pub struct Case {
 /// A case that is unpacked and opened.
 #[derive(Debug)]
 pub struct OpenedCase {
-    /// Its manifest.
+    /// Manifest of the case.
     pub case: Case,
     /// The data.
     pub dataset: Dataset,
     /// The pair.
     pub pair: PairId,
-    /// What a person said about it.
+    /// Labels that a person gave the pair.
     pub labels: PairLabels,
-    /// What it brings besides.
+    /// Imprints and models that the case brings besides.
     pub held: Held,
 }
 
-/// What a case brings besides the data.
+/// Content of a case besides the data.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Held {
     /// The imprints that its results were had from, meters.
@@ -132,16 +132,16 @@ pub struct Held {
     pub models: Option<PathBuf>,
 }
 
-/// What differs between a case and what this program makes of it.
+/// Differences between a case and the results of this program.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct CaseReport {
     /// The pair.
     pub pair: String,
-    /// Whether everything is the same, bit for bit.
+    /// True where everything is the same, bit for bit.
     pub same: bool,
     /// Things compared.
     pub compared: usize,
-    /// What differs, in words, with by how much where that is known.
+    /// Differences in words, with by how much where that is known.
     pub differences: Vec<String>,
 }
 
@@ -260,16 +260,16 @@ fn tool_of(dataset: &Dataset, pair: PairId) -> Result<ToolModel, TaskError> {
     load_tool(dataset, name).map(|(tool, _)| tool)
 }
 
-/// What goes into a case, besides the data.
+/// Content of a case to be written, besides the data.
 #[derive(Clone, Debug)]
 pub struct CaseSetup {
     /// The pair.
     pub pair: PairId,
-    /// What decides its results.
+    /// Recipe that decides its results.
     pub recipe: Recipe,
-    /// What a person said about the pair.
+    /// Labels that a person gave the pair.
     pub labels: PairLabels,
-    /// How the studio shows it.
+    /// View in the studio.
     pub view: Option<serde_json::Value>,
 }
 
@@ -442,9 +442,7 @@ impl OpenedCase {
 pub fn check(opened: &OpenedCase, found: &FoundBundles, models: &Models, cx: &JobCx) -> Result<CaseReport, TaskError> {
     let OpenedCase { case, dataset, pair, labels, .. } = opened;
     let sample = dataset.load(*pair).map_err(|err| TaskError::from_error(WHAT, &err).with_hint(err.hint()))?;
-    let here = |named: ModelName| -> Option<Model> {
-        found.bundles.iter().find(|bundle| *bundle.id == *named.id).cloned().map(Model::from)
-    };
+    let here = |named: ModelName| -> Option<Model> { by_id(&found.bundles, &named.id).cloned().map(Model::from) };
     let lacking = || {
         let (generator, mask_model) = (case.recipe.generator.iter().map(|(model, _)| model), &case.recipe.mask_model);
         let named = generator.chain(mask_model).find(|named| here((*named).clone()).is_none());

@@ -25,7 +25,7 @@ pub struct FingerCloud {
     pub points: Vec<DVec3>,
     /// The raw bubble pixel `(x, y)` of each point.
     pub pixels: Vec<[u16; 2]>,
-    /// Whether each point is a contact point.
+    /// True for each point that is a contact point.
     pub contact: Vec<bool>,
 }
 
@@ -117,8 +117,8 @@ pub fn contact_points(
     if any { Ok(points) } else { Err(TaskError::new(WHAT, why)) }
 }
 
-/// Where the pixels of a finger's imprint lie in a 3D picture that its mask is drawn on: those that are reached. Points of
-/// the other fingers can hide them.
+/// Pixels of a finger's imprint that are visible in a 3D picture that its mask is drawn on, with their places in it.
+/// Points of the other fingers can hide them.
 ///
 /// # Errors
 /// If the finger has no imprint or no camera, or as [`finger_cloud`].

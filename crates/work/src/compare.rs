@@ -30,9 +30,9 @@ pub struct Comparison {
     pub mae_m: f64,
     /// With an assumed scale, the metrics of the pictures as they are, beside those of the stretched ones.
     pub unstretched: Option<Unstretched>,
-    /// Whether PSNR and SSIM are of meters, or (assumed scale) of images stretched to 0..1 each.
+    /// Scale that PSNR and SSIM are of: meters, or (assumed scale) images stretched to 0..1 each.
     pub scale: Scale,
-    /// The same figures inside and outside the GelSlim's footprint, errors in meters; `None` where nobody asked.
+    /// Figures inside and outside the GelSlim's footprint, errors in meters; `None` where nobody asked.
     pub split: Option<Split>,
 }
 
@@ -157,8 +157,8 @@ pub fn tiles(predicted: &DepthMap, tile: &DepthMap, sample: &Sample, pad: PadId)
 pub struct Depicted<'a> {
     /// Meters, raw orientation.
     pub imprint: &'a DepthMap,
-    /// The same as its file or its decoder has it, on the grid of the pair's picture ([`tile_of`]); `None` where imprints
-    /// were measured.
+    /// Imprint as its file or its decoder has it, on the grid of the pair's picture ([`tile_of`]); `None` where
+    /// imprints were measured.
     pub tile: Option<Cow<'a, DepthMap>>,
 }
 

@@ -1,4 +1,5 @@
-//! How far the contact points lie from the registered model: [`deviation`]; and one cloud from another: [`apart`].
+//! Distances of the contact points from the registered model: [`deviation`]; and of one cloud from another:
+//! [`cloud_difference`].
 
 use super::cloud::Clouds;
 use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
@@ -29,7 +30,7 @@ impl Deviation {
     }
 }
 
-/// How far the points of a cloud lie from another of the same cameras.
+/// Distances of the points of a cloud from another of the same cameras.
 #[derive(Clone, Debug)]
 pub struct CloudDifference {
     /// Of each point, in the order of the first cloud, meters: positive where its imprint is the deeper one; NaN of a

@@ -1,4 +1,4 @@
-//! What seems wrong with a data set that looks right: [`examine_reading`].
+//! Doubts about a data set that looks right: [`examine_reading`].
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -26,8 +26,8 @@ const MOST_TOOLS: usize = 32;
 /// A generator with the models that run it.
 pub type Generator<'a> = (&'a Models, Generating<'a>);
 
-/// What seems wrong with a data set, from about `pairs` of its pairs, spread over the tools. With a generator, predictions
-/// are compared with what was measured, which takes seconds; without one it is a fraction of a second.
+/// Doubts about a data set, from about `pairs` of its pairs, spread over the tools. With a generator, predictions are
+/// compared with what was measured, which takes seconds; without one it is a fraction of a second.
 ///
 /// Pairs and CAD models that cannot be read are left out: what is wrong with those is said by whoever reads them.
 pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Generator<'_>>, cx: &JobCx) -> Vec<Doubt> {
@@ -50,7 +50,8 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
     }
 }
 
-/// How the data set is to be read where some doubts are true, as `--read-as` takes it; `None` where no reading helps.
+/// Reading of the data set that removes the doubts if they are true, as `--read-as` takes it; `None` where no reading
+/// helps.
 pub fn remedy(dataset: &Dataset, doubts: &[Doubt]) -> Option<String> {
     let mut readings = doubts.iter().filter_map(Doubt::read_as).peekable();
     readings.peek()?;
@@ -78,7 +79,7 @@ pub fn problems(dataset: &Dataset, doubts: &[Doubt]) -> Vec<Problem> {
     doubts.iter().map(of).collect()
 }
 
-/// What seems wrong with a data set, for the notes of whoever answers from it: cheaply, without predictions.
+/// Doubts about a data set, for the notes of whoever answers from it: cheaply, without predictions.
 pub fn notes(dataset: &Dataset) -> Vec<Problem> {
     problems(dataset, &examine_reading(dataset, PAIRS, None, &JobCx::unwatched()))
 }

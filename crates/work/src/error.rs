@@ -7,16 +7,16 @@ use serde::Serialize;
 
 use crate::io::dataset::ToolUnit;
 
-/// What failed, why, and what to do about it. Shown once, in the log.
+/// Failure of a task: its name, the reason, and what to do about it. Shown once, in the log.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TaskError {
-    /// What was being done, e.g. `Load pattern_31_rod/data_4`.
+    /// Task that failed, e.g. `Load pattern_31_rod/data_4`.
     pub what: String,
     /// Why it did not work, with the file at the end where there is one.
     pub why: String,
-    /// What to do about it, where that is known.
+    /// Advice for the user, where there is one.
     pub hint: Option<String>,
-    /// How it ended.
+    /// Kind of end.
     pub kind: TaskErrorKind,
     /// Units in which the CAD model that it is about would fit.
     pub units: Option<Arc<UnitOffer>>,
@@ -29,7 +29,7 @@ pub struct UnitOffer {
     pub tool: String,
     /// The units, each with how long the tool then is: `64.35 mm`.
     pub units: Vec<(ToolUnit, String)>,
-    /// What `unit.txt` beside the file says, if it is there.
+    /// Content of `unit.txt` beside the file, if it is there.
     pub says: Option<String>,
 }
 
@@ -38,11 +38,11 @@ pub struct UnitOffer {
 pub struct Remark {
     /// The pair.
     pub name: String,
-    /// What is the matter.
+    /// Reason, in words.
     pub why: String,
 }
 
-/// How a task ended without a result.
+/// Kind of a task's end without a result.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TaskErrorKind {
     /// It met something wrong in its input or surroundings.
@@ -89,7 +89,7 @@ impl TaskError {
         self
     }
 
-    /// Whether it was told to stop.
+    /// True where the task was told to stop.
     pub fn is_cancelled(&self) -> bool {
         self.kind == TaskErrorKind::Cancelled
     }

@@ -18,53 +18,41 @@ use serde::Serialize;
 use crate::doubts;
 use crate::error::TaskError;
 use crate::infer::bundle::Origin;
-use crate::infer::engine::{EngineChoice, threads};
+use crate::infer::engine::threads;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::mask::MaskChoice;
 use crate::models;
+use crate::recipe::Recipe;
 use kept::KeptScores;
 use methods::Models;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Group, Row, Scores};
 use touch2touch_core::findings::{Finding, Findings};
-use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 pub use export::{Report, export, rows};
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Evaluate";
 
-/// What to evaluate, and how.
+/// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Setup {
     /// Generator bundles: a row each.
     pub bundles: Vec<Origin>,
-    /// The mask model; without it there are no angles by [`MaskSource::Unet`](super::mask::MaskSource).
-    pub mask_bundle: Option<Origin>,
     /// The tool classifier; without it neither accuracy nor Fréchet distance.
     pub classifier: Option<Origin>,
-    /// Where the contact masks come from that nobody drew, for every method alike.
-    pub mask: MaskChoice,
-    /// Whether a mask drawn by hand is taken where there is one, for every method alike.
-    pub hand: bool,
-    /// The registration.
-    pub engine: RegistrationChoice,
-    /// How decoder outputs become meters.
-    pub shift: ShiftMode,
+    /// What every method has in common: all but the generator and the imprint, which are the method's.
+    #[serde(flatten)]
+    pub recipe: Recipe,
     /// Sampling steps instead of each bundle's own; not for bundles that draw in one step.
     pub steps: Option<u32>,
     /// Seed instead of each bundle's own; every image starts from the same one.
     pub seed: Option<u64>,
     /// Sampler instead of each bundle's own.
     pub sampler: Option<Sampler>,
-    /// The engine that runs the models.
-    #[serde(skip)]
-    pub runtime: EngineChoice,
     /// At most so many grasps of each tool, spread evenly.
     pub grasps_per_tool: Option<usize>,
     /// The only finger whose images are compared, or all. Poses always come from all.
@@ -79,16 +67,11 @@ impl Default for Setup {
     fn default() -> Self {
         Self {
             bundles: Vec::new(),
-            mask_bundle: None,
             classifier: None,
-            mask: MaskChoice::default(),
-            hand: true,
-            engine: RegistrationChoice::default(),
-            shift: ShiftMode::default(),
+            recipe: Recipe::default(),
             steps: None,
             seed: None,
             sampler: None,
-            runtime: EngineChoice::default(),
             grasps_per_tool: None,
             finger: None,
             batch: 8,
@@ -117,17 +100,17 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
     /// The column groups.
     pub groups: Vec<Group>,
-    /// What PSNR and SSIM mean.
+    /// Meaning of PSNR and SSIM.
     pub conventions: &'static str,
-    /// What the columns mean, and what is missing and why.
+    /// Meaning of the columns, and reasons for what is missing.
     pub notes: Vec<String>,
-    /// What is odd about the files, by kind.
+    /// Oddities of the files, by kind.
     pub findings: Vec<Finding>,
-    /// What was left out.
+    /// Grasps and tools that were left out, and why.
     pub skipped: Vec<Skipped>,
-    /// Whether everything asked for was scored: false if stopped early.
+    /// True where everything asked for was scored; false if stopped early.
     pub complete: bool,
-    /// How.
+    /// Settings of the evaluation.
     pub setup: Setup,
     /// The engine of the models and its threads.
     pub runtime: String,
@@ -167,7 +150,7 @@ pub fn evaluate(
     let todo: Vec<ToolWork> = work.iter().map(missing).collect();
     let fresh: usize = todo.iter().map(|tool| tool.ids.len()).sum();
     if fresh > 0 {
-        models.load(setup)?;
+        models.load()?;
     }
     let mut skipped = Vec::new();
     let mut scores = models.empty_scores();

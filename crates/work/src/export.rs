@@ -18,15 +18,15 @@ use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::units::counted;
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Export masks";
 
 /// The masks drawn by hand on measured imprints: those on the disk, and over them what was changed since.
 #[derive(Clone, Copy, Debug)]
 pub struct DrawnMasks<'a> {
-    /// What is stored.
+    /// Labels as they are stored.
     pub labels: &'a Labels,
-    /// What is newer, by pair name.
+    /// Labels that are newer, by pair name.
     pub changed: &'a BTreeMap<String, PairLabels>,
 }
 
@@ -46,7 +46,7 @@ impl DrawnMasks<'_> {
         all
     }
 
-    /// What a person said about a pair.
+    /// Labels of a pair, the newer ones where there are any.
     pub(super) fn of_pair(&self, pair: &str) -> Result<PairLabels, TaskError> {
         self.changed.get(pair).map_or_else(|| self.labels.load(pair), |labels| Ok(labels.clone()))
     }
@@ -64,14 +64,14 @@ impl DrawnMasks<'_> {
     }
 }
 
-/// Which pairs go along, by their review state. Those marked *skip* or *flagged* never do.
+/// Pairs that go along, by their review state. Pairs marked *skip* or *flagged* never do.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum Which {
     /// Pairs marked *done* that have a mask drawn by hand.
     #[default]
     Done,
-    /// Those, and pairs whose mask was begun.
+    /// Pairs as above, and pairs whose mask was begun.
     Begun,
     /// All pairs; the masks that nobody drew are made (`--mask`).
     All,
@@ -84,16 +84,17 @@ impl Which {
     }
 }
 
-/// What a person chooses about an export.
+/// Choices that a person has for an export.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ExportChoice {
-    /// Which pairs.
+    /// Pairs, by review state.
     pub which: Which,
-    /// Whether pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they go to test.
+    /// True where pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they go to
+    /// test.
     pub test_in_train: bool,
-    /// Whether all pairs of a tool go to the same part.
+    /// True where all pairs of a tool go to the same part.
     pub by_tool: bool,
-    /// Whether only pixels that a person painted count; all others are ignored.
+    /// True where only pixels that a person painted count; all others are ignored.
     pub manual_checked: bool,
     /// Decides which pair lands in which part.
     pub seed: u64,
@@ -101,12 +102,12 @@ pub struct ExportChoice {
     pub format: Format,
 }
 
-/// What is exported.
+/// Pairs and choices of an export.
 #[derive(Clone, Debug, Default)]
 pub struct ExportSetup {
     /// Only these pairs; `None` takes all.
     pub pairs: Option<Vec<PairId>>,
-    /// Which of them, and how they are divided.
+    /// Choice among them, and their division.
     pub choice: ExportChoice,
 }
 
@@ -114,7 +115,7 @@ pub struct ExportSetup {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum LeftOut {
-    /// Its mask was begun and is not marked *done*.
+    /// The mask was begun and is not marked *done*.
     NotDone,
     /// It is marked *done* and no mask was drawn.
     NotDrawn,
@@ -136,7 +137,7 @@ impl LeftOut {
     }
 }
 
-/// What goes where, before anything is written.
+/// Division of an export, before anything is written.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plan {
     /// Masks in train, val and test.
@@ -158,7 +159,7 @@ impl Plan {
         self.counts.iter().sum()
     }
 
-    /// What goes where and what does not, a line each.
+    /// Counts that go to each part, and reasons for those that do not, a line each.
     pub fn lines(&self) -> Vec<String> {
         let [train, val, test] = self.counts;
         let by_hand =
@@ -187,7 +188,7 @@ fn split_of(dataset: &Dataset, choice: ExportChoice) -> ExportConfig {
     }
 }
 
-/// Which masks go to which part. Reads the review states and the names of the masks, no pixels.
+/// Division of the masks among the parts. Reads the review states and the names of the masks, no pixels.
 ///
 /// # Errors
 /// If the masks cannot be divided.

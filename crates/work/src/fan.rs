@@ -14,7 +14,6 @@ use super::models::Models;
 use super::prediction::Prediction;
 use super::recipe::{Recipe, Stage};
 use touch2touch_core::contact::MaskBasis;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::ensemble::{AngleFan, seeds};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
@@ -65,8 +64,8 @@ pub struct Fan {
     pub of_mean_rad: Option<f64>,
     /// The angles around their mean; `None` where there are none.
     pub fan: Option<AngleFan>,
-    /// How many of the masks (one per seed and one of the mean imprint) are not of the source that was asked, by finger and
-    /// what they are of instead.
+    /// Number of masks (one per seed and one of the mean imprint) that are not of the source that was asked, by finger
+    /// and what they are of instead.
     pub otherwise: BTreeMap<String, usize>,
 }
 
@@ -96,10 +95,8 @@ pub fn fan(touch: Touch<'_>, recipe: &Recipe, count: usize, models: &Models, cx:
     let seeds = seeds(generating.config.seed, count);
     let mut angles_rad = Vec::new();
     for (at, &seed) in seeds.iter().enumerate() {
-        let with_seed = |(model, config)| (model, GenerateConfig { seed, ..config });
-        let recipe = Recipe { generator: recipe.generator.clone().map(with_seed), ..recipe.clone() };
         let made = fingers.as_ref().map(|finger| Some((*finger?.predictions[at]).clone()));
-        angles_rad.push(angle(Felt::of_predictions(&recipe, made))?);
+        angles_rad.push(angle(Felt::of_predictions(&recipe.with_seed(seed), made))?);
     }
     let means = fingers.as_ref().map(|finger| Some(finger?.ensemble.spread.mean.clone()));
     let of_mean_rad = angle(Felt::of_imprints(recipe, means))?;

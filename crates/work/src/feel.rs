@@ -8,7 +8,7 @@ use strum::IntoEnumIterator as _;
 use super::error::TaskError;
 use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
-use super::labels::{ImprintOf, ImprintSource, MaskPlace, PairLabels};
+use super::labels::{ImprintOf, ImprintSource, PairLabels};
 use super::mask::{Contact, MaskInputs, contact_mask};
 use super::models::Models;
 use super::pose::{PoseResult, pose};
@@ -29,25 +29,25 @@ use touch2touch_core::sample::Sample;
 pub struct Touch<'a> {
     /// The data set.
     pub dataset: &'a Dataset,
-    /// Which pair.
+    /// Place of the pair in the data set.
     pub pair: PairId,
     /// The pair itself.
     pub sample: &'a Sample,
     /// The tool; `Err` says why there is none.
     pub tool: Result<&'a ToolModel, &'a TaskError>,
-    /// What people said about it.
+    /// Labels that people gave the pair.
     pub labels: &'a PairLabels,
 }
 
 /// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
 pub(crate) type Probability = Arc<(Grid<f32>, f32)>;
 
-/// What came of a touch by a recipe, as far as it was asked for. It is cheap to copy.
+/// Results of a touch by a recipe, as far as they were asked for. They are cheap to copy.
 #[derive(Clone, Debug, Default)]
 pub struct Felt {
     recipe: Recipe,
     reached: Option<Stage>,
-    /// What the generator drew; empty where the imprints are measured.
+    /// Predictions of the generator; empty where the imprints are measured.
     pub predictions: Arc<PerPad<Prediction>>,
     /// Meters, raw orientation.
     pub imprints: Arc<PerPad<DepthMap>>,
@@ -111,7 +111,7 @@ impl Felt {
         felt
     }
 
-    /// The same, up to a later stage.
+    /// Results of the touch up to a later stage.
     ///
     /// # Errors
     /// As [`feel`].
@@ -119,7 +119,7 @@ impl Felt {
         self.reach_asking(touch, stage, Ask::default(), models, cx)
     }
 
-    /// The same with a request to the registration, such as to record its steps.
+    /// Results up to a later stage, with a request to the registration, such as to record its steps.
     ///
     /// # Errors
     /// As [`feel`].
@@ -166,8 +166,7 @@ impl Felt {
         let Some(model) = &self.recipe.mask_model else { return };
         let of = self.recipe.imprint_of();
         for (pad, imprint) in self.imprints.entries() {
-            let place = MaskPlace { pad, of: of.clone() };
-            if self.recipe.hand && touch.labels.drawn(&place, imprint).is_some() {
+            if self.mask_inputs(touch, &of).drawn(pad, imprint).is_some() {
                 continue;
             }
             // What fails here fails again, and is said, where the mask is asked for.
@@ -194,8 +193,8 @@ impl Felt {
         pose(points, tool, registration, ask, touch.sample.grasp_from_object)
     }
 
-    /// What the mask model says of the imprint of a pad, asked once, and from which probability on that is contact by the
-    /// recipe.
+    /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on
+    /// that is contact by the recipe.
     ///
     /// # Errors
     /// If there is no mask model or no such imprint, or the model cannot be loaded or run.
@@ -214,11 +213,16 @@ impl Felt {
         Ok((found, least))
     }
 
+    /// What masks of a touch are made from; what was drawn is left out where the recipe says so.
+    fn mask_inputs<'a>(&self, touch: Touch<'a>, of: &'a ImprintOf) -> MaskInputs<'a> {
+        let labels = self.recipe.hand.then_some(touch.labels);
+        MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(of) }
+    }
+
     fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
         let made_by = self.recipe.mask_recipe()?;
-        let of: ImprintOf = self.recipe.imprint_of();
-        let labels = self.recipe.hand.then_some(touch.labels);
-        let inputs = MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(&of) };
+        let of = self.recipe.imprint_of();
+        let inputs = self.mask_inputs(touch, &of);
         let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
         for (pad, imprint) in imprints.entries() {
             let unet = |imprint: &DepthMap| {
@@ -234,7 +238,7 @@ impl Felt {
         Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
     }
 
-    /// Whether it came to a stage.
+    /// True where it came to a stage.
     pub fn has(&self, stage: Stage) -> bool {
         self.reached >= Some(stage)
     }

@@ -73,7 +73,7 @@ pub enum FigurePane {
 }
 
 impl FigurePane {
-    /// Its name on the command line and in files.
+    /// Name on the command line and in files.
     pub fn key(self) -> &'static str {
         self.into()
     }
@@ -91,7 +91,7 @@ impl FigurePane {
         }
     }
 
-    /// Whether something has to be predicted for it.
+    /// True where something has to be predicted for it.
     pub fn is_predicted(self) -> bool {
         matches!(self, Self::Predicted | Self::Error)
     }
@@ -118,7 +118,7 @@ pub enum FigureTheme {
     Dark,
 }
 
-/// How a figure looks.
+/// Look of a figure.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FigureLook {
     /// The columns, left to right.
@@ -131,7 +131,7 @@ pub struct FigureLook {
     pub error_m: f32,
     /// Ground and ink.
     pub theme: FigureTheme,
-    /// Whether the color sensor's window is drawn on imprints.
+    /// True where the color sensor's window is drawn on imprints.
     pub window: bool,
     /// Pixels per unit of a PNG, within [`SCALES`].
     pub scale: f64,
@@ -163,10 +163,10 @@ impl FigureLook {
         self.size(rows, rig).map(|n| (f64::from(n) * self.scale).round() as u32)
     }
 
-    /// Whether it can be drawn with so many rows.
+    /// Checks that it can be drawn with so many rows.
     ///
     /// # Errors
-    /// Why not, and what to do.
+    /// The reason why it cannot, and what to do.
     pub fn check(&self, rows: usize, rig: &Rig) -> Result<(), TaskError> {
         let fail = |why: String, hint: &str| Err(TaskError::new(WHAT, why).with_hint(hint));
         if rows == 0 || self.panes.is_empty() {
@@ -195,16 +195,16 @@ impl FigureLook {
     }
 }
 
-/// What a figure is of.
+/// Content of a figure.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureSetup {
     /// The pairs, top to bottom.
     pub pairs: Vec<PairId>,
     /// The fingers, each a row of its own where a pair has it.
     pub fingers: Vec<PadId>,
-    /// How predictions become meters.
+    /// Mapping of predictions to meters.
     pub shift: ShiftMode,
-    /// How it looks.
+    /// Look of the figure.
     pub look: FigureLook,
     /// The line below everything: what made the predictions.
     pub note: String,
@@ -217,7 +217,7 @@ struct Cell {
     picture: Result<Rgb8, String>,
     /// Pixels per meter.
     px_per_m: Option<f64>,
-    /// What the color sensor sees of it: center and size, pixels.
+    /// Window of the color sensor in it: center and size, pixels.
     window: Option<[f64; 4]>,
     /// A figure of it, in a corner.
     note: String,
@@ -239,7 +239,7 @@ pub struct Figure {
     sheet: FigureLayout,
     /// Rows drawn.
     pub rows: usize,
-    /// What each row is of: pair and finger.
+    /// Pair and finger of each row.
     pub of: Vec<[String; 2]>,
 }
 

@@ -22,7 +22,7 @@ impl Filter {
         Self { words, conditions }
     }
 
-    /// Whether a pair with this review state and note answers to all words; the conditions are for the caller.
+    /// True where a pair with this review state and note answers to all words; the conditions are for the caller.
     pub fn passes(&self, pair: &PairEntry, review: Review, note: &str) -> bool {
         let [name, tool, note] = [&pair.name, pair.tool.as_deref().unwrap_or(""), note].map(str::to_lowercase);
         self.words.iter().all(|word| {

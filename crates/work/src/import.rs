@@ -19,23 +19,23 @@ use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units::counted;
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Import masks";
 
-/// What is imported.
+/// Source and form of an import.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ImportSetup {
     /// A folder, of an export or of one of its parts, or a file.
     pub from: PathBuf,
-    /// Its form; `None` = the one that lies there.
+    /// Form of the masks; `None` = the one that lies there.
     pub format: Option<Format>,
-    /// Whether what was painted by hand is replaced as well, also of pairs that somebody judged.
+    /// True where masks painted by hand are replaced as well, also of pairs that somebody judged.
     pub over_drawn: bool,
     /// Who asked; else whom the system says.
     pub person: Option<String>,
 }
 
-/// What an import changes or changed. Masks are of measured imprints.
+/// Changes of an import, made or only planned. Masks are of measured imprints.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Import {
     /// From where.
@@ -58,11 +58,11 @@ pub struct Import {
     pub unmatched: Vec<Remark>,
     /// Masks that cannot be taken, and why.
     pub refused: Vec<Remark>,
-    /// Whether all that was found was looked at and belonged somewhere.
+    /// True where all that was found was looked at and belonged somewhere.
     pub complete: bool,
-    /// Whether it was told to stop early.
+    /// True where it was told to stop early.
     pub stopped: bool,
-    /// Where the labels lie; empty where there is no such place.
+    /// Folder of the labels; empty where there is none.
     pub labels: PathBuf,
 }
 
@@ -72,7 +72,7 @@ impl Import {
         self.new + self.replaced
     }
 
-    /// What changes and what does not, a line each.
+    /// Numbers of masks that change and that do not, a line each.
     pub fn lines(&self) -> Vec<String> {
         let counts = [
             (self.new, "new"),
@@ -94,14 +94,14 @@ impl Import {
         lines
     }
 
-    /// What was done, in words.
+    /// Summary in words.
     pub fn text(&self) -> String {
         let stopped = if self.stopped { "; stopped early" } else { "" };
         format!("Imported from {}: {}{stopped}", self.from.display(), self.lines().join("; "))
     }
 }
 
-/// What an import would change. Reads all that the import reads, and writes nothing.
+/// Changes that an import would make. Reads all that the import reads, and writes nothing.
 ///
 /// # Errors
 /// As [`import_masks`].
@@ -197,7 +197,7 @@ fn matched<'a>(
     out
 }
 
-/// What is the same for all pairs.
+/// Settings of an import that are the same for all pairs.
 #[derive(Clone, Copy)]
 struct ImportRun<'a> {
     dataset: &'a Dataset,

@@ -134,8 +134,8 @@ pub(crate) fn chain_of_pad(
     Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window(sample, finger)) })
 }
 
-/// Where the color sensor's window lies in the imprint of a finger: its center, shares of width and height. Picture pairs do
-/// not say of which finger they are: the middle of the windows stands for it.
+/// Center of the color sensor's window in the imprint of a finger, shares of width and height. Picture pairs do not say
+/// of which finger they are: the middle of the windows stands for it.
 pub fn window(sample: &Sample, finger: PadId) -> Option<[f64; 2]> {
     match sample.scale {
         Scale::Measured => sample.rig.window_share(finger),

@@ -2,7 +2,7 @@
 //!
 //! * [`bundle`]: a folder with a manifest and ONNX graphs, checked completely when it is opened.
 //! * [`engine`]: one small trait over two engines, rten (built in) and ONNX Runtime (used where its library is found).
-//! * [`trial`]: whether an engine takes a bundle, found out in a process of its own, before its first use.
+//! * [`sandbox`]: trial of a bundle by an engine, in a process of its own, before its first use.
 //! * [`runtime`]: what was found of that library, and how it is fetched.
 //! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
 //!   from a depth map to a contact mask or to the tool that made it.
@@ -19,6 +19,7 @@ pub mod kept_key;
 mod library;
 pub mod mask;
 mod onnx_header;
+pub(crate) mod recipe_id;
 pub mod runtime;
 pub mod sandbox;
 pub mod sheets;

@@ -1,4 +1,4 @@
-//! Which pixels a registered angle hangs on: [`influence`].
+//! Influence of each pixel on a registered angle: [`influence`].
 
 use glam::DVec2;
 use serde::Serialize;
@@ -19,16 +19,16 @@ const WHAT: &str = "Influence of the pixels";
 const MARGIN_MM: f64 = 4.0;
 /// Radius of a place, millimeters.
 const PLACE_MM: f64 = 1.0;
-/// How many places are named.
+/// Number of places that are named.
 const PLACES: usize = 10;
 
-/// What each pixel means for the registered angle.
+/// Influence of each pixel on the registered angle.
 #[derive(Clone, Debug)]
 pub struct Influence {
     /// By how much the angle (the one that the lab reports, radians) changes when the pixel changes sides: leaves the mask
     /// that it is in, or joins it from at most 4 mm beside. NaN elsewhere, and where nothing is measured.
     pub pixels: PerPad<Grid<f32>>,
-    /// Where labeling pays most, the first the most.
+    /// Places where labeling pays most, the first the most.
     pub places: Vec<Place>,
     /// Pixels to the millimeter of the imprints.
     pub px_per_mm: f64,
@@ -42,13 +42,13 @@ pub struct Place {
     pub finger: PadId,
     /// The pixel in the middle: column and row.
     pub pixel: [u16; 2],
-    /// The same from the left and the upper edge of the imprint, millimeters.
+    /// Position of that pixel from the left and the upper edge of the imprint, millimeters.
     pub at_mm: [f64; 2],
-    /// The same in the grasp frame, meters.
+    /// Position of that pixel in the grasp frame, meters.
     pub point_m: [f64; 3],
-    /// Whether they are in the mask.
+    /// True where the place's pixels are in the mask.
     pub in_mask: bool,
-    /// How many they are.
+    /// Number of pixels.
     pub pixels: usize,
     /// Change of the angle when they change sides, degrees.
     pub angle_deg: f64,
@@ -66,7 +66,7 @@ impl Influence {
     }
 }
 
-/// What each pixel of a pair's imprints means for the angle that was registered from their contact points.
+/// Influence of each pixel of a pair's imprints on the angle that was registered from their contact points.
 ///
 /// # Errors
 /// If the registration is not one on the distance field, or the points do not determine the angle.
@@ -74,12 +74,12 @@ pub fn influence(
     clouds: &Clouds,
     sample: &Sample,
     tool: &ToolModel,
-    engine: RegistrationChoice,
+    registration: RegistrationChoice,
     grasp_from_object: PlanarPose,
 ) -> Result<Influence, TaskError> {
-    let on_field = matches!(engine.by, Registration::DistanceField | Registration::Certified);
-    let kernel_m = engine.gate_m().filter(|_| on_field).ok_or_else(|| {
-        let why = format!("{} has no cost that says what its pixels are worth", engine.label());
+    let on_field = matches!(registration.by, Registration::DistanceField | Registration::Certified);
+    let kernel_m = registration.gate_m().filter(|_| on_field).ok_or_else(|| {
+        let why = format!("{} has no cost that says what its pixels are worth", registration.label());
         let hint = format!("Choose {} or {}.", Registration::DistanceField.label(), Registration::Certified.label());
         TaskError::new(WHAT, why).with_hint(hint)
     })?;
@@ -251,8 +251,8 @@ mod tests {
     fn it_says_why_there_is_none() {
         let (sample, model, masks) = grasp(0, 3, 2.0);
         let clouds = lifted(&sample, &masks);
-        let of = |engine: Registration, clouds: &Clouds| {
-            influence(clouds, &sample, &model, engine.into(), PlanarPose::default()).unwrap_err()
+        let of = |by: Registration, clouds: &Clouds| {
+            influence(clouds, &sample, &model, by.into(), PlanarPose::default()).unwrap_err()
         };
         assert!(of(Registration::Gicp, &clouds).why.contains("GICP, 6 DoF"));
         assert!(of(Registration::Gicp, &clouds).hint.unwrap().contains("distance field"));

@@ -1,4 +1,5 @@
-//! What work that takes time may do besides: see whether it should stop, say how far it is, show pictures on the way.
+//! Means of a task that takes time: to see that it should stop, to report its progress, and to show pictures on the
+//! way.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -19,7 +20,7 @@ impl Cancel {
         self.0.store(true, Ordering::Relaxed);
     }
 
-    /// Whether it was told to stop.
+    /// True where it was told to stop.
     pub fn is_cancelled(&self) -> bool {
         self.0.load(Ordering::Relaxed)
     }
@@ -28,24 +29,24 @@ impl Cancel {
 /// A curve that grows while a job runs.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Curve {
-    /// What it is of, e.g. `without part 1 of 3`.
+    /// Name of the run that it is of, e.g. `without part 1 of 3`.
     pub name: String,
-    /// What its values are, e.g. `loss` or `dB`: curves of one unit belong into one picture.
+    /// Unit of its values, e.g. `loss` or `dB`: curves of one unit belong into one picture.
     pub unit: &'static str,
     /// `[step, value]`.
     pub points: Vec<[f64; 2]>,
 }
 
-/// How far a job is.
+/// Progress of a job.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Progress {
     /// Steps done.
     pub done: u64,
     /// Steps in all; 0 = unknown.
     pub total: u64,
-    /// What is being done now, e.g. `step 12 of 20`.
+    /// Step that is being done now, e.g. `step 12 of 20`.
     pub text: String,
-    /// What it has found so far, where that is worth watching.
+    /// Curves so far, where they are worth watching.
     pub curves: Arc<[Curve]>,
 }
 
@@ -72,7 +73,7 @@ pub struct PreviewPicture {
 
 /// Receives pictures on the way of the items of one call, by their position in it.
 pub trait Previews: Send + Sync {
-    /// How a picture of an item after `step` steps would become meters; `None` if nobody would look at it. Nothing is
+    /// Mapping to meters of a picture of an item after `step` steps; `None` if nobody would look at it. Nothing is
     /// computed then.
     fn wants(&self, item: usize, step: u32) -> Option<ShiftMode>;
 
@@ -100,7 +101,7 @@ impl JobCx {
         Self::new(Cancel::default(), Arc::new(|_| {}))
     }
 
-    /// The same with pictures on the way, where somebody looks.
+    /// Context that shows pictures on the way, where somebody looks.
     #[must_use]
     pub fn with_previews(self, previews: Arc<dyn Previews>) -> Self {
         Self { previews: Some(previews), ..self }

@@ -1,4 +1,4 @@
-//! How far the labeling of a data set is, and what it took: [`label_stats`].
+//! Progress of the labeling of a data set, and the work that it took: [`label_stats`].
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use crate::io::dataset::Dataset;
 use touch2touch_core::dataset::Index;
 use touch2touch_core::label::Provenance;
 
-/// How many pairs are in each review state.
+/// Number of pairs in each review state.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Counts(BTreeMap<&'static str, usize>);
 
@@ -32,16 +32,16 @@ impl Counts {
     }
 }
 
-/// How far the pairs of one tool are.
+/// Progress of the pairs of one tool.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ToolProgress {
     /// The tool; `None` for pairs without one.
     pub tool: Option<String>,
-    /// Its pairs.
+    /// Number of its pairs in each review state.
     pub pairs: Counts,
 }
 
-/// How far the pairs of each tool are, by the tools' names.
+/// Progress of the pairs of each tool, by the tools' names.
 pub fn progress(index: &Index, reviews: &BTreeMap<String, Review>) -> Vec<ToolProgress> {
     let mut tools: BTreeMap<Option<&String>, Counts> = BTreeMap::new();
     for entry in &index.pairs {
@@ -56,7 +56,7 @@ pub fn progress(index: &Index, reviews: &BTreeMap<String, Review>) -> Vec<ToolPr
 pub struct PairWork {
     /// The pair's name.
     pub pair: String,
-    /// Its tool.
+    /// Tool of the pair.
     pub tool: Option<String>,
     /// Who did the last of it.
     pub person: String,
@@ -66,17 +66,17 @@ pub struct PairWork {
     pub masks: usize,
     /// Changes of masks, without those that were taken back or done again.
     pub edits: usize,
-    /// How often something was taken back.
+    /// Number of times that something was taken back.
     pub undone: usize,
     /// Changes by what was done, e.g. `brush stroke`.
     pub deeds: BTreeMap<String, usize>,
-    /// What the masks at the end were made from, each with its number.
+    /// Sources of the masks at the end, each with its number.
     pub sources: BTreeMap<&'static str, usize>,
 }
 
-/// What a mask was made from, without its numbers.
+/// Source of a mask, without its numbers.
 fn source_of(base: &Provenance) -> &'static str {
-    /// How older journals say it.
+    /// Words of older journals, each with the source that it means.
     const TOLD: [(&str, &str); 6] = [
         ("Threshold", "threshold"),
         ("Top", "top percent"),
@@ -103,7 +103,7 @@ fn source_of(base: &Provenance) -> &'static str {
 }
 
 impl PairWork {
-    /// What a journal says.
+    /// Work that a journal tells of.
     pub fn of(pair: &str, tool: Option<&String>, records: &[Record]) -> Self {
         let mut work = Self { pair: pair.to_owned(), tool: tool.cloned(), ..Self::default() };
         let mut bases: BTreeMap<(String, String), Provenance> = BTreeMap::new();
@@ -134,7 +134,7 @@ impl PairWork {
     }
 }
 
-/// What masks took that were made from one source. A pair whose masks are from several counts to each by its share.
+/// Work on masks from one source. A pair whose masks are from several counts to each by its share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Effort {
     /// Masks.
@@ -164,14 +164,14 @@ impl Effort {
     }
 }
 
-/// How far the labeling is, and what it took.
+/// Progress of the labeling, and the work that it took.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct LabelStats {
     /// The pairs of each tool by review state.
     pub tools: Vec<ToolProgress>,
     /// All pairs by review state.
     pub all: Counts,
-    /// What all masks took.
+    /// Work on all masks.
     pub effort: Effort,
     /// By what the masks were made from.
     pub sources: BTreeMap<&'static str, Effort>,
@@ -179,7 +179,7 @@ pub struct LabelStats {
     pub deeds: BTreeMap<String, usize>,
     /// The work on each pair that has a journal, in the order of the data set.
     pub pairs: Vec<PairWork>,
-    /// What one drew a second time.
+    /// Agreement with oneself on pairs drawn a second time.
     pub repeats: Repeats,
     /// Journals and masks that cannot be read, and why.
     pub problems: Vec<String>,

@@ -24,16 +24,16 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::prediction::settings_text;
 use crate::io::masks;
+use crate::io::predicted_id::PredictedId;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{CleanUp, Drawing, Ground, Marks, PackError, PackedMask, Provenance, merge};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
 
-/// Which imprint of a touch.
+/// Source of an imprint of a touch.
 #[derive(
     Clone,
     Copy,
@@ -53,10 +53,10 @@ use touch2touch_core::rig::{PadId, Rig};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum ImprintSource {
-    /// What the Soft Bubble measured.
+    /// Imprint that the Soft Bubble measured.
     #[default]
     Measured,
-    /// What the generator predicts from the GelSlim image.
+    /// Imprint that the generator predicts from the GelSlim image.
     Predicted,
 }
 
@@ -84,7 +84,7 @@ impl ImprintSource {
     }
 }
 
-/// How far the review of a pair is.
+/// State of a pair's review.
 #[derive(
     Clone,
     Copy,
@@ -107,7 +107,7 @@ pub enum Review {
     /// Nobody looked at it.
     #[default]
     Todo,
-    /// Its mask was touched.
+    /// The mask was touched.
     InProgress,
     /// Something about it is wrong.
     Flagged,
@@ -118,7 +118,7 @@ pub enum Review {
 }
 
 impl Review {
-    /// Whether somebody has judged the pair, so that nothing changes its masks unasked.
+    /// True where somebody has judged the pair, so that nothing changes its masks unasked.
     pub fn is_judged(self) -> bool {
         !matches!(self, Self::Todo | Self::InProgress)
     }
@@ -144,7 +144,7 @@ impl Review {
         name.parse().ok()
     }
 
-    /// Whether nothing more is to be done.
+    /// True where nothing more is to be done.
     pub fn is_finished(self) -> bool {
         matches!(self, Self::Done | Self::Skip)
     }
@@ -155,7 +155,7 @@ impl Review {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ImprintOf {
-    /// What the Soft Bubble measured.
+    /// Imprint that the Soft Bubble measured.
     #[default]
     Measured,
     /// One prediction, by all that decides it.
@@ -173,7 +173,7 @@ impl ImprintOf {
         Self::Predicted(PredictedId::unknown())
     }
 
-    /// Which prediction it is, for people: the first digits of its bundle's identity, the choices, the shift.
+    /// Description for people: of a prediction the first digits of its bundle's identity, the choices, the shift.
     pub fn text(&self) -> String {
         match self {
             Self::Measured => "the measured imprint".into(),
@@ -187,7 +187,7 @@ impl ImprintOf {
         }
     }
 
-    /// Which of the two it is.
+    /// Source of the imprint.
     pub fn source(&self) -> ImprintSource {
         match self {
             Self::Measured => ImprintSource::Measured,
@@ -196,12 +196,12 @@ impl ImprintOf {
     }
 }
 
-/// What a mask is of.
+/// Pad and imprint that a mask is of.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MaskPlace {
     /// The pad.
     pub pad: PadId,
-    /// Its imprint.
+    /// Imprint of the pad.
     pub of: ImprintOf,
 }
 
@@ -221,7 +221,7 @@ pub struct Revision(pub u64);
 pub struct DrawnMask {
     /// The contact, in raw bubble orientation, as large as the imprint.
     pub mask: Arc<Mask>,
-    /// Where each pixel comes from, and which are ignored.
+    /// Origin of each pixel, and the ignored pixels.
     pub marks: Arc<Marks>,
     /// Changes with every change of the pixels; equal revisions are equal masks.
     pub revision: Revision,
@@ -235,7 +235,7 @@ impl DrawnMask {
         Self { mask, marks, revision: Revision::default() }
     }
 
-    /// What it was before the first correction, in words; empty where it was nothing.
+    /// Source of the mask before the first correction, in words; empty where there was none.
     pub fn base(&self) -> String {
         self.marks.base().text()
     }
@@ -299,12 +299,12 @@ impl DrawnMask {
         Self::new(self.mask.clone(), Provenance::Copied { from, moved: None })
     }
 
-    /// The same pixels of the same provenances, whatever the revision.
+    /// True for the same pixels of the same provenances, whatever the revision.
     pub fn is_same(&self, other: &Self) -> bool {
         self.mask == other.mask && self.marks == other.marks
     }
 
-    /// What was made of `base` here, and by somebody else there (`theirs`), in one; see [`merge`].
+    /// Merge of this mask with the one that somebody else made of the same `base` (`theirs`); see [`merge`].
     #[must_use]
     pub fn merged(&self, base: Option<&Self>, theirs: &Self) -> Self {
         // Where nobody had drawn, it is the automatic mask that this one began from.
@@ -322,7 +322,7 @@ impl DrawnMask {
         PackedMask::pack(&self.mask, &self.marks)
     }
 
-    /// What was packed, with the revision that it had.
+    /// Mask from its packed form, with the revision that it had.
     ///
     /// # Errors
     /// If it is damaged.
@@ -337,7 +337,7 @@ pub fn system_person() -> Option<String> {
     masks::person()
 }
 
-/// What a person said about one pair.
+/// Labels of one pair.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PairLabels {
     /// Corrected masks.
@@ -346,7 +346,7 @@ pub struct PairLabels {
     pub review: Review,
     /// Accepted `grasp_from_object` poses, by the imprint that they were made from.
     pub accepted: BTreeMap<ImprintOf, AcceptedPose>,
-    /// What a person wrote about it, in one line; empty for nothing. See [`note`].
+    /// Note that a person wrote about it, in one line; empty for none. See [`note`].
     pub note: String,
 }
 
@@ -360,7 +360,7 @@ pub fn note(text: &str) -> String {
     words.join(" ").chars().take(MAX_NOTE).collect::<String>().trim_end().to_owned()
 }
 
-/// What people said about the pairs of a data set, apart from masks and poses.
+/// Reviews and notes of the pairs of a data set, without masks and poses.
 #[derive(Clone, Debug, Default)]
 pub struct Reviews {
     /// Review states that are not "todo", by pair name.
@@ -372,7 +372,7 @@ pub struct Reviews {
 }
 
 impl PairLabels {
-    /// Whether it says nothing, so that nothing need be stored.
+    /// True where it says nothing, so that nothing need be stored.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
     }
@@ -382,9 +382,15 @@ impl PairLabels {
         self.masks.get(&MaskPlace::measured(pad))
     }
 
-    /// The mask drawn by hand on an imprint, if it is as large.
+    /// The mask drawn by hand on an imprint, if it is as large: where there is one it is in force, and no other. The one place
+    /// that says so; [`super::mask::contact_mask`] makes what is in force elsewhere.
     pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&DrawnMask> {
-        self.masks.get(place).filter(|hand| hand.mask.size() == imprint.size())
+        self.drawn_of_size(place, imprint.size())
+    }
+
+    /// The same of an imprint of a size.
+    pub(crate) fn drawn_of_size(&self, place: &MaskPlace, size: [usize; 2]) -> Option<&DrawnMask> {
+        self.masks.get(place).filter(|hand| hand.mask.size() == size)
     }
 
     /// Puts a mask in its place, or takes it away; returns what was there.

@@ -9,7 +9,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::rig::{PadId, PerPad};
 
-/// What the layers show of one registration.
+/// Layers of one registration.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LayerResult {
     /// The registered pose that they are of, `grasp_from_object`.
@@ -55,10 +55,10 @@ impl LayerResult {
 pub const BARS: usize = 40;
 /// Range of the histogram and of the heat map in widths of the kernel: where the gate is, and a little beyond.
 const RANGE_KERNELS: f64 = 4.0;
-/// The same for an engine without a kernel, meters.
+/// Range of the histogram and of the heat map for an engine without a kernel, meters.
 const RANGE_M: f64 = 4e-3;
 
-/// What the layers show of a recorded registration of `clouds` with the masks they were made with.
+/// Layers of a recorded registration of `clouds` with the masks they were made with.
 ///
 /// # Errors
 /// If the run did not record what became of the points, or they are not those of the clouds.

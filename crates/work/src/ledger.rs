@@ -13,7 +13,7 @@ use touch2touch_core::sample::Sample;
 pub struct LedgerResult {
     /// Every stage, the result against the truth, and what is implausible.
     pub ledger: Ledger,
-    /// The same picture in every way to meters.
+    /// Depth of the picture by every way to meters.
     pub readings: Vec<ChainReading>,
 }
 

@@ -22,10 +22,10 @@ use touch2touch_core::sample::{PadTouch, Sample};
 use touch2touch_core::units::text_mm;
 
 const WHAT: &str = "Contact mask";
-/// What is felt is pushed in by at least so much more than what lies around it, meters.
+/// Depth by which a touch is pushed in at least, beyond what lies around it, meters.
 const FELT_M: f32 = 0.000_5;
 
-/// Where a mask comes from when nobody drew one.
+/// Source of a mask when nobody drew one.
 #[derive(
     Clone,
     Copy,
@@ -78,7 +78,7 @@ impl MaskSource {
         }
     }
 
-    /// What it does, in a line.
+    /// Description in a line.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Auto => "What the mask model predicts from the imprint; without a mask model, the threshold",
@@ -121,7 +121,7 @@ impl Default for MaskChoice {
 }
 
 impl MaskChoice {
-    /// The same without the numbers of other sources.
+    /// Choice with the numbers of its own source only; those of other sources are at their defaults.
     #[must_use]
     pub(crate) fn of_its_source(&self) -> Self {
         let Self { source, threshold_m, probability, top_percent, cad_distance_m } = *self;
@@ -169,8 +169,8 @@ pub enum MaskRecipe {
 }
 
 impl MaskRecipe {
-    /// Where the pixels of its masks come from; `model` is the mask model's name, and `basis` what a mask is made of in the
-    /// end.
+    /// Provenance of the pixels of its masks; `model` is the mask model's name, and `basis` what a mask is made of in
+    /// the end.
     pub fn provenance(&self, model: &str, basis: MaskBasis) -> Provenance {
         match (basis, self) {
             (MaskBasis::Flat, _) => Provenance::Flat,
@@ -202,14 +202,14 @@ impl MaskRecipe {
     }
 }
 
-/// What masks of a pair can be made from, besides its imprints.
+/// Inputs that masks of a pair can be made from, besides its imprints.
 #[derive(Clone, Copy, Debug)]
 pub struct MaskInputs<'a> {
     /// The pair.
     pub sample: &'a Sample,
-    /// Its tool, for [`MaskRecipe::Cad`].
+    /// Tool of the pair, for [`MaskRecipe::Cad`].
     pub tool: Option<&'a ToolModel>,
-    /// What people drew; `None` leaves that out.
+    /// Labels that people gave the pair; `None` leaves them out.
     pub labels: Option<&'a PairLabels>,
     /// The imprint that masks are made for; `None` where nobody can have drawn on it.
     pub of: Option<&'a ImprintOf>,
@@ -221,8 +221,8 @@ impl<'a> MaskInputs<'a> {
         Self { sample, tool, labels, of: Some(&ImprintOf::Measured) }
     }
 
-    /// The mask that a person drew on this imprint of a pad.
-    fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a DrawnMask> {
+    /// The mask that is in force on this imprint of a pad because a person drew it.
+    pub(crate) fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a DrawnMask> {
         self.labels?.drawn(&MaskPlace { pad, of: self.of?.clone() }, imprint)
     }
 }
@@ -298,7 +298,7 @@ fn felt(imprint: &DepthMap, mask: &Mask) -> Result<(), TaskError> {
     Err(TaskError::new(WHAT, why).with_hint("Check pose, CAD model and imprint, for instance with the doctor."))
 }
 
-/// What the masks of a pair are made of, from the keys of each pad in turn; see [`Contact::made_of`].
+/// Bases of a pair's masks in words, from the keys of each pad in turn; see [`Contact::made_of`].
 pub fn made_of(mut keys: Vec<&'static str>, source: &'static str) -> String {
     keys.dedup();
     if keys.is_empty() { source.to_owned() } else { keys.join(", ") }
@@ -311,19 +311,19 @@ pub struct Contact {
     pub imprints: PerPad<DepthMap>,
     /// One for each imprint.
     pub masks: PerPad<ContactMask>,
-    /// What those are made by that nobody drew.
+    /// Recipe of the masks that nobody drew.
     pub recipe: MaskRecipe,
     /// The name of the mask model, where there is one.
     pub model: Option<String>,
 }
 
 impl Contact {
-    /// Where the masks come from that nobody drew.
+    /// Source of the masks that nobody drew.
     pub fn source(&self) -> MaskSource {
         self.recipe.source()
     }
 
-    /// What the masks are made of: the key of the source; `hand` where one was drawn, `depth` where the model found
+    /// Bases of the masks in words: the key of the source; `hand` where one was drawn, `depth` where the model found
     /// nothing, `flat` where there is no contact; of the pads in turn where they differ.
     pub fn made_of(&self) -> String {
         let source = self.source().key();

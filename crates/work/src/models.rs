@@ -7,14 +7,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use strum::IntoEnumIterator as _;
 
-use super::bundles::{BundleInfo, BundleKind};
+use super::bundles::{BundleInfo, BundleKind, by_id};
 use super::error::TaskError;
 use super::imprint::in_meters;
 use super::job::{JobCx, PreviewPicture};
 use super::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
 use super::prediction::{Chains, Prediction};
 use crate::infer::bundle::GeneratorSpec;
-use crate::infer::engine::{EngineChoice, EngineKind, resolve};
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{MaskError, MaskModel};
@@ -82,12 +82,12 @@ fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
     done.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
 }
 
-/// Where sheets lie: beside what the store keeps, if it keeps anything.
+/// Folder of the sheets: that of the store, if it keeps anything.
 fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
     (store.budget() > 0).then(|| store.folder().to_owned())
 }
 
-/// What becomes of a bundle's pictures: ways to meters, steps to a color picture, and how large its condition is.
+/// Output of a bundle: ways to meters, steps to a color picture, and the size of its condition.
 #[derive(Clone, Debug, Default)]
 struct OutputChains {
     chains: Chains,
@@ -173,7 +173,7 @@ impl Models {
         Ok(opened.generator().map(|spec| self.output_chains_by(bundle, spec, opened.fit())).unwrap_or_default())
     }
 
-    /// The same of a bundle that is open already.
+    /// Output chains of a bundle that is open already.
     fn output_chains_by(&self, bundle: &BundleInfo, spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
         lock(&self.outputs).entry(bundle.id.clone()).or_insert_with(|| output_chains_of(spec, fit)).clone()
     }
@@ -194,8 +194,8 @@ impl Models {
         self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
     }
 
-    /// The same, where a picture that fails, or makes a model panic, does not take the others with it. `None` once told to
-    /// stop.
+    /// Predictions, where a picture that fails, or makes a model panic, does not take the others with it. `None` once
+    /// told to stop.
     pub(crate) fn predict_each(
         &self,
         bundle: &BundleInfo,
@@ -246,7 +246,7 @@ impl Models {
             let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
             let recipe = |(item, at): (&GenerateInput<'_>, &usize)| {
                 let config = GenerateConfig { seed: item.seed, ..*config };
-                KeptKey::new(digests[*at].clone(), bundle.id.as_ref().to_owned(), kind, &config)
+                KeptKey { input: digests[*at].clone(), bundle: bundle.id.to_string(), engine: kind, config }
             };
             keys = wanted.iter().zip(&image).map(recipe).collect();
             let store = lock(store);
@@ -332,8 +332,9 @@ impl Models {
         made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model gave no answer"))
     }
 
-    /// What was made of an image before and is kept on the disk, oldest first, as far as its bundle is among `bundles`.
-    /// `engine` is the choice in force: what it stands for is said so. Never fails: what cannot be read is not there.
+    /// Predictions of an image that were made before and are kept on the disk, oldest first, as far as their bundle is
+    /// among `bundles`. `engine` is the choice in force: what it stands for is said so. Never fails: what cannot be
+    /// read is not there.
     pub fn kept(&self, bundles: &[BundleInfo], engine: EngineChoice, difference: &RgbGrid) -> Vec<KeptPrediction> {
         let Some(store) = &self.store else { return Vec::new() };
         let found = lock(store).of_input(&input_digest(difference), LISTED);
@@ -341,12 +342,11 @@ impl Models {
         let mut kept = Vec::new();
         // Oldest first: the last one is the one shown.
         for stored in found.into_iter().rev() {
-            let Some(bundle) = bundles.iter().find(|bundle| *bundle.id == *stored.recipe.bundle) else { continue };
+            let Some(bundle) = by_id(bundles, &stored.recipe.bundle) else { continue };
             let Ok(OutputChains { chains, fit, color, .. }) = self.outputs(bundle) else { continue };
             let engine = match stored.recipe.engine {
                 made if Some(made) == in_force => engine,
-                EngineKind::Rten => EngineChoice::Rten,
-                EngineKind::Ort => EngineChoice::Ort,
+                made => made.into(),
             };
             let prediction = Prediction {
                 raw: stored.raw,
@@ -358,17 +358,17 @@ impl Models {
                 seconds: stored.seconds,
                 kept: true,
             };
-            kept.push(KeptPrediction { engine, config: stored.recipe.config(), prediction });
+            kept.push(KeptPrediction { engine, config: stored.recipe.config, prediction });
         }
         kept
     }
 
-    /// Which predictions are kept on the disk.
+    /// Names of the predictions that are kept on the disk.
     pub(crate) fn kept_inputs(&self) -> Inputs {
         self.store.as_ref().map_or_else(Inputs::default, |store| lock(store).inputs())
     }
 
-    /// What the mask model says of an imprint in meters, and what the mask is made of in the end. A pixel of at least
+    /// Contact mask by the mask model for an imprint in meters, with what it is made of in the end. A pixel of at least
     /// `probability` is contact; `None` for the bundle's own.
     ///
     /// # Errors
@@ -466,7 +466,7 @@ fn open_mask_model(bundle: &BundleInfo, engine: EngineChoice) -> Result<MaskMode
     MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
 }
 
-/// How contact masks are made.
+/// Choice, model and engine of contact masks.
 #[derive(Clone, Copy, Debug)]
 pub struct Masking<'a> {
     /// Of what.
@@ -510,7 +510,7 @@ fn distinct<'a>(wanted: &[GenerateInput<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) 
 struct Follow<'a> {
     cx: &'a JobCx,
     wanted: &'a [GenerateInput<'a>],
-    /// Which of them are made.
+    /// Positions in `wanted` of the predictions that are made.
     fresh: &'a [usize],
     chains: &'a Chains,
 }

@@ -12,7 +12,7 @@ use crate::io::digest::sha256;
 use crate::io::staging::{self, Claim, Staging};
 use crate::io::{atomic, files, folders};
 
-/// Where the program keeps models that were made with it, and looks for them at its start; `None` without a folder for
+/// Folder of the models that were made with the program, which looks for them at its start; `None` without a folder for
 /// such files.
 pub fn models_folder() -> Option<PathBuf> {
     folders::program_data().map(|folder| folder.join("models"))

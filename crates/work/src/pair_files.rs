@@ -35,7 +35,7 @@ pub enum PairFile {
 }
 
 impl PairFile {
-    /// Its name on the command line.
+    /// Name on the command line.
     pub fn key(self) -> &'static str {
         self.into()
     }
@@ -49,23 +49,23 @@ impl PairFile {
     }
 }
 
-/// What is written of a pair.
+/// Parts that are written of a pair.
 #[derive(Clone, Copy, Debug)]
 pub struct PairParts<'a> {
-    /// Its name.
+    /// Name of the pair.
     pub name: &'a str,
-    /// Which imprint it is about.
+    /// Source of the imprint.
     pub source: ImprintSource,
-    /// How it was predicted, as [`super::figure::note`] says it; `None` of a measured one.
+    /// Origin of the prediction, as [`super::figure::note`] says it; `None` of a measured one.
     pub prediction: Option<&'a str>,
-    /// Its sensors.
+    /// Sensors of the pair.
     pub rig: &'a Rig,
     /// The surface points of that imprint.
     pub clouds: &'a Clouds,
-    /// What their contact masks are made of.
+    /// Bases of the contact masks, as [`super::mask::made_of`] says them.
     pub mask: &'a str,
     /// The registration.
-    pub engine: RegistrationChoice,
+    pub registration: RegistrationChoice,
     /// Its answer; `None` where there is none.
     pub pose: Option<&'a PoseResult>,
     /// The true pose, `grasp_from_object`, where it is known.
@@ -81,11 +81,12 @@ type Matrix = [[f64; 4]; 4];
 struct PoseFile<'a> {
     pair: &'a str,
     imprint: &'static str,
-    /// How the imprint was predicted; none of a measured one.
+    /// Origin of the prediction; none of a measured imprint.
     #[serde(skip_serializing_if = "Option::is_none")]
     prediction: Option<&'a str>,
     tool: Option<&'a str>,
-    engine: String,
+    #[serde(rename = "engine")]
+    registration: String,
     mask: &'a str,
     convention: &'static str,
     grasp_from_object: Matrix,
@@ -172,7 +173,7 @@ fn comments(parts: &PairParts<'_>) -> Vec<String> {
     let fingers: Vec<String> =
         parts.rig.pads().map(|pad| format!("{} = {}", pad.index(), parts.rig.pad_key(pad))).collect();
     let distance = match (parts.pose, parts.tool) {
-        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.engine),
+        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.registration),
         _ => "NaN, without a pose".to_owned(),
     };
     let predicted = parts.prediction.map_or_else(String::new, |how| format!(" ({})", how.replace('·', ",")));
@@ -217,7 +218,7 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         imprint: parts.source.key(),
         prediction: parts.prediction,
         tool: parts.tool.map(|(name, _)| name),
-        engine: parts.engine.to_string(),
+        registration: parts.registration.to_string(),
         mask: parts.mask,
         convention: CONVENTION,
         grasp_from_object: matrix(found),
@@ -252,8 +253,8 @@ mod tests {
         let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
         let clouds = clouds(&sample, &of).unwrap();
         let tool = ToolModel::new(spec.mesh()).unwrap();
-        let (engine, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
-        let found = pose(&clouds.contact_points(), &tool, &*engine.method(), Ask::default(), truth).unwrap();
+        let (registration, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
+        let found = pose(&clouds.contact_points(), &tool, &*registration.method(), Ask::default(), truth).unwrap();
         let parts = PairParts {
             name: "a/b",
             source: ImprintSource::Measured,
@@ -261,7 +262,7 @@ mod tests {
             rig: &sample.rig,
             clouds: &clouds,
             mask: "threshold",
-            engine,
+            registration,
             pose: Some(&found),
             truth,
             tool: Some(("tool", &tool)),

@@ -1,4 +1,4 @@
-//! Which pairs a pass over a data set takes.
+//! Choice of pairs for a pass over a data set.
 
 /// The positions of at most `limit` of `len` things, spread evenly; all of them without a limit.
 pub fn spread(len: usize, limit: Option<usize>) -> impl ExactSizeIterator<Item = usize> {

@@ -30,7 +30,7 @@ pub struct PoseResult {
     pub num_points: usize,
     /// Why it stopped, in words.
     pub stop: String,
-    /// Whether it stopped because nothing moved any more.
+    /// True where it stopped because nothing moved any more.
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
@@ -39,7 +39,7 @@ pub struct PoseResult {
 }
 
 impl PoseResult {
-    /// The same the other way round; its angle is the number that the lab reports.
+    /// Pose the other way round; its angle is the number that the lab reports.
     pub fn object_from_grasp(&self) -> PlanarPose {
         self.grasp_from_object.inverse()
     }
@@ -82,20 +82,20 @@ pub fn pose(
     })
 }
 
-/// Where starts lead.
+/// Basin map: the poses that many starts lead to.
 ///
 /// # Errors
 /// If the job was told to stop, or no start led anywhere.
 pub fn basin(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: RegistrationChoice,
+    registration: RegistrationChoice,
     plane: Plane,
     cx: &JobCx,
 ) -> Result<Basin, TaskError> {
     const WHAT: &str = "Basin map";
     let config = BasinConfig::new(plane);
-    let map = basin_map(points, tool, engine, &config, || cx.cancel.is_cancelled())
+    let map = basin_map(points, tool, registration, &config, || cx.cancel.is_cancelled())
         .ok_or_else(|| TaskError::cancelled(WHAT))?;
     match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
         Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),

@@ -41,7 +41,7 @@ impl Generating<'_> {
         Ok(ends.map_err(|err| TaskError::from_error(what(), &err))?.input)
     }
 
-    /// What to say where no touch has a reading of the sensor that it starts from.
+    /// Error for a rig of which no touch has a reading of the sensor that the generator starts from.
     pub fn no_input(self, rig: &Rig) -> TaskError {
         let sensor = self.input(rig).ok().and_then(|input| rig.sensor(input));
         let name = sensor.map_or("GelSlim", |sensor| &sensor.name);

@@ -27,17 +27,17 @@ pub struct Prediction {
     pub engine: String,
     /// Time that making it took, seconds; what was made together shares its time.
     pub seconds: f64,
-    /// Whether it was made earlier and only read now.
+    /// True where it was made earlier and only read now.
     pub kept: bool,
 }
 
-/// How a prediction was made, as it stands beside each picture, 3D view and file of it: `model · 2 steps · seed 42`, with the
-/// sampler, its noise and the guidance where they are not the usual ones.
+/// Origin of a prediction, as it stands beside each picture, 3D view and file of it: `model · 2 steps · seed 42`, with
+/// the sampler, its noise and the guidance where they are not the usual ones.
 pub fn made_with(model: &str, config: &GenerateConfig) -> String {
     format!("{model} · {}", settings_text(config))
 }
 
-/// The same without the model.
+/// Settings of a prediction, likewise, without the model.
 pub fn settings_text(config: &GenerateConfig) -> String {
     let GenerateConfig { steps, eta, seed, sampler, guidance, .. } = *config;
     let plural = if steps == 1 { "" } else { "s" };

@@ -21,7 +21,7 @@ use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
-use touch2touch_core::manual::ManualPose;
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -31,16 +31,16 @@ pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";
 
-/// How far a membrane may lie from where it was in the other pair and still be in contact with the same place of the
-/// tool, meters.
+/// Distance that a membrane may lie at most from where it was in the other pair and still be in contact with the same
+/// place of the tool, meters.
 const CARRY_GATE_M: f64 = 0.0015;
-/// The same from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
+/// Distance likewise from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
 const ACROSS_GATE_M: f64 = 0.003;
 
 /// The greatest distance to the CAD model that a mask can be made of, meters.
 pub const FARTHEST_M: f64 = 0.01;
 
-/// What proposes a mask.
+/// Source of a proposed mask.
 #[derive(
     Clone,
     Copy,
@@ -96,7 +96,7 @@ impl ProposalSource {
         }
     }
 
-    /// What it does, in a line.
+    /// Description in a line.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Automatic => "What the automatic source below says, with its numbers",
@@ -113,10 +113,54 @@ impl ProposalSource {
         }
     }
 
-    /// Whether it measures the distance to the CAD model.
-    pub fn is_cad(self) -> bool {
-        matches!(self, Self::CadTruth | Self::CadRegistered | Self::CadHand)
+    /// What a proposal of it is made of.
+    pub fn takes(self) -> Takes {
+        match self {
+            Self::Automatic => Takes::AutomaticMask,
+            Self::CadTruth => Takes::CadModel(CadAt::Truth),
+            Self::CadRegistered => Takes::CadModel(CadAt::Registered),
+            Self::CadHand => Takes::CadModel(CadAt::Hand),
+            Self::Grow => Takes::DrawnMask,
+            Self::Carry => Takes::OtherPair,
+            Self::OtherFinger => Takes::OtherPad,
+        }
     }
+
+    /// It measures the distance to the CAD model.
+    pub fn is_cad(self) -> bool {
+        matches!(self.takes(), Takes::CadModel(_))
+    }
+}
+
+/// What a proposal is made of, besides the imprint. Each has one function that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// The mask of the automatic source: [`automatic`].
+    AutomaticMask,
+    /// The distances to the CAD model at a pose ([`cad_distances`]): [`near_cad`].
+    CadModel(CadAt),
+    /// The mask that a person drew on the imprint: [`grown`].
+    DrawnMask,
+    /// The mask that a person drew of the pair that [`carries_from`] names: [`carried_from_pair`].
+    OtherPair,
+    /// The mask in force of the other pad: [`carried_across`].
+    OtherPad,
+}
+
+/// Where the CAD model lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CadAt {
+    /// At the true pose.
+    Truth,
+    /// At the pose that is registered from the masks in force.
+    Registered,
+    /// Where a hand holds it, else where one put it: [`hand_pose`].
+    Hand,
+}
+
+/// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
+pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Option<ManualPose> {
+    held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
 }
 
 /// A proposed mask.
@@ -124,9 +168,9 @@ impl ProposalSource {
 pub struct Proposal {
     /// The contact, as large as the imprint.
     pub mask: Mask,
-    /// Where it comes from.
+    /// Origin of the mask.
     pub provenance: Provenance,
-    /// What to know about it, in words; empty if there is nothing.
+    /// Remark on the mask, in words; empty if there is none.
     pub note: String,
 }
 
@@ -143,8 +187,9 @@ fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
     camera.ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))
 }
 
-/// How far around a pixel a measured imprint is looked at to tell grain from membrane, millimeters. On simulated touches of
-/// unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of 0.82 with the grain.
+/// Radius around a pixel in which a measured imprint is looked at to tell grain from membrane, millimeters. On
+/// simulated touches of unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of
+/// 0.82 with the grain.
 const GRAIN_MM: f64 = 1.7;
 
 /// The imprint as distances to the CAD model are measured from it: what was measured without its grain, a prediction, which
@@ -222,7 +267,7 @@ pub struct Side<'a> {
     pub sample: &'a Sample,
     /// The finger.
     pub pad: PadId,
-    /// Its imprint, meters.
+    /// Imprint of the finger, meters.
     pub imprint: &'a DepthMap,
 }
 

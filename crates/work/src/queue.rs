@@ -1,4 +1,4 @@
-//! Which pairs are worth a look first: [`queue`].
+//! Order of the pairs by how much they are worth a look: [`queue`].
 //!
 //! A pair's uncertainty has parts, each a metric with its unit. Parts of different units are put together by how a pair
 //! stands among all that have the part.
@@ -14,20 +14,20 @@ use crate::io::dataset::Dataset;
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{Metric, Scores};
 
-/// What a queue is ordered by.
+/// Metric that a queue is ordered by.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
 #[strum(serialize_all = "snake_case")]
 pub enum QueueBy {
     /// All parts together.
     #[default]
     Overall,
-    /// How far the mask drawn by hand is from the mask model's.
+    /// Distance of the mask drawn by hand from the mask model's.
     Disagreement,
-    /// How many pixels the mask model is unsure of.
+    /// Share of pixels that the mask model is unsure of.
     Probability,
     /// The error of the angle.
     Angle,
-    /// How far predictions with different seeds are apart.
+    /// Spread of predictions with different seeds.
     Spread,
 }
 
@@ -42,7 +42,7 @@ impl QueueBy {
         self.metric().map_or("Overall", Metric::name)
     }
 
-    /// What it does, in a line.
+    /// Description in a line.
     pub fn tip(self) -> &'static str {
         self.metric().map_or("The mean of the ranks by each metric that the pair has", Metric::tip)
     }
@@ -62,7 +62,7 @@ impl QueueBy {
 /// One reason to look at a pair.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Part {
-    /// What it is a value of.
+    /// Metric that it is a value of.
     pub metric: Metric,
     /// The value, in the metric's own unit (radians, meters, shares).
     pub value: f64,
@@ -73,7 +73,7 @@ pub struct Part {
 /// A pair in the queue.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Queued {
-    /// What is known of it.
+    /// Reasons to look at the pair, one for each metric that is known.
     pub parts: Vec<Part>,
     /// The mean of the ranks of the parts; `None` where nothing is known.
     pub overall: Option<f64>,
@@ -85,7 +85,7 @@ impl Queued {
         self.parts.iter().find(|part| part.metric == metric)
     }
 
-    /// What it is ordered by: the greater, the earlier.
+    /// Rank that it is ordered by: the greater, the earlier.
     fn weight(&self, by: QueueBy) -> Option<f64> {
         by.metric().map_or(self.overall, |metric| self.part(metric).map(|part| part.rank))
     }
@@ -165,7 +165,7 @@ fn rank(sorted: &[f64], value: f64) -> f64 {
     if others == 0 { 0.5 } else { (below as f64 + 0.5 * equal.saturating_sub(1) as f64) / others as f64 }
 }
 
-/// How the measured imprints alone are scored: no generator is run.
+/// Setup that scores the measured imprints alone: no generator is run.
 pub fn measured_only(setup: &Setup) -> Setup {
     Setup { bundles: Vec::new(), grasps_per_tool: None, ..setup.clone() }
 }
@@ -186,9 +186,9 @@ pub fn queue(dataset: &Dataset, setup: &Setup, models: &Models, cx: &JobCx) -> R
 pub struct Line {
     /// The pair's name.
     pub pair: String,
-    /// Its tool.
+    /// Tool of the pair.
     pub tool: Option<String>,
-    /// Its review state.
+    /// Review state of the pair.
     pub review: &'static str,
     /// Mean of the ranks, 0..1.
     pub overall: Option<f64>,
@@ -198,7 +198,7 @@ pub struct Line {
     pub unsure: Option<f64>,
     /// Error of the angle; missing (with `no_pose`) where there is no pose.
     pub angle_error_deg: Option<f64>,
-    /// Whether no pose was found.
+    /// True where no pose was found.
     pub no_pose: bool,
     /// Standard deviation between seeds.
     pub seed_spread_mm: Option<f64>,

@@ -2,12 +2,10 @@
 
 mod words;
 
-use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value};
 
 use super::bundles::BundleInfo;
 use super::error::TaskError;
@@ -15,23 +13,19 @@ use super::labels::{ImprintOf, ImprintSource};
 use super::mask::{MaskChoice, MaskRecipe, MaskSource};
 use super::predict::Generating;
 use crate::infer::engine::EngineChoice;
-use crate::io::digest::sha256;
-use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
+use crate::infer::recipe_id::Named;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::ensemble::seeds;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
 
+pub use crate::infer::recipe_id::RecipeId;
 pub use words::{Words, meters, millimeters, quoted};
-
-/// Version of [`Recipe::id`].
-const VERSION: &str = "r1";
-/// The choices of a generation that an id does not name. Part of the format: they stay when defaults change.
-const UNNAMED: GenerateConfig =
-    GenerateConfig { steps: 50, eta: 0.0, seed: 42, sampler: Sampler::Ddim, spacing: Spacing::Trailing, guidance: 1.0 };
 
 /// The steps from a touch to a pose, in order; the result of each is made from the one before.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
 pub enum Stage {
-    /// What the generator draws.
+    /// Prediction of the generator.
     Prediction,
     /// The imprint in meters, measured or predicted.
     Imprint,
@@ -84,9 +78,9 @@ fn is_yes(value: &bool) -> bool {
 /// A model bundle, as files name it.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct ModelName {
-    /// Its name.
+    /// Name for people.
     pub name: String,
-    /// Its identity.
+    /// Identity of the bundle.
     pub id: String,
 }
 
@@ -126,17 +120,6 @@ impl Serialize for Model {
     }
 }
 
-/// A digest of all that decides a result: equal ids are equal results of the same touch. Choices are named in it and those
-/// at their defaults left out, so that a new choice changes no id.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-pub struct RecipeId(String);
-
-impl fmt::Display for RecipeId {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
 impl<M> Default for Recipe<M> {
     fn default() -> Self {
         Self {
@@ -153,7 +136,7 @@ impl<M> Default for Recipe<M> {
 }
 
 impl<M> Recipe<M> {
-    /// The same with other models; `None` where one has no counterpart.
+    /// Recipe with other models; `None` where one has no counterpart.
     pub(crate) fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
         let generator = match self.generator {
             Some((model, config)) => Some((find(model)?, config)),
@@ -167,7 +150,7 @@ impl<M> Recipe<M> {
         Some(Recipe { imprint, generator, shift, mask, mask_model, hand, registration, engine })
     }
 
-    /// The same from another imprint.
+    /// Recipe from another imprint.
     #[must_use]
     pub fn of(&self, imprint: ImprintSource) -> Self
     where
@@ -176,7 +159,27 @@ impl<M> Recipe<M> {
         Self { imprint, ..self.clone() }
     }
 
-    /// Whether the mask model is run.
+    /// The same with another seed of its predictions.
+    #[must_use]
+    pub(crate) fn with_seed(&self, seed: u64) -> Self
+    where
+        M: Clone,
+    {
+        let mut with = self.clone();
+        with.generator.iter_mut().for_each(|(_, config)| config.seed = seed);
+        with
+    }
+
+    /// So many recipes that differ from it in their seeds alone, from its own on; none where nothing is predicted.
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self>
+    where
+        M: Clone,
+    {
+        let own = self.generator.as_ref().map(|(_, config)| config.seed);
+        own.map_or_else(Vec::new, |own| seeds(own, count).into_iter().map(|seed| self.with_seed(seed)).collect())
+    }
+
+    /// True where the mask model is run.
     fn takes_mask_model(&self) -> bool {
         matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
     }
@@ -204,40 +207,20 @@ impl Recipe {
 
     /// The identity of the result of a stage, of any touch.
     pub fn id(&self, stage: Stage) -> RecipeId {
-        let digest = sha256(self.named(stage).to_string().as_bytes());
-        RecipeId(format!("{VERSION}-{digest:.16}"))
-    }
-
-    /// What decides the result of a stage, by name, without what is at its default.
-    fn named(&self, stage: Stage) -> Value {
         let of = self.until(stage);
-        let mut named = Map::new();
-        let mut name = |key: &str, value: Value, default: Value| {
-            if value != default {
-                named.insert(key.into(), value);
-            }
-        };
         let from = Self::default();
-        name("imprint", json(&of.imprint), json(&from.imprint));
-        if let Some((model, config)) = &of.generator {
-            name("bundle", json(&model.id), Value::Null);
-            // + 0.0 turns -0 into 0, which means the same.
-            let config = GenerateConfig { eta: config.eta + 0.0, guidance: config.guidance + 0.0, ..*config };
-            let (Value::Object(choices), Value::Object(defaults)) = (json(&config), json(&UNNAMED)) else {
-                unreachable!("choices are named")
-            };
-            for (key, value) in choices {
-                let default = defaults.get(&key).cloned().unwrap_or_default();
-                name(&key, value, default);
-            }
-        }
-        name("shift", json(&of.shift), json(&from.shift));
-        name("mask", json(&of.mask), json(&from.mask));
-        name("mask_model", json(&of.mask_model.as_ref().map(|model| &model.id)), Value::Null);
-        name("hand", json(&of.hand), json(&from.hand));
-        name("registration", json(&of.registration.to_string()), json(&from.registration.to_string()));
-        name("engine", json(&of.engine), json(&from.engine));
-        Value::Object(named)
+        let mut named = match &of.generator {
+            Some((model, config)) => Named::prediction(&model.id, config, of.engine),
+            None => Named::default(),
+        };
+        named.add("imprint", &of.imprint, &from.imprint);
+        named.add("shift", &of.shift, &from.shift);
+        named.add("mask", &of.mask, &from.mask);
+        named.add("mask_model", &of.mask_model.as_ref().map(|model| &model.id), &None::<&str>);
+        named.add("hand", &of.hand, &from.hand);
+        named.add("registration", &of.registration.to_string(), &from.registration.to_string());
+        named.add("engine", &of.engine, &from.engine);
+        named.id()
     }
 
     /// The imprint that it is about, for masks and poses that people filed under it.
@@ -268,11 +251,7 @@ impl Recipe {
     }
 }
 
-/// What to say where a mask model is asked for and there is none.
+/// Error where a mask model is asked for and there is none.
 pub(crate) fn no_mask_model() -> TaskError {
     TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
-}
-
-fn json(value: &impl Serialize) -> Value {
-    serde_json::to_value(value).unwrap_or_default()
 }

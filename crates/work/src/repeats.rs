@@ -1,7 +1,7 @@
 //! Blind repeats: some pairs that a person marked done come back without their mask, so that it is known how far one
 //! agrees with oneself. The second masks lie apart from the first, in a folder of their own, and never replace them.
 //!
-//! Which pairs come back follows from their name and the person alone: neither chance nor choice has a part in it.
+//! The choice of pairs follows from their name and the person alone: neither chance nor choice has a part in it.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ pub struct Repeats {
     pub due: Vec<String>,
 }
 
-/// Whether a pair of a person comes back, where a share of them does: the same answer every time.
+/// True where a pair of a person comes back, where a share of them does: the same answer every time.
 pub(crate) fn comes_back(pair: &str, person: &str, share: f64) -> bool {
     let digest = sha256(format!("{person}\n{pair}").as_bytes());
     let draw = digest.get(..12).and_then(|digits| u64::from_str_radix(digits, 16).ok());
@@ -62,7 +62,7 @@ fn due(mut done: Vec<(u64, String)>, repeated: &BTreeMap<String, Review>, person
     done.into_iter().take(ready).filter(comes).map(|(_, pair)| pair).collect()
 }
 
-/// What a person drew a second time, and what comes back next.
+/// Repeats of a person: the pairs drawn a second time, and those that come back next.
 ///
 /// # Errors
 /// If masks cannot be read.

@@ -2,17 +2,17 @@
 
 use std::sync::Arc;
 
-use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::job::JobCx;
 use super::models::GenerateInput;
+use super::predict::Generating;
 use super::prediction::Prediction;
+use super::recipe::Recipe;
 use crate::io::masks::now_unix_s;
 use crate::io::statistics::{Provenance, ShiftStatistics, utc_text};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::postprocess::{ShiftFit, ShiftMode};
-use touch2touch_core::rig::{PadId, SensorId};
+use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{Sample, Scale};
 
 /// Pairs that a pass takes at most, spread evenly, where no other number is asked for: minutes, not hours.
@@ -21,19 +21,15 @@ pub const PAIRS: usize = 96;
 /// Name of the job in errors.
 const WHAT: &str = "Shift statistics";
 
-/// What is predicted, and how.
+/// Pairs and predictions that statistics are made of.
 #[derive(Clone, Debug)]
 pub struct StatisticsSetup {
     /// The pairs. Any order of them gives the same figures.
     pub pairs: Vec<PairId>,
     /// Whose touches.
     pub fingers: Vec<PadId>,
-    /// The sensor that the generator starts from.
-    pub input: SensorId,
-    /// The generator.
-    pub bundle: BundleInfo,
-    /// The choices of the generation.
-    pub config: GenerateConfig,
+    /// How they are predicted; how predictions become meters decides nothing.
+    pub recipe: Recipe,
     /// The data set's title, for the statistics' provenance.
     pub dataset: String,
 }
@@ -42,13 +38,14 @@ pub struct StatisticsSetup {
 /// and the touches that could not be used.
 ///
 /// # Errors
-/// If the job was told to stop, or no touch could be used.
+/// If the recipe has no generator, the job was told to stop, or no touch could be used.
 pub fn statistics(
     setup: &StatisticsSetup,
     load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
-    mut predict: impl FnMut(GenerateInput<'_>, &JobCx) -> Result<Prediction, TaskError>,
+    predict: impl Fn(Generating<'_>, &[GenerateInput<'_>], &JobCx) -> Result<Vec<Prediction>, TaskError>,
     cx: &JobCx,
 ) -> Result<(ShiftStatistics, Vec<TaskError>), TaskError> {
+    let generating = setup.recipe.generating()?;
     let (mut fit, mut failed) = (ShiftFit::default(), Vec::new());
     let (mut scale, mut engine) = (Scale::Measured, String::new());
     // The steps of each prediction are not worth showing.
@@ -67,18 +64,15 @@ pub fn statistics(
             scale = Scale::Assumed;
         }
         for finger in &setup.fingers {
-            let touch = sample.pad(*finger);
-            let (Some(picture), Some(bubble)) =
-                (touch.and_then(|t| t.picture(setup.input)), touch.and_then(|t| t.depth()))
-            else {
-                continue;
-            };
+            let bubble = sample.pad(*finger).and_then(|touch| touch.depth());
+            let (Some(picture), Some(bubble)) = (generating.picture(&sample, *finger)?, bubble) else { continue };
             cx.check(WHAT)?;
-            let wanted = GenerateInput { difference: &picture, seed: setup.config.seed, size: [0, 0] };
-            let added = predict(wanted, &quiet).and_then(|made| {
-                let chain = super::imprint::chain(&made, ShiftMode::Raw)?;
-                engine.clone_from(&made.engine);
-                fit.add(&chain, &made.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
+            let input = GenerateInput { difference: &picture, seed: generating.config.seed, size: [0, 0] };
+            let added = predict(generating, &[input], &quiet).and_then(|predictions| {
+                let prediction = predictions.first().ok_or_else(|| TaskError::new(WHAT, "the generator gave none"))?;
+                let chain = super::imprint::chain(prediction, ShiftMode::Raw)?;
+                engine.clone_from(&prediction.engine);
+                fit.add(&chain, &prediction.raw, &bubble.imprint).map_err(|err| TaskError::from_error(WHAT, &err))
             });
             match added {
                 Ok(()) => {}
@@ -87,10 +81,10 @@ pub fn statistics(
             }
         }
     }
-    let config = &setup.config;
+    let config = generating.config;
     let provenance = Provenance {
-        bundle: setup.bundle.name.clone(),
-        bundle_hash: setup.bundle.id.to_string(),
+        bundle: generating.bundle.name.clone(),
+        bundle_hash: generating.bundle.id.to_string(),
         dataset: setup.dataset.clone(),
         seed: config.seed,
         steps: config.steps,

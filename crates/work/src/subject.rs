@@ -4,19 +4,20 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::recipe::Recipe;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 
 /// Fewest and most seeds of a mean.
 pub const SEEDS: std::ops::RangeInclusive<usize> = 2..=16;
 
-/// What can stand on either side of a comparison: a rule that each pair resolves for itself.
+/// Subject of a comparison, on either side of it: a rule that each pair resolves for itself.
 ///
 /// As text: `measured`, `prediction`, `mean`, `stored`; a prediction and a mean are followed by what differs from the
 /// settings, as in `prediction:bundle=fitted,seed=7,steps=50,shift=raw` or `mean:seeds=4`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Subject {
-    /// What was measured.
+    /// Imprint that was measured.
     Measured,
     /// A prediction.
     Predicted(RecipeChange),
@@ -26,7 +27,8 @@ pub enum Subject {
     Stored,
 }
 
-/// Which prediction: what is `None` is as the settings (of the studio) or the options (of a verb) say.
+/// Changes to a recipe that name a prediction: what is `None` is as the settings (of the studio) or the options (of a
+/// verb) say.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct RecipeChange {
     /// The generator, by its bundle's name.
@@ -35,8 +37,37 @@ pub struct RecipeChange {
     pub steps: Option<u32>,
     /// Seed of the noise.
     pub seed: Option<u64>,
-    /// How it becomes meters.
+    /// Mapping to meters.
     pub shift: Option<Mapping>,
+}
+
+/// What a subject is made from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MadeFrom {
+    /// The measurement.
+    Measurement,
+    /// The picture of another program's prediction.
+    Picture,
+    /// A prediction by this recipe.
+    Prediction(Recipe),
+    /// The mean of the predictions by these recipes, which differ in their seeds alone.
+    Mean(Vec<Recipe>),
+}
+
+impl RecipeChange {
+    /// The recipe that it makes of the one that settings or options give; `given` gives that, with the generator that is named.
+    ///
+    /// # Errors
+    /// Those of `given`, such as that there is no such generator.
+    fn of<E>(&self, given: impl FnOnce(Option<&str>) -> Result<Recipe, E>) -> Result<Recipe, E> {
+        let mut recipe = given(self.bundle.as_deref())?;
+        if let Some((_, config)) = &mut recipe.generator {
+            config.steps = self.steps.unwrap_or(config.steps);
+            config.seed = self.seed.unwrap_or(config.seed);
+        }
+        recipe.shift = self.shift.map_or(recipe.shift, Mapping::mode);
+        Ok(recipe)
+    }
 }
 
 /// A way to meters that needs no statistics of a data set.
@@ -63,7 +94,7 @@ impl Mapping {
         }
     }
 
-    /// Its name in text.
+    /// Name in text.
     pub fn key(self) -> &'static str {
         match self {
             Self::Exact => "exact",
@@ -80,7 +111,7 @@ impl Subject {
         Self::Predicted(RecipeChange::default())
     }
 
-    /// Whether something is predicted for it.
+    /// Changes to the recipe, where something is predicted for it.
     pub fn wish(&self) -> Option<&RecipeChange> {
         match self {
             Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
@@ -88,7 +119,21 @@ impl Subject {
         }
     }
 
-    /// What a person reads.
+    /// What it is made from; `given` gives the recipe of predictions by the settings or options, with the generator that is
+    /// named, else theirs.
+    ///
+    /// # Errors
+    /// Those of `given`, such as that there is no such generator.
+    pub fn made_from<E>(&self, given: impl FnOnce(Option<&str>) -> Result<Recipe, E>) -> Result<MadeFrom, E> {
+        Ok(match self {
+            Self::Measured => MadeFrom::Measurement,
+            Self::Stored => MadeFrom::Picture,
+            Self::Predicted(change) => MadeFrom::Prediction(change.of(given)?),
+            Self::Mean(change, count) => MadeFrom::Mean(change.of(given)?.with_seeds(*count)),
+        })
+    }
+
+    /// Name for people.
     pub fn label(&self) -> String {
         let base = match self {
             Self::Measured => return "Measured".into(),
@@ -201,6 +246,21 @@ mod tests {
             assert!(!subject.label().is_empty());
         }
         assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(RecipeChange::default(), 8));
+    }
+
+    #[test]
+    fn a_subject_is_made_from_what_is_given_with_its_changes() {
+        let given = |named: Option<&str>| match named {
+            Some(_) => Err("there is no such generator"),
+            None => Ok(Recipe { shift: ShiftMode::PaperShift, ..Recipe::default() }),
+        };
+        let of = |text: &str| text.parse::<Subject>().unwrap().made_from(given);
+        assert_eq!((of("measured"), of("stored")), (Ok(MadeFrom::Measurement), Ok(MadeFrom::Picture)));
+        let Ok(MadeFrom::Prediction(shown)) = of("prediction") else { panic!("{:?}", of("prediction")) };
+        assert_eq!(shown.shift, ShiftMode::PaperShift);
+        let Ok(MadeFrom::Prediction(raw)) = of("prediction:shift=raw") else { panic!("a prediction") };
+        assert_eq!(raw, Recipe { shift: ShiftMode::Raw, ..shown });
+        assert_eq!(of("mean:bundle=other"), Err("there is no such generator"));
     }
 
     #[test]

@@ -1,8 +1,9 @@
 //! A dial turned through some values over many pairs: what a threshold, a probability, a gate, a trim or a shift does to
 //! every pose, so that it can be chosen for all of them: [`sweep`]. The verb `sweep` and the studio's Dial pane call it.
 //!
-//! What does not depend on the dial is computed once: nothing is predicted anew for another mask, and no contact point
-//! is made anew for another gate. Each pose is that of the verb `pose` and of the results table with the same settings.
+//! Results that do not depend on the dial are computed once: nothing is predicted anew for another mask, and no contact
+//! point is made anew for another gate. Each pose is that of the verb `pose` and of the results table with the same
+//! settings.
 
 mod dial;
 mod outcome;
@@ -36,15 +37,15 @@ use touch2touch_core::sample::Sample;
 pub use dial::{Dial, MOST_VALUES, Setting};
 pub use outcome::{Outcome, Point, Series, Summary};
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Dial";
 /// Pairs that are read and predicted together.
 const BATCH: usize = 8;
 
-/// Which dial is turned, to what, over which pairs, and what is in force besides.
+/// Settings of a sweep: the dial, its values, the pairs, and the recipe in force besides.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepSetup {
-    /// What the dial is turned to, in this order; all of one dial.
+    /// Values that the dial is turned to, in this order; all of one dial.
     pub values: Vec<Setting>,
     /// The pairs.
     pub pairs: Vec<PairId>,
@@ -52,7 +53,7 @@ pub struct SweepSetup {
     pub recipe: Recipe,
 }
 
-/// What every value does to every pair.
+/// Effect of every value on every pair.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sweep {
     /// The data set's title.
@@ -61,7 +62,7 @@ pub struct Sweep {
     pub dial: Dial,
     /// The unit of its values; empty for a share or a name.
     pub unit: &'static str,
-    /// What the dial stands at without turning it; `None` where something else decides.
+    /// Setting of the dial without turning it; `None` where something else decides.
     pub at: Option<Setting>,
     /// The recipe besides.
     #[serde(serialize_with = "what_decides")]
@@ -70,11 +71,11 @@ pub struct Sweep {
     pub series: Vec<Series>,
     /// Pairs that have no pose whatever the dial says, and why.
     pub left_out: Vec<Remark>,
-    /// What to know about the figures.
+    /// Remarks on the figures, in words.
     pub notes: Vec<String>,
     /// Pairs that were taken.
     pub pairs: usize,
-    /// Whether all pairs asked for were: false if stopped early.
+    /// True where all pairs asked for were taken; false if stopped early.
     pub complete: bool,
     /// Time it took, seconds.
     pub seconds: f64,
@@ -223,7 +224,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
     })
 }
 
-/// What is the same for all pairs.
+/// Settings of a sweep that are the same for all pairs.
 struct SweepRun<'a> {
     dataset: &'a Dataset,
     setup: &'a SweepSetup,
@@ -231,11 +232,11 @@ struct SweepRun<'a> {
     cx: &'a JobCx,
     labels: Option<Labels>,
     dial: Dial,
-    /// Where it stands.
+    /// Setting of the dial without turning it.
     at: Option<Setting>,
     /// The recipe without the dial, then with each value.
     turns: Vec<Recipe>,
-    /// Whether one of them asks the mask model.
+    /// True where one of them asks the mask model.
     sees: bool,
 }
 

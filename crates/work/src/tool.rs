@@ -64,7 +64,7 @@ pub fn units_of(dataset: &Dataset, tool: &str) -> Result<UnitOffer, TaskError> {
     Ok(UnitOffer { tool: tool.to_owned(), units, says: said_beside(file).map_err(fail)? })
 }
 
-/// How a CAD file is read from now on.
+/// Unit in which a CAD file is read from now on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnitSet {
     /// The tool.
@@ -73,7 +73,7 @@ pub struct UnitSet {
     pub unit: ToolUnit,
     /// The file that says so, for all CAD models beside it.
     pub file: PathBuf,
-    /// What it says: the unit, or `auto` where the models beside it are in several.
+    /// Word in that file: the unit, or `auto` where the models beside it are in several.
     pub word: String,
     /// Why it could not be written: then the unit holds as long as this data set is open.
     pub not_written: Option<String>,
@@ -124,7 +124,8 @@ pub fn set_unit(dataset: &Dataset, tool: &str, unit: ToolUnit, replacing: Option
     }
 }
 
-/// What [`UNIT_FILE`] beside a model has to say so that it is read in `unit` and the models beside it can be read.
+/// Word that [`UNIT_FILE`] beside a model has to hold so that it is read in `unit` and the models beside it can be
+/// read.
 fn word_for(model: &Path, unit: ToolUnit) -> Option<String> {
     let beside = std::fs::read_dir(model.parent()?).ok()?.flatten().map(|entry| entry.path());
     let is_model = |file: &PathBuf| file.extension().is_some_and(|end| end.eq_ignore_ascii_case("stl"));
@@ -182,7 +183,7 @@ impl<'a> Tools<'a> {
         self.known(name)
     }
 
-    /// What was odd about the files that were read.
+    /// Oddities of the files that were read.
     pub(crate) fn into_notes(self) -> Vec<Problem> {
         self.notes
     }

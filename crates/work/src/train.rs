@@ -29,7 +29,7 @@ use touch2touch_core::units::counted;
 pub use super::error::Remark;
 pub use trained::{MaskScore, Trained};
 
-/// What it is called in errors.
+/// Name of the task in errors.
 const WHAT: &str = "Train the mask model";
 /// Fewer masks leave much to chance.
 pub(crate) const ENOUGH_MASKS: usize = 20;
@@ -40,14 +40,15 @@ const MOST_MASKS: usize = 5000;
 /// Pairs of tools that nobody named.
 pub(crate) const NO_TOOL: &str = "no tool named";
 
-/// How pairs are divided into those that are learned from and those that are left out.
+/// Division of the pairs into those that are learned from and those that are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrainChoice {
     /// Percent of the pairs that are left out of the training, for the score.
     pub held_out_percent: u8,
     /// Decides which those are, and the order and variation of the masks.
     pub seed: u64,
-    /// Whether pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they are left out.
+    /// True where pairs that the data set keeps for tests (`test_only`) are divided like the rest; else they are left
+    /// out.
     pub test_in_train: bool,
 }
 
@@ -57,7 +58,7 @@ impl Default for TrainChoice {
     }
 }
 
-/// What is trained, from what, and for how long.
+/// Settings of a training: the model, the masks, and the time.
 #[derive(Clone, Debug)]
 pub struct TrainSetup {
     /// The mask model to begin from; it stays as it is.
@@ -68,9 +69,9 @@ pub struct TrainSetup {
     pub engine: EngineChoice,
     /// The division.
     pub choice: TrainChoice,
-    /// How long.
+    /// Length of the training.
     pub tuning: Tuning,
-    /// Where a run that is stopped is kept, to go on from there when the same is asked for again.
+    /// Folder in which a run that is stopped is kept, to go on from there when the same is asked for again.
     pub unfinished: Option<PathBuf>,
     /// The folder of the new bundle, which must not hold anything.
     pub out: PathBuf,
@@ -83,12 +84,12 @@ struct Entry {
     id: PairId,
     name: String,
     tool: Option<String>,
-    /// Whether it is left out of the training.
+    /// True where it is left out of the training.
     held_out: bool,
     places: Vec<MaskPlace>,
 }
 
-/// What a training started now would learn from.
+/// Plan of a training that would start now.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TrainPlan {
     /// Masks to learn from, by tool.
@@ -114,7 +115,7 @@ impl TrainPlan {
         self.tools.values().sum()
     }
 
-    /// What is learned from and what is not, a line each.
+    /// Numbers that are learned from and that are not, a line each.
     pub fn lines(&self) -> Vec<String> {
         let predicted = match self.predicted {
             0 => String::new(),
@@ -142,7 +143,7 @@ impl TrainPlan {
         lines
     }
 
-    /// What to be careful about before it starts.
+    /// Warnings before it starts, in words.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let masks = self.masks();
@@ -183,11 +184,11 @@ impl TrainPlan {
     }
 }
 
-/// What a training would learn from: the masks drawn by hand, on measured imprints and on predictions, of pairs marked
-/// *done*. Reads the labels of these pairs, no data.
+/// Plan of a training: the masks drawn by hand, on measured imprints and on predictions, of pairs marked *done*. Reads
+/// the labels of these pairs, no data.
 ///
-/// Pairs that the data set keeps for tests are left out for the score, unless the choice says otherwise. Of the others so many are as the choice says,
-/// by the pair's name and the seed, at least one where there are two.
+/// Pairs that the data set keeps for tests are left out for the score, unless the choice says otherwise. Of the others
+/// so many are as the choice says, by the pair's name and the seed, at least one where there are two.
 ///
 /// # Errors
 /// If there is no place for labels.

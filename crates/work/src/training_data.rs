@@ -8,8 +8,9 @@ use serde_json::{Value, json};
 
 use super::error::{Remark, TaskError};
 use super::job::JobCx;
-use super::labels::{Labels, MaskPlace, PairLabels, Review};
-use super::mask::{MaskChoice, MaskInputs, MaskRecipe, without_model};
+use super::labels::{Labels, PairLabels, Review};
+use super::mask::{MaskChoice, MaskInputs, MaskRecipe, contact_mask};
+use super::recipe::no_mask_model;
 use super::tool::Tools;
 use super::usable::unusable;
 use crate::io::dataset::Dataset;
@@ -30,25 +31,25 @@ const WHAT: &str = "Write training data";
 /// Pairs in memory at a time.
 const CHUNK: usize = 64;
 
-/// Where touches come from.
+/// Source of touches.
 #[derive(Clone, Copy, Debug)]
 pub enum TouchSource<'a> {
     /// A data set, with what people said about it.
     Dataset(&'a Dataset, &'a Labels, &'a [PairId]),
     /// The simulator.
     Simulator {
-        /// How many grasps.
+        /// Number of grasps.
         grasps: usize,
-        /// What they are drawn from.
+        /// Mix of tools that they are drawn from.
         mix: Mix,
-        /// What is wrong with them.
+        /// Condition that the touches are simulated under.
         condition: Condition,
         /// Decides all of it.
         seed: u64,
     },
 }
 
-/// How the touches are divided.
+/// Division of the touches.
 #[derive(Clone, Copy, Debug)]
 pub struct ShardSetup {
     /// Pairs in a shard.
@@ -70,7 +71,7 @@ pub struct ContactCounts {
     pub unknown: usize,
 }
 
-/// What was written.
+/// Counts of what was written.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct WrittenShards {
     /// Shards written now.
@@ -207,7 +208,7 @@ struct ShardTouch {
     known: Known,
 }
 
-/// What touches are read from.
+/// Source of touches with what is read once for all of them.
 struct Reader<'a> {
     source: TouchSource<'a>,
     /// Without those marked *skip*.
@@ -251,7 +252,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// How shards are called: shards of several sources lie beside each other.
+    /// Start of the shards' names: shards of several sources lie beside each other.
     fn name(&self) -> String {
         match self.source {
             TouchSource::Dataset(dataset, ..) => names::label(&dataset.title),
@@ -364,12 +365,15 @@ fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<
 /// The contact by hand, else near the CAD model at the true pose.
 fn contact(sample: &Sample, pad: PadId, tool: Option<&ToolModel>, labels: &PairLabels) -> Option<(Mask, Known)> {
     let imprint = &sample.pad(pad)?.depth()?.imprint;
-    if let Some(hand) = labels.drawn(&MaskPlace::measured(pad), imprint) {
-        return Some(((*hand.mask).clone(), Known::Hand));
-    }
     let recipe = MaskRecipe::Cad(MaskChoice::default().cad_distance_m.into());
-    let found = without_model(&recipe, imprint, pad, MaskInputs::measured(sample, tool, None)).ok()?;
-    (found.basis == MaskBasis::Source).then_some((found.mask, Known::Cad))
+    let inputs = MaskInputs::measured(sample, tool, Some(labels));
+    let found = contact_mask(&recipe, imprint, pad, inputs, |_| Err(no_mask_model())).ok()?;
+    let known = match found.basis {
+        MaskBasis::Hand => Known::Hand,
+        MaskBasis::Source => Known::Cad,
+        MaskBasis::Depth(_) | MaskBasis::Flat => return None,
+    };
+    Some((found.mask, known))
 }
 
 /// Holes are filled from their borders inward with the mean of what is beside them.

@@ -1,5 +1,5 @@
-//! What runs of training have in common, whichever network they tune: how long ([`Tuning`]), what is kept across a stop,
-//! and how far a run is.
+//! Common parts of all training runs, whichever network they tune: their length ([`Tuning`]), what is kept across a
+//! stop, and the progress of a run.
 
 #[cfg(feature = "tune")]
 mod kept;
@@ -18,7 +18,7 @@ pub(super) use kept::KeptRun;
 #[cfg(feature = "tune")]
 pub(super) use runs::{Look, Runs, steps_within};
 
-/// How long networks are tuned.
+/// Length of the tuning of networks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Tuning {

@@ -1,4 +1,4 @@
-//! What a touch needs before anything is fitted to it or learned from it.
+//! Requirements of a touch before anything is fitted to it or learned from it.
 
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 

@@ -10,7 +10,7 @@ const ANGLE_RAD: [f64; 2] = [5.0 / 180.0 * std::f64::consts::PI, 10.0 / 180.0 * 
 /// Limits of a good and of a usable place, meters: a tenth and a half of what the gripper leaves open.
 const PLACE_M: [f64; 2] = [1e-3, 5e-3];
 
-/// How much a pose can be relied on; a later one is worse.
+/// Grade of a pose by how much it can be relied on; a later one is worse.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Grade {
     /// Nothing is known against it, and nothing for it: there is no truth.
@@ -44,7 +44,7 @@ impl Grade {
     }
 }
 
-/// What speaks for or against a pose.
+/// Verdict on a pose: all that speaks for or against it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// The worst of what is known.

@@ -1,7 +1,6 @@
 //! What belongs to the place where a person is: the workspace on screen and the pane under the pointer.
 
-use super::super::pane::{Kind, Pane};
-use super::super::settings::state::Workspace;
+use super::super::pane::{Kind, Pane, Workspace};
 use super::{Action, Group};
 
 impl Action {

@@ -4,19 +4,20 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::effect::{Access, Effect, Errand};
-use super::super::keys::{PredictionKey, ShiftMode};
-use super::super::services::DataSource;
+use super::super::keys::{ImprintSource, ShiftMode};
+use super::super::source::DataSource;
 use super::super::state::State;
-use super::super::tasks::state::TaskKind;
-use super::super::{settings, tasks};
+use super::super::state::tasks::TaskKind;
+use super::super::{recipe, results, settings, tasks};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::rig::PadId;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models::GenerateInput;
 use touch2touch_work::pairs;
+use touch2touch_work::predict::Generating;
+use touch2touch_work::recipe::Recipe;
 use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
 
 /// The job on screen.
@@ -27,26 +28,18 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     if state.tasks.running.values().any(|task| task.kind == TaskKind::Refit && !task.cancelling) {
         return;
     }
-    let ready = state.can_generate().and_then(|()| state.bundle(BundleKind::Generator).cloned());
-    let bundle = match ready {
-        Ok(bundle) => bundle,
-        Err(absent) => return state.log.error(&TaskError::new(TITLE, absent.text().trim_end_matches('.'))),
-    };
-    let (Some(touch), Some(source)) =
-        (state.touch_key(PadId::default()), state.library.open.as_ref().map(|open| open.source.clone()))
-    else {
-        return;
-    };
-    let Some(recipe) = state.recipe(touch) else { return };
-    let title = format!("{TITLE} of {}", source.title());
-    tasks::start(state, title, Refit { recipe, bundle, source }, effects);
+    let ready = results::can_generate(state).and_then(|()| recipe::bundle(state, BundleKind::Generator));
+    if let Err(absent) = ready {
+        return state.log.error(&TaskError::new(TITLE, absent.text().trim_end_matches('.')));
+    }
+    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+    let recipe = recipe::in_force(state, ImprintSource::Predicted);
+    tasks::start(state, format!("{TITLE} of {}", source.title()), Refit { recipe, source }, effects);
 }
 
 /// Makes shift statistics of a data set.
 pub struct Refit {
-    /// How its touches are predicted; the touch itself is replaced.
-    recipe: PredictionKey,
-    bundle: BundleInfo,
+    recipe: Recipe,
     source: Arc<dyn DataSource>,
 }
 
@@ -56,21 +49,16 @@ impl Errand for Refit {
     const KIND: TaskKind = TaskKind::Refit;
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
-        let Self { recipe, bundle, source } = self;
+        let Self { recipe, source } = self;
         let pairs = pairs::spread(source.index().pairs.len(), Some(PAIRS));
-        let rig = source.rig();
-        let ends = bundle.ends(&rig).transpose().map_err(|err| TaskError::from_error(TITLE, &err))?;
         let setup = StatisticsSetup {
             pairs: pairs.map(|at| PairId(at as u32)).collect(),
-            fingers: rig.pad_list(),
-            input: ends.ok_or_else(|| TaskError::new(TITLE, "the bundle is not a generator"))?.input,
-            config: recipe.config(),
+            fingers: source.rig().pad_list(),
+            recipe,
             dataset: source.title().to_owned(),
-            bundle,
         };
-        let predict = |wanted: GenerateInput<'_>, cx: &JobCx| {
-            let made = access.services.predict(&setup.bundle, recipe.runtime, &setup.config, &[wanted], cx)?;
-            made.into_iter().next().ok_or_else(|| TaskError::new(TITLE, "no answer"))
+        let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
+            access.services.predict(by.bundle, by.engine, by.config, inputs, cx)
         };
         let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), predict, cx)?;
         let saved = access.services.save_statistics(&found)?;

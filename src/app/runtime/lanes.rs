@@ -10,7 +10,7 @@ use strum::IntoEnumIterator as _;
 use super::super::answers::Answer;
 use super::super::jobs::{self, Body, Lane};
 use super::super::keys::DatasetSeq;
-use super::super::results::{Computed, Request};
+use super::super::state::results::{Computed, Request};
 use super::{JobId, Wake, lock};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::caught::caught;

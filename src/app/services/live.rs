@@ -1,8 +1,6 @@
 //! The services of the program: data sets and labels through `io`, models through `infer`, settings in the user's
 //! configuration folder.
 
-mod follow;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,11 +8,12 @@ use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::{PairLabels, Review};
-use super::super::library::state::Place;
 use super::super::services::Opened;
-use super::super::settings::state::{SETTINGS_VERSION, Settings};
-use super::{DataSource, Following, Services};
+use super::super::source::DataSource;
+use super::super::state::labels::{PairLabels, Review};
+use super::super::state::library::Place;
+use super::super::state::settings::{SETTINGS_VERSION, Settings};
+use super::Services;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;
@@ -27,6 +26,7 @@ use touch2touch_work::case::{self, Case, Held};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
+use touch2touch_work::follow::Following;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
 use touch2touch_work::io::case_file;
@@ -188,8 +188,21 @@ impl DataSource for LiveSource {
         Ok(tool_file(&self.dataset, tool)?.mesh)
     }
 
-    fn follow(&self) -> Option<Box<dyn Following>> {
-        follow::start(self)
+    fn follow(&self) -> Option<Following> {
+        Following::continuing(self.dataset.clone())
+    }
+
+    fn grown(&self, dataset: &Arc<Dataset>) -> Option<Arc<dyn DataSource>> {
+        Some(Arc::new(Self {
+            dataset: dataset.clone(),
+            labels: self.labels.continued(dataset),
+            problems: dataset.problems.clone(),
+            reviews: self.reviews.clone(),
+            repeats: self.repeats.clone(),
+            case: None,
+            waiting: self.waiting.clone(),
+            recovered: Recovered::default(),
+        }))
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
@@ -286,7 +299,7 @@ impl Services for LiveServices {
     ) -> Vec<(PredictionKey, Prediction)> {
         let keyed = |kept: KeptPrediction| {
             let bundle = kept.prediction.bundle.clone();
-            (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
+            (PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine }, kept.prediction)
         };
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }

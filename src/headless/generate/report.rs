@@ -1,4 +1,4 @@
-//! What `generate` answers: the metrics of each prediction, their means, and the table.
+//! Answer of `generate`: the metrics of each prediction, their means, and the table.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use touch2touch_core::rig::Text;
 use touch2touch_core::sample::Scale;
 use touch2touch_work::compare::Comparison;
 
-/// What a prediction is measured in.
+/// Unit of a prediction's errors.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Unit {
     Meters,
@@ -19,7 +19,7 @@ pub(super) enum Unit {
     Levels,
 }
 
-/// What PSNR and SSIM of a color picture mean.
+/// Meaning of PSNR and SSIM of a color picture.
 pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor on the 0..255 scale, peak and range 255; the split \
     by footprint, contact and pose need depth and are left out";
 
@@ -34,7 +34,7 @@ pub(super) struct Pair {
     pub(super) vqvae_psnr_db: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) vqvae_ssim: Option<f64>,
-    /// Where the scale was assumed: of the pictures as they are, and after the best straight line.
+    /// Metrics where the scale was assumed: of the pictures as they are, and after the best straight line.
     #[serde(flatten)]
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
@@ -44,12 +44,12 @@ pub(super) struct Pair {
     pub(super) seen: Option<metrics::PixelMetrics>,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) invented: Option<metrics::PixelMetrics>,
-    /// Whether the GelSlim image tells where on the tool it is.
+    /// Verdict on whether the GelSlim image tells where on the tool it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<Ambiguity>,
     /// Of the prediction; where both fingers were predicted in one go, half of it.
     pub(super) seconds: f64,
-    /// Whether it was made before and only read now.
+    /// True where it was made before and only read now.
     pub(super) kept: bool,
     /// With `--seeds`.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -140,11 +140,11 @@ pub(super) struct Report {
     pub(super) steps: u32,
     pub(super) seed: u64,
     pub(super) guidance: f64,
-    /// What is odd about the files, by kind.
+    /// Oddities of the files, by kind.
     pub(super) notes: Vec<Finding>,
 }
 
-/// What PSNR and SSIM mean here.
+/// Meaning of PSNR and SSIM for the scale.
 pub(super) fn convention(scale: Scale) -> &'static str {
     match scale {
         Scale::Measured => "depth in meters, PSNR peak and SSIM range 0.0225 m (the lab's peak)",

@@ -1,4 +1,4 @@
-//! What is stored of pairs, for programs and for people.
+//! Labels that are stored of pairs, for programs and for people.
 
 use std::path::PathBuf;
 
@@ -10,18 +10,18 @@ use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::label_stats::Counts;
 use touch2touch_work::labels::{ImprintOf, PairLabels};
 
-/// What is stored of a pair.
+/// Labels that are stored of a pair.
 #[derive(Debug, Serialize)]
 pub(super) struct Stored {
     name: String,
     review: &'static str,
     /// The fingers with a corrected mask on the measured imprint, and how many pixels it has.
     masks: Vec<(String, usize)>,
-    /// The same of masks on predictions, with what each prediction is.
+    /// Fingers with a corrected mask on a prediction, its number of pixels, and what the prediction is.
     predicted: Vec<(String, usize, String)>,
     /// Accepted poses, each with what it is of.
     accepted: Vec<Accepted>,
-    /// What a person wrote about it; empty for nothing.
+    /// Note that a person wrote about it; empty for none.
     note: String,
 }
 
@@ -80,10 +80,10 @@ impl Accepted {
     }
 }
 
-/// What `label` answers.
+/// Answer of `label`.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
-    /// Where labels lie.
+    /// Folder of the labels.
     pub(super) folder: PathBuf,
     /// The labeled pair, or all that are labeled.
     pub(super) pairs: Vec<Stored>,

@@ -17,7 +17,7 @@ use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propos
 pub(in super::super) struct ProposeArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// What proposes. `cad_hand` takes the poses that were set by hand and accepted.
+    /// Source of the proposals. `cad_hand` takes the poses that were set by hand and accepted.
     #[arg(long, default_value = ProposalSource::default().key(), value_parser = keyed::<ProposalSource>())]
     source: ProposalSource,
     /// The imprints that masks are proposed for.
@@ -34,8 +34,8 @@ pub(in super::super) struct ProposeArgs {
     #[arg(long, value_name = "PAIR")]
     carry_from: Option<String>,
     /// The registration of `cad_registered`.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Who labels; else whom the system says.
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
@@ -71,7 +71,7 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
     let setup = BatchSetup {
         propose: ProposeSetup {
             source: args.source,
-            recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?,
+            recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?,
             pose: None,
             carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
         },

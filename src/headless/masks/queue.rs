@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::recipe::{MappingArgs, RuntimeArg};
+use super::super::recipe::{MappingArgs, RuntimeArg, common};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::RegistrationChoice;
@@ -23,8 +23,9 @@ use touch2touch_work::queue::{Line, QueueBy, queue};
 pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// What the pairs are ordered by: all together, how far the mask drawn by hand is from the mask model's, how many
-    /// pixels the model is unsure of, the error of the angle, or how far kept predictions with different seeds are apart.
+    /// Metric that the pairs are ordered by: all together, how far the mask drawn by hand is from the mask model's, how
+    /// many pixels the model is unsure of, the error of the angle, or how far kept predictions with different seeds are
+    /// apart.
     #[arg(long, default_value = QueueBy::default().key(), value_parser = keyed::<QueueBy>())]
     by: QueueBy,
     /// Only the first so many.
@@ -39,8 +40,8 @@ pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mapping: MappingArgs,
     /// The engine that runs the models.
@@ -55,11 +56,11 @@ pub(in super::super) struct QueueArgs {
     common: Common,
 }
 
-/// What `masks queue` answers.
+/// Answer of `masks queue`.
 #[derive(Serialize)]
 struct Report {
     by: &'static str,
-    /// Whether every pair was looked at.
+    /// True where every pair was looked at.
     complete: bool,
     pairs: Vec<Line>,
 }
@@ -69,15 +70,11 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let bundles = find_all(&[]).bundles;
     let first = |fits: fn(&Bundle) -> bool| bundles.iter().find(|b| fits(b)).map(|b| b.origin().clone());
     let generator = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
+    let mask_model = args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some()));
     Ok(Setup {
         bundles: bundles.iter().filter(generator).map(|b| b.origin().clone()).collect(),
-        mask_bundle: args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some())),
         classifier: first(|b| b.tool_classifier().is_some()),
-        mask: args.mask.choice(),
-        hand: !args.mask.no_hand,
-        engine: args.engine,
-        shift: args.mapping.mode(None)?,
-        runtime: args.runtime.choice(),
+        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.registration, args.runtime)?,
         ..Setup::default()
     })
 }

@@ -21,7 +21,7 @@ pub(in super::super) struct StatsArgs {
     common: Common,
 }
 
-/// What `masks stats` answers.
+/// Answer of `masks stats`.
 #[derive(Serialize)]
 struct Report {
     seconds_per_mask: Option<f64>,

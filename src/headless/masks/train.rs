@@ -51,7 +51,7 @@ pub(in crate::headless) struct TrainArgs {
     /// Says what would be learned from, and trains nothing.
     #[arg(long)]
     dry_run: bool,
-    /// What makes predictions again on which masks were drawn.
+    /// Engine that makes predictions again on which masks were drawn.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
     /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.

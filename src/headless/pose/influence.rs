@@ -15,12 +15,12 @@ use touch2touch_work::io::pt::Tensor;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pose::PoseResult;
 
-/// What a case says of the influence of its pixels.
+/// Influence of a case's pixels on its angle.
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct Influences {
     /// Holds, by finger, degrees to the square millimeter for every pixel; NaN where none was asked.
     pub(super) file: PathBuf,
-    /// Where the angle hangs on most, the first the most.
+    /// Places that the angle hangs on most, the first the most.
     pub(super) places: Vec<NamedPlace>,
 }
 
@@ -46,15 +46,15 @@ impl NamedPlace {
 pub(super) fn write(
     stem: &Path,
     (clouds, sample, tool): (&Clouds, &Sample, &ToolModel),
-    (imprint, engine): (ImprintSource, RegistrationChoice),
+    (imprint, registration): (ImprintSource, RegistrationChoice),
     found: &PoseResult,
 ) -> anyhow::Result<Result<Influences, TaskError>> {
-    let found = match influence(clouds, sample, tool, engine, found.grasp_from_object) {
+    let found = match influence(clouds, sample, tool, registration, found.grasp_from_object) {
         Ok(found) => found,
         Err(why) => return Ok(Err(why)),
     };
-    let engine = engine.to_string().replace([':', '='], "_");
-    let file = names::with_ending(stem, &format!("_{}_{engine}_influence.npz", imprint.key()));
+    let registration = registration.to_string().replace([':', '='], "_");
+    let file = names::with_ending(stem, &format!("_{}_{registration}_influence.npz", imprint.key()));
     let name = |pad| sample.rig.pad_key(pad).to_string();
     let arrays: Vec<(String, Tensor)> = found
         .pixels

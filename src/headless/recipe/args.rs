@@ -1,4 +1,4 @@
-//! Which models are used, and how they are run, as the command line says it.
+//! Models, and how they are run, as the command line says it.
 
 use std::cell::OnceCell;
 use std::path::PathBuf;
@@ -13,9 +13,8 @@ use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::subject::{Mapping, RecipeChange};
 
-/// Which models, and how they are run.
+/// Models, and how they are run.
 #[derive(Debug, Clone, Args)]
 pub struct ModelArgs {
     /// The generator's bundle (default: the shipped one).
@@ -24,7 +23,7 @@ pub struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     pub(super) mask_bundle: Option<PathBuf>,
-    /// How good: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
+    /// Quality: `fast` (one step), `default` (what the bundle recommends) or `sharp` (50 steps). The options below
     /// change single numbers of it.
     #[arg(long, value_parser = keyed::<Preset>(), default_value = Preset::default().key())]
     pub(super) preset: Preset,
@@ -61,22 +60,18 @@ pub struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// The same with what a subject of a comparison wants otherwise. A bundle is named by its folder, or as it calls
-    /// itself.
-    pub(in crate::headless) fn with(&self, wish: &RecipeChange) -> Self {
-        let mut args = self.clone();
-        if let Some(name) = &wish.bundle {
-            let found = self.found.get_or_init(|| bundles::find(&[]));
-            let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
-            args.bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
-        }
-        args.steps = wish.steps.or(args.steps);
-        args.seed = wish.seed.or(args.seed);
-        match wish.shift {
-            None => {}
-            Some(mapping) => args.mapping = MappingArgs::of(mapping),
-        }
-        args
+    /// The same with another generator, named by its folder, or as it calls itself.
+    pub(in crate::headless) fn with_generator(&self, name: &str) -> Self {
+        let found = self.found.get_or_init(|| bundles::find(&[]));
+        let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
+        let bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
+        Self { bundle, ..self.clone() }
+    }
+
+    /// The same with the mapping that is there without options: for what names its own.
+    pub(in crate::headless) fn without_mapping(&self) -> Self {
+        let mapping = MappingArgs { shift: ShiftArg::Exact, fit_parts: CorrectionParts::ALL, stats: None };
+        Self { mapping, ..self.clone() }
     }
 }
 
@@ -109,14 +104,14 @@ pub(super) enum SpacingArg {
     Lab,
 }
 
-/// How the decoder's output becomes meters, as the command line says it.
+/// Mapping of the decoder's output to meters, as the command line says it.
 #[derive(Debug, Clone, Args)]
 pub(in crate::headless) struct MappingArgs {
-    /// How the decoder's output becomes meters.
+    /// Mapping of the decoder's output to meters.
     #[arg(long, value_enum, default_value_t = ShiftArg::Exact)]
     shift: ShiftArg,
-    /// What of the fit of a bundle to a rig is applied with `--shift exact`: `all`, `none`, or some of offset, field, gain,
-    /// response, separated by commas.
+    /// Parts of the fit of a bundle to a rig that are applied with `--shift exact`: `all`, `none`, or some of offset,
+    /// field, gain, response, separated by commas.
     #[arg(long, value_name = "PARTS", default_value = "all", value_parser = fit_parts)]
     fit_parts: CorrectionParts,
     /// The statistics for `--shift refit`, made by `touch2touch stats` with the same bundle.
@@ -126,7 +121,7 @@ pub(in crate::headless) struct MappingArgs {
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 enum ShiftArg {
-    /// What the lab's released script saves: its range is mapped twice.
+    /// Depth as the lab's released script saves it: its range is mapped twice.
     Raw,
     /// The paper's mean-and-deviation shift of that.
     Paper,
@@ -137,16 +132,6 @@ enum ShiftArg {
 }
 
 impl MappingArgs {
-    fn of(mapping: Mapping) -> Self {
-        let (shift, fit_parts) = match mapping {
-            Mapping::Raw => (ShiftArg::Raw, CorrectionParts::ALL),
-            Mapping::Paper => (ShiftArg::Paper, CorrectionParts::ALL),
-            Mapping::Exact => (ShiftArg::Exact, CorrectionParts::ALL),
-            Mapping::Unfitted => (ShiftArg::Exact, CorrectionParts::NONE),
-        };
-        Self { shift, fit_parts, stats: None }
-    }
-
     /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
     pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
         if self.shift != ShiftArg::Refit && self.stats.is_some() {

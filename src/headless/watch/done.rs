@@ -1,4 +1,4 @@
-//! What is written and said of a touch.
+//! Result of a touch, as it is written and said.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -24,7 +24,7 @@ pub(super) struct FingerFigures {
     pub(super) max_m: f64,
     pub(super) mean_m: f64,
     pub(super) contact_px: Option<usize>,
-    /// What the mask is made of: the source's key, `depth` where the mask model found nothing, `flat` where there is no
+    /// Basis of the mask: the source's key, `depth` where the mask model found nothing, `flat` where there is no
     /// contact.
     pub(super) mask: &'static str,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -57,7 +57,7 @@ pub(super) struct Done {
     pub(super) source: Source,
     pub(super) recipe: Value,
     pub(super) files: Vec<String>,
-    /// What is odd about the touch's files.
+    /// Oddities of the touch's files.
     pub(super) notes: Vec<Problem>,
     pub(super) scale: &'static str,
     pub(super) fingers: Vec<FingerFigures>,

@@ -1,4 +1,4 @@
-//! What a result depends on besides the touch.
+//! Choices that a result depends on besides the touch.
 
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// Where the time of one touch went, milliseconds.
+/// Times of the stages of one touch, milliseconds.
 #[derive(Debug, Clone, Copy, Default, Serialize)]
 pub(super) struct Latency {
     /// From the file's last change to its being found whole.

@@ -31,7 +31,7 @@ fn output(stem: &Path, ending: &str) -> PathBuf {
     names::with_ending(stem, &format!("{OUTPUT_MARK}{ending}"))
 }
 
-/// Whether the touch was done before: same file, same recipe, no error.
+/// True where the touch was done before: same file, same recipe, no error.
 pub(super) fn is_done(stem: &Path, source: &Source, recipe: &Value) -> bool {
     let Ok(text) = files::read(&output(stem, "json"), files::SMALL) else { return false };
     let Ok(before) = serde_json::from_slice::<Value>(&text) else { return false };

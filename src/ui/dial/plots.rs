@@ -6,6 +6,7 @@ use eframe::egui::{
 };
 
 use crate::app::command::{DialCommand, LibraryCommand};
+use crate::app::dial;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::theme::{SMALL, medium};
 use touch2touch_core::dataset::PairId;
@@ -23,20 +24,20 @@ const HEIGHT: f32 = 58.0;
 const GAP: f32 = 8.0;
 /// Largest radius of a dot, points.
 const DOT: f32 = 3.0;
-/// How near the pointer has to come to a dot, points.
+/// Distance of the pointer from a dot at which it means it, points.
 const NEAR: f32 = 6.0;
 /// Height of the line plot, points.
 const LINE_HEIGHT: f32 = 88.0;
 /// From this width on a small plot says how many contact points there are, points.
 const WIDE: f32 = 200.0;
 
-/// Where a pair stands, degrees: at its error, or without a truth at its change.
+/// Position of a pair, degrees: its error, or without a truth its change.
 fn place_deg(series: &Series, outcome: &Outcome) -> Option<f64> {
     let radians = if series.has_truth() { outcome.error_rad } else { outcome.change_rad };
     radians.map(|r| r.to_degrees().abs())
 }
 
-/// What all small plots of a series share.
+/// Axes that all small plots of a series share.
 struct Axes {
     /// Degrees at the right end.
     most_deg: f64,
@@ -92,7 +93,7 @@ fn small() -> FontId {
 }
 
 /// One small plot for each value.
-pub(super) fn multiples(cx: &mut Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
+pub(super) fn multiples(cx: &mut Cx<'_>, ui: &mut Ui, sweep: &Sweep, series: &Series) {
     let axes = Axes::of(series);
     // Where the dial stands at none of the values, what is in force is a plot of its own.
     let standing = series.points.iter().any(|point| point.in_force);
@@ -111,7 +112,7 @@ pub(super) fn multiples(cx: &mut Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Se
             for (at, point) in row {
                 let best = at.is_some() && *at == series.best;
                 ui.allocate_ui(vec2(width, HEIGHT + 54.0), |ui| {
-                    ui.vertical(|ui| cell(cx, ui, (found, series), point, best, (&axes, width)));
+                    ui.vertical(|ui| cell(cx, ui, (sweep, series), point, best, (&axes, width)));
                 });
             }
         });
@@ -122,15 +123,15 @@ pub(super) fn multiples(cx: &mut Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Se
 fn cell(
     cx: &mut Cx<'_>,
     ui: &mut Ui,
-    (found, series): (&Sweep, &Series),
+    (sweep, series): (&Sweep, &Series),
     point: &Point,
     best: bool,
     (axes, width): (&Axes, f32),
 ) {
     ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
     let dialed = match point.value {
-        Some(value) => cx.state.is_dialed(value, point.in_force),
-        None => cx.state.dial_recipe() == found.in_force,
+        Some(value) => dial::is_dialed(cx.state, value, point.in_force),
+        None => dial::recipe(cx.state) == sweep.in_force,
     };
     ui.horizontal(|ui| {
         ui.set_width(width);
@@ -142,7 +143,7 @@ fn cell(
             let tip = "The best of these values: most pairs within 5°, then within 10°, then the least median";
             ui.label(RichText::new("best").size(SMALL).color(cx.p.good)).on_hover_text(tip);
         }
-        let Some(value) = point.value.filter(|value| !dialed && value.put(&cx.state.dial_recipe()).is_ok()) else {
+        let Some(value) = point.value.filter(|value| !dialed && value.put(&dial::recipe(cx.state)).is_ok()) else {
             return;
         };
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -278,7 +279,7 @@ fn said(case: &Outcome) -> String {
     lines.join("\n")
 }
 
-/// What is drawn over the values.
+/// Curve that is drawn over the values.
 struct Track {
     name: &'static str,
     unit: &'static str,
@@ -305,7 +306,7 @@ impl Track {
 }
 
 /// Success and median over the value.
-pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
+pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, sweep: &Sweep, series: &Series) {
     let p = cx.p;
     let side = side_color(p, series.source);
     let what = if series.has_truth() { "median error" } else { "median change" };
@@ -332,7 +333,7 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
     let x = |at: usize| plot.left() + 10.0 + at as f32 / last * (plot.width() - 20.0);
     let y = |value: f64, top: f64| plot.bottom() - 3.0 - (value / top) as f32 * (plot.height() - 6.0);
     for (at, point) in series.points.iter().enumerate() {
-        if point.value.is_some_and(|value| cx.state.is_dialed(value, point.in_force)) {
+        if point.value.is_some_and(|value| dial::is_dialed(cx.state, value, point.in_force)) {
             painter.vline(x(at), plot.y_range(), Stroke::new(1.5, p.accent));
         }
     }
@@ -376,7 +377,7 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, found: &Sweep, series: &Series) {
     for (at, point) in series.points.iter().enumerate().filter(|(at, _)| at % every == 0) {
         painter.text(pos2(x(at), plot.bottom() + 2.0), Align2::CENTER_TOP, name(point.value), small(), p.weak);
     }
-    let label = format!("{}: {what} and success over {} values", found.dial.name(), series.points.len());
+    let label = format!("{}: {what} and success over {} values", sweep.dial.name(), series.points.len());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
     let Some(pointer) = response.hover_pos() else { return };
     let near = (0..series.points.len()).min_by(|a, b| (x(*a) - pointer.x).abs().total_cmp(&(x(*b) - pointer.x).abs()));

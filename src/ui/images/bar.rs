@@ -13,7 +13,7 @@ use crate::ui::widget::colorbar::{Colorbar, ColorbarChange};
 use crate::ui::widget::texture::Histogram;
 use touch2touch_core::colormap::{ColorMap, Range};
 
-/// Where a picture takes little of the locked range, a way to see more of it.
+/// Offer of a smaller range where a picture takes little of the locked one.
 pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &Histogram) {
     /// A picture that takes less of the range shows a few of its colors.
     const LITTLE: f32 = 1.0 / 6.0;
@@ -36,9 +36,9 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
     });
 }
 
-/// What setting the range does.
+/// Tooltip of the button that sets the range.
 const AUTO: &str = "Set the range once from what is shown";
-/// What the lock means.
+/// Tooltip of the lock.
 const LOCK: &str = "Locked: colors mean the same in every pair. Unlocked: set from each pair shown";
 
 /// The bar of a pane's pictures: that of errors, else that of depth.

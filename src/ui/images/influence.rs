@@ -1,8 +1,9 @@
-//! Which pixels the registered angle hangs on, over an imprint.
+//! Influence of the pixels on the registered angle, over an imprint.
 
 use eframe::egui::{Align2, Color32, ColorImage, FontId, Rect, Ui, pos2, vec2};
 
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::state::{Lookup, State};
 use crate::ui::cx::Cx;
 use crate::ui::widget::colorbar::gradient;
@@ -16,17 +17,17 @@ use touch2touch_work::influence::Influence;
 /// The colors end here, degrees to the square millimeter: the same in every pair, so that they can be compared.
 const END_DEG_PER_MM2: f32 = 0.02;
 
-/// How much of the imprint the colors let through: enough to know the place.
+/// Opacity of the colors, of 255: enough of the imprint comes through to know the place.
 const OPACITY: u8 = 225;
 
 /// Blue where the angle would fall, red where it would grow, white where nothing hangs on a pixel.
-fn picture(found: &Influence, values: &Grid<f32>) -> ColorImage {
+fn picture(influence: &Influence, values: &Grid<f32>) -> ColorImage {
     let range = Range::symmetric(END_DEG_PER_MM2);
     let pixel = |value: &f32| {
         if value.is_nan() {
             return Color32::TRANSPARENT;
         }
-        let [r, g, b] = ColorMap::Diverging.rgb8(range.unit(found.deg_per_mm2(*value) as f32));
+        let [r, g, b] = ColorMap::Diverging.rgb8(range.unit(influence.deg_per_mm2(*value) as f32));
         Color32::from_rgba_unmultiplied(r, g, b, OPACITY)
     };
     ColorImage::new(values.size(), values.as_slice().iter().map(pixel).collect())
@@ -34,11 +35,11 @@ fn picture(found: &Influence, values: &Grid<f32>) -> ColorImage {
 
 /// The colors over one finger's imprint, with their bar where the finger is the active one; else why there are none.
 pub(super) fn overlay(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: PadId) {
-    if !cx.state.shows_influence(source) {
+    if !results::shows_influence(cx.state, source) {
         return;
     }
     let active = finger == cx.state.selection.finger;
-    let why = match cx.state.influence(source) {
+    let why = match results::influence(cx.state, source) {
         Lookup::Failed(err) => {
             let hint = err.hint.as_ref().map_or(String::new(), |hint| format!(". {hint}"));
             Some(format!("{}{hint}", err.why))
@@ -52,11 +53,11 @@ pub(super) fn overlay(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: I
         }
         return;
     }
-    let Some((key, found)) = cx.state.shown_influence(source) else { return };
-    let Some(values) = &found.pixels[finger] else { return };
+    let Some((key, influence)) = results::shown_influence(cx.state, source) else { return };
+    let Some(values) = &influence.pixels[finger] else { return };
     let slot = ("influence", source, finger);
-    let made = cx.shared.textures.get(ui.ctx(), slot, &key, true, || (picture(found, values), None));
-    output.paint(made.texture.id(), Color32::WHITE);
+    let drawn = cx.shared.textures.get(ui.ctx(), slot, &key, true, || (picture(influence, values), None));
+    output.paint(drawn.texture.id(), Color32::WHITE);
     if active {
         bar(output);
     }
@@ -72,7 +73,7 @@ fn said(cx: &Cx<'_>, output: &CanvasOutput, text: &str) {
     output.painter.galley(place.min, galley, cx.p.caution);
 }
 
-/// Which color is which change of the angle.
+/// Bar of the colors, with the change of the angle that each means.
 fn bar(output: &CanvasOutput) {
     const WIDTH: f32 = 150.0;
     let area = output.painter.clip_rect().shrink(8.0);
@@ -94,21 +95,21 @@ fn bar(output: &CanvasOutput) {
         (1.0, Align2::RIGHT_TOP, format!("+{end} °/mm²")),
     ];
     for (share, anchor, text) in texts {
-        let at = pos2(bar.left() + share * bar.width(), bar.bottom() + 1.0);
-        output.painter.text(at, anchor, text, font.clone(), color);
+        let below = pos2(bar.left() + share * bar.width(), bar.bottom() + 1.0);
+        output.painter.text(below, anchor, text, font.clone(), color);
     }
 }
 
-/// What hangs on a pixel, for the status bar; empty where nothing is shown.
+/// Influence of a pixel, for the status bar; empty where nothing is shown.
 pub(super) fn readout(state: &State, source: ImprintSource, finger: PadId, [x, y]: [usize; 2]) -> String {
-    let found = state.shown_influence(source).filter(|_| state.shows_influence(source));
-    let value = found.and_then(|(key, found)| {
+    let influence = results::shown_influence(state, source).filter(|_| results::shows_influence(state, source));
+    let value = influence.and_then(|(key, influence)| {
         let contact = state.results.clouds.get(&key.0.cloud)?.finger(finger).and_then(|cloud| {
-            let at = cloud.at_pixel(x, y)?;
-            cloud.contact.get(at).copied()
+            let index = cloud.at_pixel(x, y)?;
+            cloud.contact.get(index).copied()
         })?;
-        let value = found.pixels[finger].as_ref()?.get(x, y).copied().filter(|v| v.is_finite())?;
-        Some((found.deg_per_mm2(value), contact))
+        let value = influence.pixels[finger].as_ref()?.get(x, y).copied().filter(|v| v.is_finite())?;
+        Some((influence.deg_per_mm2(value), contact))
     });
     value.map_or(String::new(), |(value, contact)| {
         let sign = if value > 0.0 { "+" } else { "" };

@@ -4,6 +4,7 @@ use eframe::egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, StrokeKind,
 
 use super::Memory;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::settings::MaskTool;
 use crate::ui::cx::Cx;
 use crate::ui::theme::CONTACT;
@@ -11,9 +12,9 @@ use crate::ui::widget::image_canvas::{CanvasMap, CanvasOutput};
 use crate::ui::widget::texture::outline;
 use touch2touch_core::rig::PadId;
 
-/// How much larger than in the picture.
+/// Magnification over the picture.
 const TIMES: f32 = 8.0;
-/// Its side, points.
+/// Side of the lens, points.
 const SIDE: f32 = 152.0;
 /// At least so many pixels are seen across it: where the picture itself is that large, there is no lens.
 const LEAST_PX: f32 = 7.0;
@@ -30,7 +31,7 @@ fn place(area: Rect, pos: Pos2, scale: f32) -> Option<(Rect, f32)> {
     let x = if pos.x + gap + SIDE <= area.right() { pos.x + gap } else { pos.x - gap - SIDE };
     let y = if pos.y - gap - SIDE >= area.top() { pos.y - gap - SIDE } else { pos.y + gap };
     let [x, y] = [(x, area.left(), area.right()), (y, area.top(), area.bottom())]
-        .map(|(at, low, high)| at.clamp(low, (high - SIDE).max(low)));
+        .map(|(place, low, high)| place.clamp(low, (high - SIDE).max(low)));
     Some((Rect::from_min_size(pos2(x, y), vec2(SIDE, SIDE)), magnified))
 }
 
@@ -77,8 +78,8 @@ pub(super) fn show(
         painter: painter.clone(),
         panning: false,
     };
-    if let (true, Ok(mask)) = (cx.state.settings.mask_visible, cx.state.mask_in_force(source, finger)) {
-        let key = (&mask.version, cx.state.imprint_key(source, finger).ok());
+    if let (true, Ok(mask)) = (cx.state.settings.mask_visible, results::mask_in_force(cx.state, source, finger)) {
+        let key = (&mask.version, results::imprint_key(cx.state, source, finger).ok());
         let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask.mask));
         lens.segments(segments, Color32::from_black_alpha(140), 3.5);
         lens.segments(segments, CONTACT, 1.75);

@@ -2,7 +2,7 @@
 
 use touch2touch_core::rig::{PadId, Rig};
 
-/// Which part of a depth picture the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
+/// Window of a depth picture that the color sensor sees (the dashed rectangle), and whether it sees it turned by 180
 /// degrees.
 #[derive(Clone, Copy)]
 pub(in crate::ui) struct Link {
@@ -12,12 +12,12 @@ pub(in crate::ui) struct Link {
 }
 
 impl Link {
-    /// What the rig says; `None` where it does not.
+    /// Window of a finger by the rig; `None` where it has none.
     pub(in crate::ui) fn of(rig: &Rig, finger: PadId) -> Option<Self> {
         Some(Self { window: rig.color_window(finger)?.rectangle(), turned: rig.turned() })
     }
 
-    /// Where a depth pixel appears in the color picture of `size` pixels.
+    /// Position in the color picture of `size` pixels of a depth pixel.
     pub(in crate::ui) fn color_from_depth(self, px: [f32; 2], size: [usize; 2]) -> [f32; 2] {
         let [cx, cy, w, h] = self.window.map(|v| v as f32);
         let share = [(px[0] - cx) / w + 0.5, (px[1] - cy) / h + 0.5].map(|s| if self.turned { 1.0 - s } else { s });

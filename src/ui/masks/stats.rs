@@ -1,4 +1,4 @@
-//! How far the labeling is, and what the masks took.
+//! Progress of the labeling, and the work that the masks took.
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, RichText, Role, Sense, Ui, WidgetInfo, vec2};
 use strum::IntoEnumIterator as _;
@@ -102,7 +102,7 @@ fn counts(cx: &Cx<'_>, ui: &mut Ui, name: &str, counts: &Counts) {
     response.on_hover_text(said);
 }
 
-/// What was drawn twice, the worst first.
+/// Masks that were drawn twice, the worst first.
 fn repeats(cx: &Cx<'_>, ui: &mut Ui, stats: &LabelStats) {
     let masks = &stats.repeats.masks;
     if masks.is_empty() {

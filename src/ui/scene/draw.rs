@@ -5,6 +5,7 @@ use eframe::egui::{FontId, Ui, pos2, vec2};
 use super::{Memory, build, nearest};
 use crate::app::command::LabelsCommand;
 use crate::app::keys::ImprintSource;
+use crate::app::labels;
 use crate::app::labels::StrokeIn3d;
 use crate::app::settings::MaskTool;
 use crate::app::state::State;
@@ -17,7 +18,7 @@ use touch2touch_core::label::DrawTool;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
 
-/// Whether the pointer draws on masks in the 3D views.
+/// True where the pointer draws on masks in the 3D views.
 pub(super) fn is_ready(state: &State) -> bool {
     let drawn = state.workbench.tool == SceneTool::Paint && state.settings.mask.tool != MaskTool::Pan;
     drawn && state.document.is_editable(state.pair_name())
@@ -52,7 +53,7 @@ pub(super) fn show(
     let (finger, radius_px) = match drawn.map(|(stroke, _)| (stroke.place.pad, stroke.drawing.tool)) {
         Some((pad, DrawTool::Brush { radius_px })) => (pad, radius_px),
         Some((pad, _)) => (pad, 0.0),
-        None => (meant.map_or(state.selection.finger, |(finger, _)| finger), state.brush_px(&sight, size_at)),
+        None => (meant.map_or(state.selection.finger, |(finger, _)| finger), labels::brush_px(state, &sight, size_at)),
     };
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
@@ -81,13 +82,13 @@ pub(super) fn show(
     };
     let turn = "Shift + drag turns, the middle button moves";
     let font = FontId::proportional(11.0);
-    let mut at = rect.min + vec2(8.0, 6.0);
+    let mut corner = rect.min + vec2(8.0, 6.0);
     for (text, color) in [(format!("{tool} {reach}"), cx.p.strong), (turn.to_owned(), cx.p.weak)] {
         let galley = painter.layout(text, font.clone(), color, (rect.width() - 16.0).max(40.0));
-        let back = eframe::egui::Rect::from_min_size(at, galley.size());
+        let back = eframe::egui::Rect::from_min_size(corner, galley.size());
         painter.rect_filled(back.expand2(vec2(4.0, 1.0)), 3.0, cx.p.canvas.gamma_multiply(0.8));
         painter.galley(back.min, galley, color);
-        at = pos2(at.x, back.bottom() + 2.0);
+        corner = pos2(corner.x, back.bottom() + 2.0);
     }
     if output.pointer.is_some() {
         let point = cx.shared.readout.take().filter(|_| meant.is_some());

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Memory;
 use crate::app::keys::{CloudKey, ImprintSource};
 use crate::app::settings::SceneLayer;
+use crate::app::{labels, results};
 use crate::ui::cx::Cx;
 
 /// Points as the renderer takes them, made once for a change.
@@ -15,16 +16,16 @@ pub(super) struct SceneGhost {
     key: [CloudKey; 2],
     /// Counts up with every new one.
     pub(super) revision: u64,
-    /// What was dropped and what was added.
+    /// Points that were dropped and points that were added.
     pub(super) points: [(SceneLayer, Arc<[DVec3]>); 2],
 }
 
 /// Finds them where a change is shown and both clouds are there. Between clouds of other imprints nothing is compared.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let held = &mut memory.ghosts[source as usize];
-    let before = cx.state.ghost(source).and_then(|ghost| ghost.clouds);
+    let before = labels::ghost(cx.state, source).and_then(|ghost| ghost.clouds);
     let (Some((old, before)), Ok(Some(new)), Some(now)) =
-        (before, cx.state.cloud_key(source), cx.state.cloud(source).ready())
+        (before, results::cloud_key(cx.state, source), results::cloud(cx.state, source).ready())
     else {
         *held = None;
         return;
@@ -47,7 +48,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     *held = Some(SceneGhost { key: [old.clone(), new], revision: memory.revision, points });
 }
 
-/// What the list says of them.
+/// Entries of the list for them.
 pub(super) fn legend_entries(memory: &Memory, source: ImprintSource) -> Vec<(SceneLayer, String)> {
     let points = memory.ghosts[source as usize].iter().flat_map(|ghost| &ghost.points);
     let name = |layer: SceneLayer| if layer == SceneLayer::Dropped { "dropped" } else { "added" };

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use super::Memory;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::workbench::{SceneTool, WorkbenchCommand};
 use crate::gpu::guides::AXIS_COLORS;
 use crate::gpu::view::Camera;
@@ -16,7 +17,7 @@ use crate::ui::cx::Cx;
 use crate::ui::scene_view::SceneOutput;
 use touch2touch_core::manual::{ManualPose, PoseAxis};
 
-/// How near the pointer must be to a handle, points.
+/// Distance of the pointer from a handle at which it means it, points.
 const NEAR: f32 = 9.0;
 /// Radius of the disc in the middle, points.
 const DISC: f32 = 9.0;
@@ -27,7 +28,7 @@ const ARM: f64 = 44.0;
 /// Cosine of the angle between the view and a plane below which a drag in it is not worked out.
 const EDGE_ON: f64 = 0.12;
 
-/// What is dragged.
+/// Handle that can be dragged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Handle {
     /// y and z.
@@ -58,12 +59,12 @@ pub(super) struct Gizmo {
 }
 
 impl Gizmo {
-    /// Whether no handle is dragged.
+    /// True where no handle is dragged.
     pub(super) fn is_free(&self) -> bool {
         self.drag.is_none()
     }
 
-    /// Whether the primary button is the handles' and does not turn the view.
+    /// True where the primary button is the handles' and does not turn the view.
     pub(super) fn holds(&self, source: ImprintSource) -> bool {
         self.drag.is_some_and(|d| d.source == source) || self.hot.is_some_and(|(of, _)| of == source)
     }
@@ -98,16 +99,16 @@ fn origin(pose: ManualPose) -> DVec3 {
 }
 
 /// Meters that are as long as `points` on the screen at the handles.
-fn meters(camera: &Camera, output: &SceneOutput, ppp: f32, at: DVec3, points: f64) -> f64 {
-    let depth = (camera.eye() - at).dot(camera.axes()[2]);
+fn meters(camera: &Camera, output: &SceneOutput, ppp: f32, center: DVec3, points: f64) -> f64 {
+    let depth = (camera.eye() - center).dot(camera.axes()[2]);
     let scale = if camera.orthographic { 1.0 } else { depth / camera.distance };
     points * f64::from(ppp) * scale.max(1e-3) / camera.px_per_m(output.size)
 }
 
 fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: ManualPose, six_dof: bool) -> Option<Placed> {
-    let at = origin(pose);
-    let center = output.on_screen(camera, at)?;
-    let meter = |points: f64| meters(camera, output, ppp, at, points);
+    let center_m = origin(pose);
+    let center = output.on_screen(camera, center_m)?;
+    let meter = |points: f64| meters(camera, output, ppp, center_m, points);
     let axes: &[PoseAxis] =
         if six_dof { &[PoseAxis::Theta, PoseAxis::Pitch, PoseAxis::Yaw] } else { &[PoseAxis::Theta] };
     let rings = axes.iter().map(|&axis| {
@@ -115,11 +116,11 @@ fn place(camera: &Camera, output: &SceneOutput, ppp: f32, pose: ManualPose, six_
         let (u, v) = n.any_orthonormal_pair();
         let rim = (0..=64).filter_map(|i| {
             let (s, c) = (f64::from(i) / 64.0 * std::f64::consts::TAU).sin_cos();
-            output.on_screen(camera, at + (u * c + v * s) * r)
+            output.on_screen(camera, center_m + (u * c + v * s) * r)
         });
         (axis, rim.collect())
     });
-    let arm = six_dof.then(|| output.on_screen(camera, at + DVec3::X * meter(ARM))).flatten();
+    let arm = six_dof.then(|| output.on_screen(camera, center_m + DVec3::X * meter(ARM))).flatten();
     Some(Placed { center, arm, rings: rings.collect() })
 }
 
@@ -143,19 +144,19 @@ fn to_segment(p: Pos2, a: Pos2, b: Pos2) -> f32 {
 
 /// The pose that a drag of `handle` from `began` to `now` (physical pixels) leads to.
 fn dragged(camera: &Camera, size: [u32; 2], from: ManualPose, handle: Handle, began: DVec2, now: DVec2) -> ManualPose {
-    let at = origin(from);
+    let center_m = origin(from);
     let n = match handle {
         Handle::Ring(axis) => normal(axis),
         Handle::Disc | Handle::Arm => DVec3::X,
     };
     let meet = |px: DVec2| {
         let ray = camera.ray(px, size);
-        (ray.direction.dot(n).abs() > EDGE_ON).then(|| ray.meets_plane(at, n)).flatten()
+        (ray.direction.dot(n).abs() > EDGE_ON).then(|| ray.meets_plane(center_m, n)).flatten()
     };
     // The motion in the plane of the screen through the tool, meters.
     let on_screen = {
         let [right, up, back] = camera.axes();
-        let depth = (camera.eye() - at).dot(back);
+        let depth = (camera.eye() - center_m).dot(back);
         let scale = if camera.orthographic { 1.0 } else { depth / camera.distance };
         let px = now - began;
         (right * px.x - up * px.y) * (scale / camera.px_per_m(size))
@@ -179,7 +180,7 @@ fn dragged(camera: &Camera, size: [u32; 2], from: ManualPose, handle: Handle, be
         Handle::Ring(axis) => {
             let angle = match (meet(began), meet(now)) {
                 (Some(a), Some(b)) => {
-                    let (u, v) = (a - at, b - at);
+                    let (u, v) = (a - center_m, b - center_m);
                     n.dot(u.cross(v)).atan2(u.dot(v))
                 }
                 // Edge-on a ring is a line: along it, half a turn is its length.
@@ -194,13 +195,13 @@ fn dragged(camera: &Camera, size: [u32; 2], from: ManualPose, handle: Handle, be
 pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory, source: ImprintSource, output: &SceneOutput) {
     let bench = &cx.state.workbench;
     let elsewhere = bench.hand.as_ref().is_some_and(|hand| hand.source != source);
-    if bench.tool != SceneTool::Pose || elsewhere || cx.state.tool().ready().is_none() {
+    if bench.tool != SceneTool::Pose || elsewhere || results::tool(cx.state).ready().is_none() {
         if memory.gizmo.holds(source) {
             memory.gizmo = Gizmo::default();
         }
         return;
     }
-    let pose = bench.hand(source).map_or_else(|| cx.state.manual_begins(source), |hand| hand.pose);
+    let pose = bench.hand(source).map_or_else(|| results::manual_begins(cx.state, source), |hand| hand.pose);
     let six_dof = bench.six_dof;
     let camera = memory.views[source as usize].camera;
     let ppp = ui.pixels_per_point();

@@ -1,5 +1,6 @@
 //! The list of what a 3D view draws: what each color means, and switches for it; below it the bar of the color map.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::containers::menu::MenuButton;
 use eframe::egui::{
@@ -27,7 +28,7 @@ const WIDTH: f32 = 152.0;
 
 /// A line of the list.
 struct Row {
-    /// What it switches; `None` explains a color only.
+    /// Layer that it switches; `None` explains a color only.
     layer: Option<SceneLayer>,
     color: Color32,
     text: String,
@@ -61,7 +62,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
     }
 }
 
-/// What is drawn, or could be.
+/// Rows for everything that is drawn, or could be.
 fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
     let state = cx.state;
     let mut rows = Vec::new();
@@ -94,7 +95,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
     }
     if state.workbench.layer == Layer::Reasons
         && memory.layer_colors[source as usize].is_some()
-        && let Some(layers) = state.layers(source).ready()
+        && let Some(layers) = results::layers(state, source).ready()
     {
         // The reasons of the points that are drawn, with their counts.
         for reason in Reason::iter().filter(|r| !matches!(r, Reason::OutsideMask | Reason::InvalidDepth)) {
@@ -112,7 +113,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
 fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static str {
     match layer {
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
-        SceneLayer::Cad if cx.state.by_hand(source).is_some() => "CAD, accepted by hand",
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, accepted by hand",
         SceneLayer::TrueCad => "CAD, true pose",
         SceneLayer::Before => "CAD, before",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
@@ -129,11 +130,11 @@ fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
     ui.horizontal(|ui| {
         ui.set_height(ROW);
         let sense = if look.is_some() { Sense::click() } else { Sense::hover() };
-        let (at, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
+        let (dot, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
         if shown {
-            ui.painter().circle_filled(at.center(), 4.5, row.color);
+            ui.painter().circle_filled(dot.center(), 4.5, row.color);
         } else {
-            ui.painter().circle_stroke(at.center(), 4.0, Stroke::new(1.5, row.color));
+            ui.painter().circle_stroke(dot.center(), 4.0, Stroke::new(1.5, row.color));
         }
         let color = if shown { cx.p.text } else { cx.p.weak };
         let Some((layer, look)) = row.layer.zip(look) else {
@@ -206,8 +207,8 @@ fn bar(rect: Rect) -> Rect {
 fn ends(painter: &Painter, bar: Rect, texts: [String; 3], color: Color32) {
     let anchors = [(0.0, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)];
     for ((share, anchor), text) in anchors.into_iter().zip(texts) {
-        let at = pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0);
-        painter.text(at, anchor, text, FontId::proportional(10.0), color);
+        let below = pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0);
+        painter.text(below, anchor, text, FontId::proportional(10.0), color);
     }
 }
 
@@ -218,9 +219,9 @@ fn colors(painter: &Painter, bar: Rect, map: ColorMap) {
     });
 }
 
-/// Which color is which residual, with the width of the kernel.
+/// Bar of the residuals' colors, with the width of the kernel.
 fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) {
-    let Some(layers) = cx.state.layers(source).ready() else { return };
+    let Some(layers) = results::layers(cx.state, source).ready() else { return };
     let bar = bar(rect);
     colors(painter, bar, RESIDUAL_MAP);
     let end = units::mm(layers.range_m);
@@ -233,7 +234,8 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
     }
 }
 
-/// Which color is which signed distance, `below` being what negative ones are called; the reach is one for all views, and can be changed.
+/// Bar of the signed distances' colors, `below` being what negative ones are called; the reach is one for all views,
+/// and can be changed.
 pub(in crate::ui) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
     let bar = bar(rect);
     let painter = ui.painter_at(rect);

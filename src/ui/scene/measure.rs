@@ -6,6 +6,7 @@ use glam::DVec3;
 use super::{Memory, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
 use crate::ui::cx::Cx;
 use crate::ui::layers::reason_rgb;
@@ -15,7 +16,7 @@ use crate::ui::widget::line::Line;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
 
-/// What a click does.
+/// Does what a click means with the tool in hand.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
     let tool = cx.state.workbench.tool;
     if !output.response.clicked() || matches!(tool, SceneTool::Pose | SceneTool::Paint) {
@@ -45,9 +46,9 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);
     let font = FontId::proportional(12.0);
-    let label = |at: Pos2, text: String, color: Color32| {
+    let label = |place: Pos2, text: String, color: Color32| {
         let galley = painter.layout_no_wrap(text, font.clone(), color);
-        let back = Rect::from_min_size(at + vec2(8.0, -8.0), galley.size());
+        let back = Rect::from_min_size(place + vec2(8.0, -8.0), galley.size());
         painter.rect_filled(back.expand2(vec2(4.0, 2.0)), 3.0, cx.p.canvas.gamma_multiply(0.85));
         painter.galley(back.min, galley, color);
     };
@@ -70,9 +71,9 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
         painter.circle(*place, 4.0, cx.p.accent, Stroke::new(1.0, color));
     }
     if let Some(text) = result(bench.tool, &points)
-        && let Some(Some(at)) = places.get(places.len() / 2)
+        && let Some(Some(middle)) = places.get(places.len() / 2)
     {
-        label(*at, text, color);
+        label(*middle, text, color);
     }
 }
 
@@ -95,10 +96,10 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
     let state = cx.state;
     let Some(cloud) = clouds.finger(picked.finger) else { return };
     let (x, y) = (usize::from(picked.pixel[0]), usize::from(picked.pixel[1]));
-    let imprint = state.imprint(source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
-    let camera = state.touch(picked.finger).ready().and_then(|t| t.camera());
+    let imprint = results::imprint(state, source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
+    let camera = results::touch(state, picked.finger).ready().and_then(|t| t.camera());
     let depth = camera.and_then(|c| c.depth_reference.get(x, y).copied()).zip(imprint).map(|(r, i)| r - i);
-    let layer = state.layers(source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
+    let layer = results::layers(state, source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
     let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));
     let fit = layer.and_then(|(_, fit)| fit);
     let lines = [

@@ -1,4 +1,4 @@
-//! What is drawn over a 3D picture: scale bar, names of the axes, buttons; and how poses are put in words.
+//! Overlay of a 3D picture: scale bar, names of the axes, buttons; and how poses are put in words.
 
 use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
 use glam::DVec3;
@@ -8,6 +8,7 @@ use super::build::{AXIS, axes_origin};
 use super::legend;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::state::Absent;
 use crate::gpu::guides;
@@ -34,13 +35,13 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
 
 /// Angle and figures of the step shown, where that is not the registered pose.
 pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, Color32, String)> {
-    let shown = cx.state.inspected_in(source)?;
+    let shown = results::inspected_in(cx.state, source)?;
     if shown.is_last() && cx.state.inspect.start.is_none() && shown.run == shown.inspection.report().winner {
         return None;
     }
     let angle = units::wrap_angle(-shown.step.grasp_from_object.theta_rad);
     let (mut text, mut color) = (units::text_deg(angle), cx.p.strong);
-    if let Some(truth) = cx.state.truth() {
+    if let Some(truth) = results::truth(cx.state) {
         let truth = units::wrap_angle(-truth.theta_rad);
         let error = units::angle_error(angle, truth);
         text += &format!(" (true {}, error {})", units::text_deg(truth), units::text_deg(error));
@@ -111,7 +112,7 @@ pub(in crate::ui) fn error_color(p: &Palette, error_rad: f64) -> Color32 {
     grade_color(p, Grade::of_angle_error(error_rad))
 }
 
-/// How long a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
+/// Time that a registration took. On a line of its own: no other text wraps elsewhere because a machine was busy.
 pub(in crate::ui) fn pose_time(pose: &PoseResult) -> String {
     if pose.ms < 9.95 { format!("in {:.1} ms", pose.ms) } else { format!("in {:.0} ms", pose.ms) }
 }
@@ -119,10 +120,10 @@ pub(in crate::ui) fn pose_time(pose: &PoseResult) -> String {
 /// Points, residual, stop reason.
 pub(in crate::ui) fn pose_details(pose: &PoseResult) -> String {
     let report = &pose.report;
-    let found = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
+    let rung = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
     let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
-    format!("{} points · residual {} · {}{found}{open}{beyond}", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
+    format!("{} points · residual {} · {}{rung}{open}{beyond}", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {
@@ -131,9 +132,9 @@ fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output:
         (DVec3::Y, "y", guides::AXIS_COLORS[1]),
         (DVec3::Z, "z", guides::AXIS_COLORS[2]),
     ] {
-        if let Some(at) = output.on_screen(camera, axes_origin() + axis * (AXIS * 1.25)) {
+        if let Some(tip) = output.on_screen(camera, axes_origin() + axis * (AXIS * 1.25)) {
             let color = Color32::from_rgb(color[0], color[1], color[2]);
-            painter.text(at, Align2::CENTER_CENTER, name, FontId::proportional(11.0), color);
+            painter.text(tip, Align2::CENTER_CENTER, name, FontId::proportional(11.0), color);
         }
     }
     // In the plane of the target, as all perspective scale bars.

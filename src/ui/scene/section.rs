@@ -36,14 +36,14 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             // What stands behind the slider in the same row.
             let others = if only_window { 350.0 } else { 200.0 };
             let reach = units::mm(SECTION_REACH_M);
-            let mut at = units::mm(section.at_m);
+            let mut place_mm = units::mm(section.at_m);
             ui.spacing_mut().slider_width = (ui.available_width() - others).clamp(24.0, 220.0);
-            let slider = ui.add(Slider::new(&mut at, -reach..=reach).fixed_decimals(1).suffix(" mm"));
+            let slider = ui.add(Slider::new(&mut place_mm, -reach..=reach).fixed_decimals(1).suffix(" mm"));
             let slider = slider.accessible_name(format!("Place of the cut, {side}"));
             // A notch of the wheel over the slider is half a millimeter.
             let notches = if slider.hovered() { ui.input(|i| i.smooth_scroll_delta().y / 40.0) } else { 0.0 };
             if slider.changed() || notches != 0.0 {
-                new.at_m = (at + 0.5 * f64::from(notches)) * 1e-3;
+                new.at_m = (place_mm + 0.5 * f64::from(notches)) * 1e-3;
             }
             if ui.add(Button::new(RichText::new("Other side").size(SMALL))).clicked() {
                 new.flipped = !new.flipped;

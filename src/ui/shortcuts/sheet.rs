@@ -17,7 +17,7 @@ const COLUMN: f32 = 370.0;
 /// Height of a row, points.
 const ROW: f32 = 18.0;
 
-/// What is under way in the sheet.
+/// State of the sheet.
 #[derive(Debug, Default)]
 pub(in crate::ui) struct Memory {
     open: bool,
@@ -27,7 +27,7 @@ pub(in crate::ui) struct Memory {
     asking: Asking,
 }
 
-/// How far the choice of a key has come.
+/// State of the choice of a key.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Asking {
     #[default]
@@ -43,7 +43,7 @@ enum Asking {
 }
 
 impl Memory {
-    /// Whether the next key is an action's new one, and means nothing else.
+    /// True where the next key is an action's new one, and means nothing else.
     pub(in crate::ui) fn waits(&self) -> bool {
         matches!(self.asking, Asking::Key(..))
     }

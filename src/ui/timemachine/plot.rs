@@ -5,7 +5,9 @@ use eframe::egui::{
 };
 
 use super::table::root_mm;
-use crate::app::inspect::{InspectCommand, Inspected, Inspection};
+use crate::app::inspect::InspectCommand;
+use crate::app::inspect::Inspected;
+use crate::app::keys::Inspection;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{Palette, mix};
 use touch2touch_core::align::TraceStep;
@@ -13,7 +15,7 @@ use touch2touch_core::units;
 
 /// Room for the numbers at the left, points.
 const LEFT: f32 = 34.0;
-/// How near the pointer must be to a step to mean it, points.
+/// Distance of the pointer from a step at which it means it, points.
 const NEAR: f32 = 14.0;
 
 /// Both plots over the same steps.
@@ -150,7 +152,7 @@ fn axes(p: &Palette, painter: &Painter, plot: &Plot<'_>) {
     painter.text(end, Align2::RIGHT_BOTTOM, "step; 0 is the applied start", font, p.weak);
 }
 
-/// Where the kernel's width or the points change: costs on both sides of a line are not of one kind.
+/// Lines where the kernel's width or the points change: costs on both sides of a line are not of one kind.
 fn kernels(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize) {
     let font = FontId::proportional(10.0);
     let mut before = None;
@@ -202,9 +204,9 @@ fn curve(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize, shown: boo
 }
 
 fn pins(cx: &Cx<'_>, painter: &Painter, plot: &Plot<'_>) {
-    for (i, pin) in cx.state.pins().into_iter().enumerate() {
+    for (i, pin) in cx.state.inspect.pins_of(cx.state.pair_key()).into_iter().enumerate() {
         let Some(pin) = pin else { continue };
-        let here = pin.source == cx.state.inspect.source && pin.engine == cx.state.settings.pose_engine;
+        let here = pin.source == cx.state.inspect.source && pin.registration == cx.state.settings.registration;
         let step = plot.inspection.step(pin.run, pin.at).filter(|s| s.grasp_from_object == pin.grasp_from_object);
         if let (true, Some(step)) = (here, step) {
             let at = plot.cost_at(pin.at, step);

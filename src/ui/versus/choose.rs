@@ -54,11 +54,11 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
     };
     row(ui, mean, "Mean of seeds", "The mean of predictions that differ in their seeds");
     row(ui, Subject::Stored, "Stored picture", "What another program predicted: NAME_vqvae.png beside the pair");
-    let made = made(cx);
-    if !made.is_empty() {
+    let wishes = made(cx);
+    if !wishes.is_empty() {
         ui.separator();
         ui.label(caption("Made of this touch", cx.p));
-        for wish in made {
+        for wish in wishes {
             let value = Subject::Predicted(wish);
             let text = value.label();
             row(ui, value, text.trim_start_matches("Prediction · "), "This very recipe, of every pair");
@@ -88,17 +88,17 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
 /// The predictions that were made of the active finger, each as the wish that names it.
 fn made(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
     let state = cx.state;
-    let made = state.touch_key(state.selection.finger).and_then(|touch| state.results.made.get(&touch));
+    let keys = state.touch_key(state.selection.finger).and_then(|touch| state.results.made.get(&touch));
     let wish = |key: &crate::app::keys::PredictionKey| {
         let bundle = state.library.bundle(&key.bundle)?;
         Some(RecipeChange {
             bundle: Some(bundle.name.clone()),
-            steps: Some(key.steps),
-            seed: Some(key.seed),
+            steps: Some(key.config.steps),
+            seed: Some(key.config.seed),
             shift: None,
         })
     };
-    made.into_iter().flatten().rev().take(6).filter_map(wish).collect()
+    keys.into_iter().flatten().rev().take(6).filter_map(wish).collect()
 }
 
 /// Model, seed, steps and way to meters; what was changed.

@@ -3,6 +3,7 @@
 use eframe::egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 
 use super::{Letter, color};
+use crate::app::results;
 use crate::app::settings::Versus;
 use crate::ui::cx::Cx;
 use crate::ui::theme::SMALL;
@@ -24,7 +25,7 @@ enum Metric6 {
 
 impl Metric6 {
     const ALL: [Self; 6] = [Self::Psnr, Self::Ssim, Self::Mean, Self::Seen, Self::Invented, Self::Angle];
-    /// Where there is little room.
+    /// Figures where there is little room.
     const FEW: [Self; 4] = [Self::Psnr, Self::Mean, Self::Seen, Self::Angle];
 
     fn name(self) -> &'static str {
@@ -49,16 +50,16 @@ impl Metric6 {
         }
     }
 
-    fn text(self, found: Option<&Comparison>, angle: &str) -> String {
-        let split = found.and_then(|found| found.split);
+    fn text(self, comparison: Option<&Comparison>, angle: &str) -> String {
+        let split = comparison.and_then(|comparison| comparison.split);
         let number = |v: Option<f64>, digits: usize| {
             v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::fixed(v, digits))
         };
         let mm = |v: Option<f64>| number(v.map(units::mm), 2);
         match self {
-            Self::Psnr => number(found.and_then(|found| found.psnr_db), 1),
-            Self::Ssim => number(found.and_then(|found| found.ssim), 3),
-            Self::Mean => mm(found.map(|found| found.mae_m)),
+            Self::Psnr => number(comparison.and_then(|comparison| comparison.psnr_db), 1),
+            Self::Ssim => number(comparison.and_then(|comparison| comparison.ssim), 3),
+            Self::Mean => mm(comparison.map(|comparison| comparison.mae_m)),
             Self::Seen => mm(split.and_then(|split| split.seen.mae)),
             Self::Invented => mm(split.and_then(|split| split.invented.mae)),
             Self::Angle => angle.to_owned(),
@@ -79,8 +80,8 @@ pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let width = ((area.width() - NAMES) / columns.len() as f32).min(92.0);
     let painter = ui.painter_at(area);
     let font = FontId::proportional(SMALL);
-    let row = |at: usize, name: &str, color: Color32, texts: Vec<String>, text_color: Color32| {
-        let y = area.top() + (at as f32 + 0.5) * ROW;
+    let row = |line: usize, name: &str, color: Color32, texts: Vec<String>, text_color: Color32| {
+        let y = area.top() + (line as f32 + 0.5) * ROW;
         painter.text(pos2(area.left(), y), Align2::LEFT_CENTER, name, font.clone(), color);
         for (i, text) in texts.iter().enumerate() {
             let x = area.left() + NAMES + width * (i as f32 + 1.0);
@@ -88,17 +89,19 @@ pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
         }
     };
     row(0, "", cx.p.weak, columns.iter().map(|column| column.name().to_owned()).collect(), cx.p.weak);
-    let poses = [&versus.a, &versus.b].map(|subject| state.subject_pose(subject));
-    for (at, letter) in [(1, Letter::A), (2, Letter::B)] {
+    let poses = [&versus.a, &versus.b].map(|subject| results::subject_pose(state, subject));
+    for (line, letter) in [(1, Letter::A), (2, Letter::B)] {
         let subject = letter.of(versus);
         let against = (*subject != Subject::Measured)
-            .then(|| state.subjects_compared(subject, &Subject::Measured, finger).ready())
+            .then(|| results::subjects_compared(state, subject, &Subject::Measured, finger).ready())
             .flatten();
-        let angle = poses[at - 1].map_or("–".into(), angle);
+        let angle = poses[line - 1].map_or("–".into(), angle);
         let texts = columns.iter().map(|column| column.text(against, &angle)).collect();
-        row(at, &format!("{letter:?}"), color(cx.p, versus, letter), texts, cx.p.text);
+        row(line, &format!("{letter:?}"), color(cx.p, versus, letter), texts, cx.p.text);
     }
-    let apart = (versus.a != versus.b).then(|| state.subjects_compared(&versus.a, &versus.b, finger).ready()).flatten();
+    let apart = (versus.a != versus.b)
+        .then(|| results::subjects_compared(state, &versus.a, &versus.b, finger).ready())
+        .flatten();
     let turned = match poses {
         [Some(a), Some(b)] => format!("{:+.1}", units::wrap_angle(a.angle_rad - b.angle_rad).to_degrees()),
         _ => "–".into(),

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{Letter, color};
 use crate::app::keys::{CloudDifferenceKey, CloudKey, DatasetSeq};
+use crate::app::results;
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
@@ -85,11 +86,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
 /// Why there is nothing to draw.
 fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let state = cx.state;
-    if let Some(absent) = state.seed_pose_absent() {
+    if let Some(absent) = results::seed_pose_absent(state) {
         return super::absent_text(cx, ui, absent);
     }
     for subject in [&versus.a, &versus.b] {
-        let lookup = state.subject(subject, state.selection.finger);
+        let lookup = results::subject(state, subject, state.selection.finger);
         if lookup.shown().is_none() {
             return super::instead(cx, ui, lookup);
         }
@@ -100,9 +101,9 @@ fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
 /// Makes what the renderer needs, where it changed.
 fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
     for (held, letter) in space.clouds.iter_mut().zip([Letter::A, Letter::B]) {
-        let found = cx.state.subject_points(letter.of(versus));
+        let points = results::subject_points(cx.state, letter.of(versus));
         let same_pair = |key: &CloudKey| key.place().map(|(pair, _)| pair) == cx.state.pair_key();
-        match found {
+        match points {
             Some((key, _)) if held.as_ref().is_some_and(|held| held.key == key) => {}
             Some((key, clouds)) => {
                 space.revision += 1;
@@ -113,11 +114,11 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
             None => *held = None,
         }
     }
-    let apart = cx.state.subjects_apart(&versus.a, &versus.b).filter(|_| versus.mode == VersusMode::Apart);
+    let apart = results::subjects_apart(cx.state, &versus.a, &versus.b).filter(|_| versus.mode == VersusMode::Apart);
     match (apart, &space.apart) {
         (None, _) => space.apart = None,
         (Some((key, _)), Some((held, ..))) if *held == key => {}
-        (Some((key, found)), _) => {
+        (Some((key, difference)), _) => {
             if let Some(clouds) = cx.state.results.clouds.get(&key.a) {
                 space.revision += 1;
                 let colored = |pad, values: &Vec<f32>| {
@@ -125,7 +126,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
                     Some(Colored { points, values: values.as_slice().into() })
                 };
                 let mut fingers = PerPad::default();
-                for (pad, values) in found.points.entries() {
+                for (pad, values) in difference.points.entries() {
                     fingers[pad] = colored(pad, values);
                 }
                 space.apart = Some((key, space.revision, fingers));
@@ -184,7 +185,7 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
     let Some(held) = &space.mesh else { return };
     let cad = cx.state.settings.scene.layer(SceneLayer::Cad);
     for letter in [Letter::A, Letter::B] {
-        let Some(pose) = cx.state.subject_pose(letter.of(versus)) else { continue };
+        let Some(pose) = results::subject_pose(cx.state, letter.of(versus)) else { continue };
         if (flipped && letter == Letter::A) || !cad.shown {
             continue;
         }
@@ -214,20 +215,20 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
     }
 }
 
-/// What is what, and the bar of the distances.
+/// Legend of the two subjects, and the bar of the distances.
 fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: eframe::egui::Rect) {
     let apart = versus.mode == VersusMode::Apart && !flipped;
     let font = FontId::proportional(SMALL);
-    let mut at = rect.min + vec2(8.0, 8.0);
+    let mut corner = rect.min + vec2(8.0, 8.0);
     let painter = ui.painter_at(rect);
     let mut line = |text: String, color: Color32| {
-        painter.text(pos2(at.x, at.y), Align2::LEFT_TOP, text, font.clone(), color);
-        at.y += 14.0;
+        painter.text(pos2(corner.x, corner.y), Align2::LEFT_TOP, text, font.clone(), color);
+        corner.y += 14.0;
     };
     if apart {
         line("A, colored by its distance to B".into(), cx.p.text);
-        if let Some((_, found)) = cx.state.subjects_apart(&versus.a, &versus.b) {
-            let rms = units::text_mm(found.contact_rms_m);
+        if let Some((_, difference)) = results::subjects_apart(cx.state, &versus.a, &versus.b) {
+            let rms = units::text_mm(difference.contact_rms_m);
             line(format!("contact points: {rms} (root mean square)"), cx.p.text);
         }
     } else {

@@ -28,15 +28,15 @@ pub(crate) struct Colorbar<'a> {
     pub symmetric: bool,
     /// Of the picture above, in meters.
     pub histogram: Option<&'a Histogram>,
-    /// Whether the range stays when another sample is shown; `None` shows no lock.
+    /// True where the range stays when another sample is shown; `None` shows no lock.
     pub locked: Option<bool>,
     /// Beside the unit, e.g. `assumed scale`.
     pub note: &'a str,
-    /// What setting the range from what is shown does, and what the lock means.
+    /// Tooltips of the button that sets the range from what is shown, and of the lock.
     pub tips: [String; 2],
 }
 
-/// What a person asked of the bar.
+/// Change that a person asked of the bar.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ColorbarChange {
     /// This range, millimeters.
@@ -185,8 +185,8 @@ fn paint_histogram(painter: &egui::Painter, histogram: &Histogram, range: Range,
     let span = histogram.span.hi - histogram.span.lo;
     for (i, n) in histogram.counts.iter().enumerate() {
         // Histograms are of meters, the bar is in millimeters.
-        let at = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
-        let (a, b) = (at(i as f32), at(i as f32 + 1.0));
+        let value_mm = |k: f32| (histogram.span.lo + span * k / bins) * 1e3;
+        let (a, b) = (value_mm(i as f32), value_mm(i as f32 + 1.0));
         if *n == 0 || b < range.lo || a > range.hi {
             continue;
         }

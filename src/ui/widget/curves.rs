@@ -29,7 +29,7 @@ pub fn show(ui: &mut Ui, size: Vec2, heading: &str, curves: &[&Curve]) {
         return;
     }
     let span = (top - least).max(1e-9);
-    let at = |point: &[f64; 2]| {
+    let place = |point: &[f64; 2]| {
         let right = point[0] / steps;
         let up = (point[1] - least) / span;
         pos2(plot.left() + plot.width() * right as f32, plot.bottom() - 2.0 - (plot.height() - 4.0) * up as f32)
@@ -41,7 +41,7 @@ pub fn show(ui: &mut Ui, size: Vec2, heading: &str, curves: &[&Curve]) {
     painter.text(area.right_bottom() - vec2(4.0, 0.0), Align2::RIGHT_BOTTOM, last, small, p.weak);
     let mut near: Option<(f32, &Curve, &[f64; 2])> = None;
     for (i, curve) in curves.iter().enumerate() {
-        let line: Vec<Pos2> = curve.points.iter().filter(|point| point[1].is_finite()).map(at).collect();
+        let line: Vec<Pos2> = curve.points.iter().filter(|point| point[1].is_finite()).map(place).collect();
         let stroke = if i + 1 == curves.len() { Stroke::new(1.5, p.accent) } else { Stroke::new(1.0, p.weak) };
         if let [only] = line.as_slice() {
             painter.circle_filled(*only, 2.0, stroke.color);
@@ -49,7 +49,7 @@ pub fn show(ui: &mut Ui, size: Vec2, heading: &str, curves: &[&Curve]) {
         painter.add(Shape::line(line, stroke));
         if let Some(pointer) = response.hover_pos() {
             for point in &curve.points {
-                let distance = at(point).distance(pointer);
+                let distance = place(point).distance(pointer);
                 if near.is_none_or(|(least, ..)| distance < least) {
                     near = Some((distance, curve, point));
                 }
@@ -57,7 +57,7 @@ pub fn show(ui: &mut Ui, size: Vec2, heading: &str, curves: &[&Curve]) {
         }
     }
     if let Some((_, curve, point)) = near {
-        painter.circle_filled(at(point), 3.0, p.accent);
+        painter.circle_filled(place(point), 3.0, p.accent);
         response.on_hover_text(format!(
             "{}, step {:.0}: {} {}",
             curve.name,

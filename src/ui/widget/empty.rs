@@ -1,4 +1,4 @@
-//! What a pane says when it has nothing to show, with the action that brings it.
+//! Sentence of a pane that has nothing to show, with the action that brings it.
 
 use eframe::egui::{self, Align, Layout, RichText, Ui, UiBuilder, vec2};
 

@@ -5,7 +5,7 @@ use eframe::egui::{
     Vec2, WidgetInfo, pos2, vec2,
 };
 
-/// What part of an image is seen. Shared by all canvases of a group, whatever their sizes.
+/// Part of an image that is seen. Shared by all canvases of a group, whatever their sizes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewTransform {
     /// The point of the image in the middle of the pane, as a share of its width and height.
@@ -33,11 +33,11 @@ impl ViewTransform {
 /// Between image pixels and the screen. (0, 0) is the center of the top-left pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CanvasMap {
-    /// Where the whole image lies on the screen.
+    /// Rectangle of the whole image on the screen, points.
     pub image_rect: Rect,
     /// Points per image pixel.
     pub scale: f32,
-    /// Whether the image is shown rotated by 180 degrees.
+    /// True where the image is shown rotated by 180 degrees.
     pub rotated: bool,
     /// Columns and rows.
     pub size: [usize; 2],
@@ -66,7 +66,7 @@ impl CanvasMap {
         [p.x - 0.5, p.y - 0.5]
     }
 
-    /// Whether the pixel lies in the image.
+    /// True where the pixel lies in the image.
     pub(crate) fn contains(&self, px: [f32; 2]) -> bool {
         px[0] >= -0.5 && px[1] >= -0.5 && px[0] < self.size[0] as f32 - 0.5 && px[1] < self.size[1] as f32 - 0.5
     }
@@ -77,7 +77,7 @@ impl CanvasMap {
     }
 }
 
-/// What the primary button does on a canvas.
+/// Use of the primary button on a canvas.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Primary {
     /// Moves the image.
@@ -92,15 +92,15 @@ pub(crate) struct ImageCanvas<'a> {
     pub label: &'a str,
     /// Columns and rows of the picture.
     pub size: [usize; 2],
-    /// Whether it is shown rotated by 180 degrees.
+    /// True where it is shown rotated by 180 degrees.
     pub rotated: bool,
-    /// What the primary button does.
+    /// Use of the primary button.
     pub primary: Primary,
     /// Behind the picture.
     pub background: Color32,
 }
 
-/// What happened on a canvas, and what is needed to draw on it.
+/// Events on a canvas, and what is needed to draw on it.
 pub(crate) struct CanvasOutput {
     /// The pane's response.
     pub response: Response,
@@ -110,7 +110,7 @@ pub(crate) struct CanvasOutput {
     pub hovered: Option<[f32; 2]>,
     /// Draws within the pane.
     pub painter: Painter,
-    /// Whether the view was changed: the caller may have to store it.
+    /// True where the view was changed: the caller may have to store it.
     pub panning: bool,
 }
 
@@ -139,11 +139,11 @@ impl ImageCanvas<'_> {
                 && let Some(pos) = ui.input(|i| i.pointer.hover_pos())
             {
                 let before = CanvasMap::new(rect, self.size, *view, false);
-                let at = (pos - before.image_rect.min) / before.image_rect.size().max(Vec2::splat(1.0));
+                let share = (pos - before.image_rect.min) / before.image_rect.size().max(Vec2::splat(1.0));
                 view.zoom *= factor;
                 view.clamp();
                 let after = CanvasMap::new(rect, self.size, *view, false);
-                let drift = after.image_rect.min + at * after.image_rect.size() - pos;
+                let drift = after.image_rect.min + share * after.image_rect.size() - pos;
                 let drift = drift / after.image_rect.size().max(Vec2::splat(1.0));
                 view.center = [view.center[0] + drift.x, view.center[1] + drift.y];
             }
@@ -166,7 +166,7 @@ impl ImageCanvas<'_> {
     }
 }
 
-/// Whether pixels are large enough on screen to be shown as squares.
+/// True where pixels are large enough on screen to be shown as squares.
 pub(crate) fn shows_squares(map: &CanvasMap, pixels_per_point: f32) -> bool {
     map.scale * pixels_per_point >= 4.0
 }

@@ -2,7 +2,7 @@
 
 use eframe::egui::{Align2, Color32, FontId, Rect, Response, Role, Sense, Ui, WidgetInfo, pos2, vec2};
 
-/// How the lines of a list look.
+/// Look of the lines of a list.
 #[derive(Clone, Copy, Debug)]
 pub struct Line {
     /// Height of a line, points.

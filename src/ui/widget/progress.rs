@@ -1,4 +1,4 @@
-//! What runs, how far it is, and a way to stop it.
+//! Progress bar of a running task.
 
 use eframe::egui::{self, Color32, FontId, Rect, Response, Role, Sense, Ui, WidgetInfo, vec2};
 

@@ -14,7 +14,7 @@ use touch2touch_core::picture::{self, Rgb8};
 /// Bars in a histogram.
 pub(crate) const BINS: usize = 64;
 
-/// How many values fall into each of [`BINS`] equal parts of a span.
+/// Number of values in each of [`BINS`] equal parts of a span.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Histogram {
     /// Counts, from the lower end to the upper.
@@ -78,7 +78,7 @@ pub struct Textures {
 /// A mask on the graphics card.
 struct MaskPicture {
     texture: TextureHandle,
-    /// What is on the card.
+    /// Mask that is on the card.
     mask: Arc<Mask>,
     key: u64,
     used: u64,
@@ -289,8 +289,8 @@ mod tests {
     fn flying_pixels_do_not_widen_the_bulk() {
         let mut values: Vec<f32> = (0..1000u16).map(|i| 0.004 + f32::from(i) * 1e-6).collect();
         values.extend([0.1; 3]);
-        let found = Histogram::of(&values).unwrap();
-        let (bulk, bin) = (found.bulk(), 0.096 / BINS as f32);
+        let histogram = Histogram::of(&values).unwrap();
+        let (bulk, bin) = (histogram.bulk(), 0.096 / BINS as f32);
         assert!(bulk.lo == 0.004 && bulk.hi <= 0.005 + bin + 1e-6, "{bulk:?}");
         let even: Vec<f32> = (0..10_000u16).map(f32::from).collect();
         let bulk = Histogram::of(&even).unwrap().bulk();

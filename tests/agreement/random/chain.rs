@@ -2,6 +2,7 @@
 
 use serde_json::json;
 use touch2touch::app::seeds::SeedsCommand;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::ensemble::AngleFan;
 use touch2touch_core::units::angle_error;
@@ -57,12 +58,12 @@ pub(in crate::agreement) fn a_random_recipe_has_the_same_depth_chain_in_the_pane
                 both.studio.send(ViewCommand::SelectFinger(finger).into());
                 let state = &both.studio.state;
                 // An image folder has one finger.
-                let Some(found) = state.ledger(finger).ready() else { continue };
+                let Some(found) = results::ledger(state, finger).ready() else { continue };
                 let said = both.said(Pane::Ledger).unwrap();
                 for (part, shown) in chain(found).as_object().unwrap() {
                     count += same(shown, &said[part], &format!("{} {part}, {recipe:?}", state.pair_name()));
                 }
-                let touch = state.sample().ready().unwrap().pad(finger).unwrap();
+                let touch = results::sample(state).ready().unwrap().pad(finger).unwrap();
                 let left_open = touch.color().and_then(|color| ambiguity(&color.difference));
                 count += same(&written(&left_open), &said["ambiguity"], "ambiguity");
                 let (_, config) = recipe.generator.as_ref().unwrap();
@@ -107,7 +108,7 @@ pub(in crate::agreement) fn the_seeds_of_a_random_recipe_have_one_mean_spread_an
         for finger in both.studio.state.rig().pads() {
             both.studio.send(ViewCommand::SelectFinger(finger).into());
             let state = &both.studio.state;
-            let Some(found) = state.ensemble(finger).ready() else { continue };
+            let Some(found) = results::ensemble(state, finger).ready() else { continue };
             let said = both.said(Pane::Seeds).unwrap();
             let of = said["pairs"].as_array().unwrap();
             let [row] = &of[..] else { panic!("{of:?}") };
@@ -125,16 +126,16 @@ pub(in crate::agreement) fn the_seeds_of_a_random_recipe_have_one_mean_spread_an
                 count += map.map_or(0, |map| same_pixels(map, &file, &format!("{what}, {recipe:?}")));
             }
             // The prediction itself is what is on screen.
-            let imprint = state.imprint(ImprintSource::Predicted, finger).ready().unwrap();
+            let imprint = results::imprint(state, ImprintSource::Predicted, finger).ready().unwrap();
             count += same_pixels(imprint, &PathBuf::from(format!("{stem}.npy")), "the first seed");
         }
         counts.push(count);
         let state = &both.studio.state;
-        if state.tool_name().is_ok() {
+        if results::tool_name(state).is_ok() {
             let angles: Vec<Option<f64>> =
-                state.seed_poses().iter().map(|pose| pose.map(|pose| pose.angle_rad)).collect();
-            let truth = state.sample().ready().unwrap().grasp_from_object.map(|pose| pose.inverse().theta_rad);
-            let words = state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+                results::seed_poses(state).iter().map(|pose| pose.map(|pose| pose.angle_rad)).collect();
+            let truth = results::sample(state).ready().unwrap().grasp_from_object.map(|pose| pose.inverse().theta_rad);
+            let words = recipe::in_force(state, ImprintSource::Predicted).words(Stage::Pose).list();
             let more = ["--imprint", "predicted", "--seeds", "3"].map(str::to_owned);
             let said = both.of_pair(&["pose"], more.into_iter().chain(words)).unwrap();
             for (part, shown) in fan(&angles, truth).as_object().unwrap() {

@@ -3,6 +3,7 @@
 use proptest::option;
 use proptest::prelude::*;
 use strum::IntoEnumIterator as _;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode};
 use touch2touch_work::compare::Comparison;
@@ -64,13 +65,15 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
                     ("a_b", &versus.a, Some(versus.b.clone())),
                 ] {
                     let shown = match other {
-                        Some(other) => figures(state.subjects_compared(one, &other, pad).ready().expect(&what)),
+                        Some(other) => {
+                            figures(results::subjects_compared(state, one, &other, pad).ready().expect(&what))
+                        }
                         None => Value::Null,
                     };
                     count += same(&shown, &finger[key], &format!("{what}: {key}"));
                 }
             }
-            let [a, b] = [&versus.a, &versus.b].map(|subject| state.subject_pose(subject));
+            let [a, b] = [&versus.a, &versus.b].map(|subject| results::subject_pose(state, subject));
             assert_eq!(said["poses"].is_null(), a.is_none() || b.is_none(), "{what}: {}", said["poses"]);
             for (key, pose) in [("a", a), ("b", b)] {
                 let Some(pose) = pose.filter(|_| !said["poses"].is_null()) else { continue };

@@ -3,6 +3,7 @@
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::ExportCommand;
 use touch2touch::app::export::Output;
+use touch2touch::app::{recipe, results};
 use touch2touch_work::case::{self, Case};
 use touch2touch_work::io::case_file;
 use touch2touch_work::mask::MaskSource;
@@ -25,7 +26,7 @@ pub(in crate::agreement) fn a_random_recipe_exports_the_same_files_by_button_and
             for (pane, source) in [Pane::SceneMeasured, Pane::ScenePredicted].into_iter().zip(ImprintSource::iter()) {
                 let what = format!("{} {source:?}, {recipe:?}", both.studio.state.pair_name());
                 let folder = both.home.parent().unwrap().join(format!("exported-{at}-{}", source.key()));
-                let there = both.studio.state.pose(source).ready().is_some();
+                let there = results::pose(&both.studio.state, source).ready().is_some();
                 both.studio.send(ExportCommand::Write(Output::Pair(source), folder.clone()).into());
                 let said = both.said(pane);
                 assert_eq!(there, said.is_ok(), "{what}: {said:?}");
@@ -118,7 +119,7 @@ pub(in crate::agreement) fn a_case_of_a_random_recipe_is_the_same_by_button_and_
         let by_studio = both.home.parent().unwrap().join("studio.t2tcase");
         both.studio.send(ExportCommand::Write(Output::Case, by_studio.clone()).into());
         let by_verb = both.at("verb.t2tcase");
-        let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
         let out = ["--out".to_owned(), by_verb.clone()];
         let said = both.of_pair(&["case", "make"], out.into_iter().chain(words));
         assert_eq!(by_studio.is_file(), said.is_ok(), "{what}: {said:?}");

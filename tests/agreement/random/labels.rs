@@ -4,6 +4,7 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::LabelsCommand;
 use touch2touch::app::labels::Review;
 use touch2touch::app::settings::{MaskTool, ProposalSource, prefer};
+use touch2touch::app::{recipe, results};
 use touch2touch_core::label::{CleanKind, CleanUp};
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
@@ -63,7 +64,7 @@ pub(in crate::agreement) fn random_edits_of_masks_by_hand_are_those_of_the_verb(
     for pair in 0..2 {
         let recipe = draws.posed();
         both.predict(&recipe, pair);
-        let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
         let label = |both: &Both, more: &[&str]| {
             let all = words.iter().cloned().chain(more.iter().map(ToString::to_string));
             both.of_pair(&["label"], all).unwrap_or_else(|err| panic!("{more:?} {words:?}: {err}"))
@@ -105,7 +106,7 @@ pub(in crate::agreement) fn random_edits_of_masks_by_hand_are_those_of_the_verb(
         both.studio.send(LabelsCommand::SetNote(pair_name, "the edge".into()).into());
         for source in ImprintSource::iter() {
             both.studio.send(LabelsCommand::AcceptPose(source, true).into());
-            if both.studio.state.pose(source).ready().is_some() {
+            if results::pose(&both.studio.state, source).ready().is_some() {
                 label(&both, &["--accept", source.key()]);
             }
         }
@@ -145,7 +146,7 @@ pub(in crate::agreement) fn masks_proposed_by_a_random_recipe_for_all_pairs_are_
         both.studio.send(LabelsCommand::ProposeAll.into());
         let what = format!("{proposal:?} {imprint:?}, {recipe:?}: {:?}", both.studio.state.log.entries.back());
         let begin = ["masks", "propose", &both.path, "--source", proposal.key(), "--imprint", imprint.key()];
-        let words = both.studio.state.in_force(imprint).until(Stage::Pose).words(Stage::Pose).list();
+        let words = recipe::in_force(&both.studio.state, imprint).until(Stage::Pose).words(Stage::Pose).list();
         let said = both.run(&begin.map(str::to_owned).into_iter().chain(words).collect::<Vec<_>>());
         let said = said.unwrap_or_else(|err| panic!("{what}: {err}"));
         counts.push(same_labels(&both, &twin, &what));

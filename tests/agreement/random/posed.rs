@@ -3,6 +3,7 @@
 use strum::IntoEnumIterator as _;
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::state::Lookup;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Rejection;
@@ -49,7 +50,7 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
                     both.studio.send(InspectCommand::Start(start).into());
                     let what = format!("{} {source:?} {start:?}, {recipe:?}", both.studio.state.pair_name());
                     let said = both.said(Pane::TimeMachine);
-                    let shown = both.studio.state.inspection();
+                    let shown = results::inspection(&both.studio.state);
                     let Lookup::Ready(found) = shown else {
                         same_reason(shown, said, &what);
                         continue;
@@ -82,7 +83,7 @@ pub(in crate::agreement) fn a_basin_map_is_the_same_in_the_pane_and_by_the_verb(
             both.studio.send(InspectCommand::Plane(plane).into());
             let what = format!("{} {source:?} {plane:?}, {recipe:?}", both.studio.state.pair_name());
             let said = both.said(Pane::BasinMap);
-            let shown = both.studio.state.basin();
+            let shown = results::basin(&both.studio.state);
             let Lookup::Ready(found) = shown else {
                 same_reason(shown, said, &what);
                 continue;
@@ -141,10 +142,10 @@ pub(in crate::agreement) fn what_a_random_angle_hangs_on_is_the_same_over_the_im
             both.predict(&recipe, 19 * at);
             for source in ImprintSource::iter() {
                 let what = format!("{} {source:?}, {recipe:?}", both.studio.state.pair_name());
-                let words = both.studio.state.in_force(source).until(Stage::Pose).words(Stage::Pose).list();
+                let words = recipe::in_force(&both.studio.state, source).until(Stage::Pose).words(Stage::Pose).list();
                 let more = ["--imprint", source.key(), "--influence", &both.at("influence")].map(str::to_owned);
                 let said = both.of_pair(&["pose"], more.into_iter().chain(words));
-                let shown = both.studio.state.influence(source);
+                let shown = results::influence(&both.studio.state, source);
                 let Lookup::Ready(found) = shown else {
                     same_reason(shown, said, &what);
                     continue;

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{DialCommand, EvaluateCommand};
 use touch2touch::app::dial::DialPairs;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::recipe::Stage;
@@ -36,7 +37,7 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
         both.show(&[Pane::Predicted, Pane::Error, Pane::Metrics]);
         let recipe = draws.posed();
         put(&mut both.studio, &recipe);
-        let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Prediction).list();
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Prediction).list();
         both.studio.send(PredictCommand::Refit.into());
         assert!(matches!(both.studio.state.settings.shift, ShiftMode::Refit(_)), "{:?}", both.studio.state.log.entries);
         let shown = only_file(&both.home.parent().unwrap().join("studio/statistics"));
@@ -52,7 +53,7 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
         let said = both.said(Pane::Generate).unwrap();
         let mut count = 0;
         for finger in both.studio.state.rig().pads() {
-            let Some(found) = both.studio.state.comparison(finger).ready() else { continue };
+            let Some(found) = results::comparison(&both.studio.state, finger).ready() else { continue };
             let name = both.studio.state.finger_name(finger);
             let row = said["pairs"].as_array().unwrap().iter().find(|row| row["finger"] == *name).unwrap();
             count += same(&written(&found.psnr_db), &row["psnr_db"], &format!("{name}, {recipe:?}"));
@@ -87,7 +88,8 @@ pub(in crate::agreement) fn a_random_dial_over_a_random_recipe_is_the_same_in_th
             both.studio.state.dial.result = None;
             let said = both.said(Pane::Dial);
             both.studio.send(DialCommand::Start.into());
-            let what = format!("{dial:?} {ends:?}, {:?}", both.studio.state.in_force(ImprintSource::Predicted));
+            let what =
+                format!("{dial:?} {ends:?}, {:?}", recipe::in_force(&both.studio.state, ImprintSource::Predicted));
             match (&both.studio.state.dial.result, said) {
                 (Some(shown), Ok(said)) => {
                     let shown = without(written(&**shown), &["seconds"]);
@@ -119,7 +121,8 @@ pub(in crate::agreement) fn a_random_recipe_orders_the_masks_the_same_in_the_lis
         for by in QueueBy::iter() {
             both.studio.send(LibraryCommand::SetUncertainBy(by).into());
             let begin = ["masks", "queue", &both.path, "--by", by.key()].map(str::to_owned);
-            let words = both.studio.state.in_force(ImprintSource::Measured).until(Stage::Pose).words(Stage::Pose);
+            let words =
+                recipe::in_force(&both.studio.state, ImprintSource::Measured).until(Stage::Pose).words(Stage::Pose);
             let said = both.run(&begin.into_iter().chain(words.list()).collect::<Vec<_>>()).unwrap();
             let state = &both.studio.state;
             let lines: Vec<_> = state

@@ -12,6 +12,7 @@ use touch2touch_work::mask::MaskSource;
 use touch2touch_work::recipe::Stage;
 
 use super::*;
+use touch2touch::app::{recipe, results};
 
 /// Holds the pair on screen against the files that the verb wrote of it.
 fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
@@ -23,7 +24,7 @@ fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
     let mut count = 0;
     for finger in said["fingers"].as_array().unwrap() {
         let pad = state.rig().pads().find(|pad| finger["finger"] == *state.finger_name(*pad)).unwrap();
-        let imprint = state.imprint(source, pad).ready().unwrap_or_else(|| panic!("{what}: no imprint"));
+        let imprint = results::imprint(state, source, pad).ready().unwrap_or_else(|| panic!("{what}: no imprint"));
         let name = state.finger_name(pad);
         let Tensor { values: Values::F32(pixels), .. } = &arrays[&format!("imprint_{name}")] else { panic!("f32") };
         assert!(imprint.as_slice().iter().map(|v| v.to_bits()).eq(pixels.iter().map(|v| v.to_bits())), "{what}");
@@ -31,17 +32,17 @@ fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
         let shown = [stats.min, stats.max, stats.mean];
         count +=
             same(&written(&shown), &serde_json::json!([finger["min_m"], finger["max_m"], finger["mean_m"]]), &what);
-        let in_force = state.mask_in_force(source, pad).unwrap_or_else(|_| panic!("{what}: no mask"));
+        let in_force = results::mask_in_force(state, source, pad).unwrap_or_else(|_| panic!("{what}: no mask"));
         let px = in_force.mask.as_slice().iter().filter(|&&on| on).count();
         assert_eq!(finger["contact_px"], px, "{what}");
-        let compared = state.comparison(pad).ready();
+        let compared = results::comparison(state, pad).ready();
         let figure = |get: fn(&touch2touch_work::compare::Comparison) -> Option<f64>| written(&compared.and_then(get));
         let none = Value::Null;
         let of = |key: &str| finger.get(key).unwrap_or(&none).clone();
         count += same(&figure(|c| c.psnr_db), &of("psnr_db"), &what) + same(&figure(|c| c.ssim), &of("ssim"), &what);
         count += pixels.len() + 1;
     }
-    let (pose, posed) = (state.pose(source).ready(), &said["pose"]);
+    let (pose, posed) = (results::pose(state, source).ready(), &said["pose"]);
     assert_eq!(pose.is_some(), posed.is_object(), "{what}: {posed}, {}", said["no_pose"]);
     if let Some(found) = pose {
         let place = found.object_from_grasp();
@@ -93,7 +94,7 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
         put(&mut both.studio, &recipe);
         let out = both.at("watched");
         let begin = ["watch", &both.path, "--once", "--out", &out].map(str::to_owned);
-        let words = both.studio.state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Pose).list();
         let all: Vec<&str> = begin.iter().chain(&words).map(String::as_str).chain(["--json"]).collect();
         let lines = run(&all, &both.home);
         assert!(lines.status.success(), "{recipe:?}: {}", String::from_utf8_lossy(&lines.stderr));

@@ -33,7 +33,7 @@ impl Kind {
         set
     }
 
-    /// Whether this is what is wrong.
+    /// True where the cause names this kind.
     pub(super) fn is(&self, cause: &Cause) -> bool {
         self.named.contains(&cause.key())
     }
@@ -44,7 +44,7 @@ fn kind(name: &str, named: &[&str], spoil: impl Fn(&mut Set) + Send + Sync + 'st
     Kind { name: name.to_owned(), spoil: Box::new(spoil), named }
 }
 
-/// What a reading undoes, by its opposite.
+/// Kind that a reading undoes, by its opposite.
 fn stored(name: &str, undone_by: &[&str], mistake: ReadAs) -> Kind {
     kind(name, undone_by, move |set| set.pairs.iter_mut().for_each(|(_, sample)| mistake.apply(sample)))
 }
@@ -147,10 +147,10 @@ fn gray(image: &RgbGrid) -> RgbGrid {
     image.map(|p| [0.299 * p[0] + 0.587 * p[1] + 0.114 * p[2]; 3])
 }
 
-/// Where a corner of a CAD model goes.
+/// Place that a corner of a CAD model is moved to.
 type TurnModel = fn(DVec3) -> DVec3;
 
-/// How a difference becomes what is stored.
+/// Stored value of a difference.
 type Store = fn(f32) -> f32;
 
 fn black(image: &RgbGrid) -> RgbGrid {

@@ -23,13 +23,13 @@ pub(crate) struct Case {
     pub(crate) truth: PlanarPose,
 }
 
-/// What a prediction is worth.
+/// Score of a prediction.
 pub(super) struct Score {
-    /// Over all pixels of both fingers, against the noise-free imprint.
+    /// Mean squared error over all pixels of both fingers, against the noise-free imprint.
     pub(super) mse_m2: f64,
     /// By finger.
     pub(super) psnr_db: [Option<f64>; 2],
-    /// Of the angle; `None` if there is no pose.
+    /// Error of the angle; `None` if there is no pose.
     pub(super) error_rad: Option<f64>,
 }
 

@@ -1,4 +1,4 @@
-//! What a generation takes, and what of it is not the graphs' own work.
+//! Times of a generation, and the part of them that is not the graphs' own work.
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -34,7 +34,7 @@ pub(super) struct Overhead {
     pub(super) percent_of_shortest: f64,
 }
 
-/// How long one waits for the first result, milliseconds of the clock; both fingers.
+/// Wait for the first result, milliseconds of the clock; both fingers.
 #[derive(Debug, Serialize)]
 pub(super) struct First {
     pub(super) engine: EngineKind,
@@ -46,7 +46,7 @@ pub(super) struct First {
     pub(super) warm_ms: f64,
     /// From the start to the first preview; `None` with a single step.
     pub(super) preview_ms: Option<f64>,
-    /// How much later the result comes with previews of one finger every four steps, percent.
+    /// Delay of the result by previews of one finger every four steps, percent.
     pub(super) preview_percent: Option<f64>,
 }
 
@@ -133,15 +133,15 @@ pub(super) fn overhead(
     let spec = generator.spec().clone();
     let steps = spec.schedule.steps(config.steps, config.spacing, spec.prediction)?.len();
     let (mut generated, mut alone, mut percent) = (Vec::new(), Vec::new(), Vec::new());
-    for at in 0..PAIRS {
-        let case = &cases[at % cases.len()];
+    for index in 0..PAIRS {
+        let case = &cases[index % cases.len()];
         let images = differences(case)?
             .iter()
             .map(|image| Ok(Tensor::stack(&[prepare(image, &spec.input)?]).expect("one tensor can be stacked")))
             .collect::<anyhow::Result<Vec<_>>>()?;
         // In turn first and second: a machine that gets slower meanwhile favors neither.
         let (with, without);
-        if at % 2 == 0 {
+        if index % 2 == 0 {
             with = timed_run(generator, case, &config)?.0;
             without = bare(generator, &images, &config, steps)?;
         } else {
@@ -210,7 +210,7 @@ pub(super) fn first(
     let median = |values: &[f64]| quantile(values.iter().copied(), 0.5);
     let ratios: Vec<f64> = seen.iter().zip(&warm).map(|(seen, plain)| 100.0 * (seen / plain - 1.0)).collect();
     let preview_ms = median(&previews);
-    let found = First {
+    let first = First {
         engine,
         load_ms,
         cold_ms,
@@ -218,5 +218,5 @@ pub(super) fn first(
         preview_ms,
         preview_percent: preview_ms.and_then(|_| median(&ratios)),
     };
-    Ok((found, generator))
+    Ok((first, generator))
 }

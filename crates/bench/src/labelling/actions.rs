@@ -1,4 +1,4 @@
-//! What a mask takes a person: pre-labeled grasps corrected by a scripted one, for each way to begin.
+//! Work of a person on a mask: pre-labeled grasps corrected by a scripted one, for each way to begin.
 //!
 //! The person knows the true contact, and of all that hands can do next takes what mends most: a clean-up by key or button
 //! (at the size that is set, 1 mm), a line around what is missing or too much, drawn with [`JITTER_PX`] of unsteadiness, or
@@ -31,20 +31,20 @@ const KEY_S: f64 = 0.28;
 const POINT_S: f64 = 1.1;
 /// To press or let go of a button of the mouse, seconds.
 const BUTTON_S: f64 = 0.1;
-/// How fast a hand follows an outline, image pixels per second.
+/// Speed of a hand that follows an outline, image pixels per second.
 const TRACE_PX_PER_S: f64 = 50.0;
-/// How far a drawn line lies off where it should be, standard deviation, pixels.
+/// Distance of a drawn line from where it should be, standard deviation, pixels.
 const JITTER_PX: f32 = 0.5;
 /// Pixels from point to point of a drawn line.
 const POINT_EVERY: usize = 3;
-/// How far beyond what is wrong a line goes where that does no harm, pixels.
+/// Distance of a line beyond what is wrong where that does no harm, pixels.
 const SLOPPY_PX: f64 = 2.0;
 /// Regions that a person looks at in turn, the largest first.
 const REGIONS: usize = 3;
 /// An outline around fewer pixels than this is not drawn.
 const SMALLEST_HOLE_PX: f32 = 6.0;
 
-/// Where a person begins.
+/// Begin of a person's work.
 pub(super) struct Begin {
     /// The mask in force, or that of the proposal.
     pub mask: Mask,
@@ -52,11 +52,11 @@ pub(super) struct Begin {
     pub keys: usize,
     /// Keys pressed to take it over where nothing is to be corrected.
     pub keys_as_it_is: usize,
-    /// What the program took to make it, milliseconds.
+    /// Time that the program took to make it, milliseconds.
     pub ms: f64,
 }
 
-/// What one mask took.
+/// Work on one mask.
 #[derive(Clone, Copy, Debug)]
 struct Took {
     begun_iou: f64,
@@ -67,7 +67,7 @@ struct Took {
     own_ms: f64,
 }
 
-/// What masks took that began in one way, means over fingers.
+/// Work on masks that began in one way, means over fingers.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Row {
     pub way: &'static str,
@@ -80,7 +80,7 @@ pub(super) struct Row {
     pub strokes: f64,
     /// By the model of a person.
     pub seconds: f64,
-    /// What the program took: proposals, drawing, packing for undo and file; milliseconds.
+    /// Time that the program took: proposals, drawing, packing for undo and file; milliseconds.
     pub own_ms: f64,
     /// Share of the masks that reached the target.
     pub reached: f64,
@@ -90,14 +90,14 @@ pub(super) struct Row {
 pub(super) struct Person {
     rig: Arc<Rig>,
     random: ChaCha8Rng,
-    /// Whether the lasso is in hand: it stays so from mask to mask.
+    /// True where the lasso is in hand: it stays so from mask to mask.
     lasso: bool,
     took: Vec<Took>,
 }
 
 /// Something that hands can do next.
 struct Move {
-    /// What is done in turn.
+    /// Acts in their order.
     does: Vec<Does>,
     actions: usize,
     seconds: f64,
@@ -171,8 +171,8 @@ impl Person {
         self.took.push(took);
     }
 
-    /// What mends most for each action, and the IoU after it; where several make the mask good enough, that of the fewest
-    /// actions, then of the least time.
+    /// Move that mends most for each action, and the IoU after it; where several make the mask good enough, that of the
+    /// fewest actions, then of the least time.
     fn best(&mut self, hand: &DrawnMask, now: f64, truth: &Mask, imprint: &DepthMap) -> Option<(Move, f64)> {
         /// A gain that nobody sees is none.
         const LEAST: f64 = 1e-3;
@@ -195,7 +195,7 @@ impl Person {
 
     /// Lines around what is missing and around what is too much.
     fn lines(&mut self, mask: &Mask, truth: &Mask) -> Vec<Move> {
-        let mut found = Vec::new();
+        let mut moves = Vec::new();
         for paint in [Paint::Contact, Paint::Free] {
             let add = paint == Paint::Contact;
             // What is wrong, and where a line may go without harm.
@@ -208,9 +208,9 @@ impl Person {
                 // The whole contact anew, in one line.
                 regions.extend(largest(&harmless, &wrong));
             }
-            found.extend(regions.iter().filter_map(|region| self.around(region, paint)));
+            moves.extend(regions.iter().filter_map(|region| self.around(region, paint)));
         }
-        found
+        moves
     }
 
     /// The mask cleared, and a line around the largest part of the contact.
@@ -236,7 +236,7 @@ impl Person {
         sum * 3f32.sqrt()
     }
 
-    /// What all masks took.
+    /// Row of all masks; `None` without any.
     pub(super) fn row(&self, way: &'static str) -> Option<Row> {
         let masks = self.took.len();
         let mean = |of: &dyn Fn(&Took) -> f64| self.took.iter().map(of).sum::<f64>() / masks as f64;
@@ -266,7 +266,7 @@ fn largest(mask: &Mask, of: &Mask) -> Vec<Mask> {
     let (labels, sizes) = islands(mask);
     let mut counts: Vec<(usize, u32)> = (1..=sizes.len() as u32).map(|label| (0, label)).collect();
     for (label, counted) in labels.as_slice().iter().zip(of.as_slice()) {
-        if *counted && let Some(entry) = (*label as usize).checked_sub(1).and_then(|at| counts.get_mut(at)) {
+        if *counted && let Some(entry) = (*label as usize).checked_sub(1).and_then(|index| counts.get_mut(index)) {
             entry.0 += 1;
         }
     }
@@ -288,10 +288,10 @@ fn path(region: &Mask) -> Option<Vec<[f32; 2]>> {
         let pairs = (0..line.len()).flat_map(|i| (0..hole.len()).map(move |j| (i, j)));
         let nearest =
             pairs.min_by(|a, b| distance(&line[a.0], &hole[a.1]).total_cmp(&distance(&line[b.0], &hole[b.1])));
-        let Some((at, from)) = nearest else { continue };
+        let Some((index, from)) = nearest else { continue };
         let around = hole[from..].iter().chain(&hole[..=from]).copied();
-        let detour: Vec<[f32; 2]> = around.chain([line[at]]).collect();
-        line.splice(at + 1..at + 1, detour);
+        let detour: Vec<[f32; 2]> = around.chain([line[index]]).collect();
+        line.splice(index + 1..index + 1, detour);
     }
     Some(line)
 }
@@ -316,8 +316,8 @@ fn smooth(outline: &[[f32; 2]]) -> Vec<[f32; 2]> {
 /// pixel.
 fn outlines(mask: &Mask) -> Vec<Vec<[f32; 2]>> {
     let inside = |x: i32, y: i32| {
-        let at = usize::try_from(x).ok().zip(usize::try_from(y).ok());
-        at.is_some_and(|(x, y)| mask.get(x, y) == Some(&true))
+        let pixel = usize::try_from(x).ok().zip(usize::try_from(y).ok());
+        pixel.is_some_and(|(x, y)| mask.get(x, y) == Some(&true))
     };
     // From each corner where the edges lead that have the mask at their right.
     let mut edges: std::collections::BTreeMap<(i32, i32), Vec<(i32, i32)>> = std::collections::BTreeMap::new();
@@ -336,19 +336,19 @@ fn outlines(mask: &Mask) -> Vec<Vec<[f32; 2]>> {
             }
         }
     }
-    let mut found = Vec::new();
+    let mut outlines = Vec::new();
     while let Some((&start, _)) = edges.first_key_value() {
-        let (mut line, mut at) = (Vec::new(), start);
-        while let Some(next) = edges.get_mut(&at).and_then(Vec::pop) {
-            if edges.get(&at).is_some_and(Vec::is_empty) {
-                edges.remove(&at);
+        let (mut line, mut corner) = (Vec::new(), start);
+        while let Some(next) = edges.get_mut(&corner).and_then(Vec::pop) {
+            if edges.get(&corner).is_some_and(Vec::is_empty) {
+                edges.remove(&corner);
             }
-            line.push([at.0 as f32 - 0.5, at.1 as f32 - 0.5]);
-            at = next;
+            line.push([corner.0 as f32 - 0.5, corner.1 as f32 - 0.5]);
+            corner = next;
         }
-        found.push(line);
+        outlines.push(line);
     }
-    found
+    outlines
 }
 
 /// The rows as a table.

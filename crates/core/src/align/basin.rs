@@ -74,7 +74,7 @@ impl Axis {
 }
 
 impl Plane {
-    /// What varies along the columns and along the rows.
+    /// Coordinates that vary along the columns and along the rows.
     pub fn axes(self) -> [Axis; 2] {
         match self {
             Self::AngleY => [Axis::Angle, Axis::Y],
@@ -84,10 +84,10 @@ impl Plane {
     }
 }
 
-/// Which starts are tried.
+/// Grid of starts, and the prior it is drawn with.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct BasinConfig {
-    /// What is varied; the third coordinate stays 0, the middle of the prior.
+    /// Plane of the two coordinates that vary; the third coordinate stays 0, the middle of the prior.
     pub plane: Plane,
     /// Columns and rows, at least one each.
     pub size: [usize; 2],
@@ -95,7 +95,7 @@ pub struct BasinConfig {
     pub angle_rad: f64,
     /// Largest size of y and z, meters.
     pub shift_m: f64,
-    /// Where the gripper can hold a tool: drawn, and the reason for the range.
+    /// Prior, where the gripper can hold a tool: drawn, and the reason for the range.
     pub prior: Prior,
 }
 
@@ -122,12 +122,12 @@ impl BasinConfig {
     }
 }
 
-/// Where a start led.
+/// Outcome of the run from one start.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Arrival {
     /// The pose the run began at, `grasp_from_object`: not always the one that was asked for.
     pub applied: PlanarPose,
-    /// Where it ended, `grasp_from_object`.
+    /// Pose where the run ended, `grasp_from_object`.
     pub end: PlanarPose,
     /// Cost per point there, square meters; comparable within the map.
     pub cost_m2: f64,
@@ -146,7 +146,7 @@ pub struct Arrival {
 pub struct Cell {
     /// The pose that was asked for, `grasp_from_object`.
     pub requested: PlanarPose,
-    /// Where it led; `None` if there was no answer.
+    /// Outcome of the run; `None` if there was no answer.
     pub arrival: Option<Arrival>,
     /// Why there was none.
     pub failure: Option<String>,
@@ -157,7 +157,7 @@ pub struct Cell {
 pub struct End {
     /// The cheapest of them, `grasp_from_object`.
     pub end: PlanarPose,
-    /// Its cost, square meters.
+    /// Cost per point of the cheapest of them, square meters.
     pub cost_m2: f64,
     /// Starts of the grid that lead here.
     pub starts: usize,
@@ -166,7 +166,7 @@ pub struct End {
 /// A basin map.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Basin {
-    /// Which starts were tried.
+    /// Grid of starts.
     pub config: BasinConfig,
     /// Row by row.
     pub cells: Vec<Cell>,
@@ -209,7 +209,7 @@ impl Basin {
     }
 }
 
-/// Whether two poses are the same place: within a degree and a millimeter.
+/// True where two poses are the same place: within a degree and a millimeter.
 pub fn is_same_place(a: PlanarPose, b: PlanarPose) -> bool {
     angle_error(a.theta_rad, b.theta_rad) <= SAME_RAD && (a.y_m - b.y_m).hypot(a.z_m - b.z_m) <= SAME_M
 }

@@ -43,7 +43,7 @@ impl Cloud {
         Self { y, z, len, resting: 0 }
     }
 
-    /// The same points, those far from the centroid first: they move most, so they decide soonest.
+    /// Cloud with the points far from the centroid first: they move most, so they decide soonest.
     pub(super) fn outermost_first(&self) -> Self {
         let mut order: Vec<usize> = (0..self.len).collect();
         let squared = |i: usize| self.y[i] * self.y[i] + self.z[i] * self.z[i];
@@ -78,7 +78,7 @@ impl Cloud {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct State {
     pub(super) phi: f64,
-    /// Where the centroid lies in the object frame, meters.
+    /// Position of the centroid in the object frame, meters.
     pub(super) place: DVec2,
 }
 
@@ -98,7 +98,7 @@ impl State {
         Self { phi: self.phi + step[0] / ANGLE_SCALE_M, place: self.place + DVec2::new(step[1], step[2]) }
     }
 
-    /// Whether descents from both will end in the same place.
+    /// True where descents from both states will end in the same place.
     pub(super) fn is_near(&self, other: &Self) -> bool {
         (self.phi - other.phi).abs() * ANGLE_SCALE_M < 3e-4 && self.place.distance(other.place) < 3e-4
     }
@@ -148,7 +148,7 @@ pub(super) struct Moments {
     pub(super) products: [f64; 6],
 }
 
-/// What was read for the points of a step: arms about the centroid (cells), distance (meters), slope (meters per cell).
+/// Field values of a step of points: arms about the centroid (cells), distance (meters), slope (meters per cell).
 struct Read {
     ay: [f32; LANES],
     az: [f32; LANES],
@@ -185,17 +185,17 @@ impl Extent {
 /// and z, meters per cell.
 pub(super) struct Slopes {
     cells: Vec<[f32; 4]>,
-    /// How far the window reaches from anywhere in the cell, meters.
+    /// Reach of the window from anywhere in the cell, meters.
     pub(super) reach: f64,
 }
 
-/// Where the lanes lie on the grid.
+/// Positions of the lanes on the grid.
 struct Located {
     /// Cell and position within it, 0 to 1.
     index: [usize; LANES],
     fy: [f32; LANES],
     fz: [f32; LANES],
-    /// Whether a lane lies off the grid; it was moved onto it.
+    /// True where a lane lies off the grid; it was moved onto it.
     off: bool,
 }
 
@@ -340,8 +340,8 @@ impl DistanceField {
         }
     }
 
-    /// What the cloud costs at least anywhere in a box of states about `state`, and what it costs at `state` itself
-    /// (square meters).
+    /// Lower bound of the cloud's cost anywhere in a box of states about `state`, and its cost at `state` itself
+    /// (square meters, summed over the points).
     ///
     /// Without `slopes`: in the box a point moves by at most its way, its distance to the silhouette shrinks by no more
     /// than that (see [`widened`]), and the kernel grows with the distance. The sums stop at `enough`.
@@ -457,7 +457,7 @@ impl DistanceField {
         into.z.resize(padded, 0.0);
     }
 
-    /// What the field says about a step of points.
+    /// Reads the field for a step of points.
     #[inline]
     fn read(&self, motion: &Motion, y: &[f32; LANES], z: &[f32; LANES]) -> Read {
         let zero = [0f32; LANES];

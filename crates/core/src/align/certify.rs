@@ -30,7 +30,7 @@ struct Region {
     lower: f64,
 }
 
-/// What is asked, and how far the answer has come.
+/// Proof by branch and bound under way: its question, and how far the answer has come.
 struct Proof<'a, 's> {
     search: &'a mut Search<'s>,
     kernel: f64,
@@ -114,14 +114,15 @@ impl Proof<'_, '_> {
             .collect()
     }
 
-    /// Whether the region holds a pose of the box: its place is that of the centroid, which turns with the angle.
+    /// True where the region may hold a pose of the box: its place is that of the centroid, which turns with the angle.
     fn meets_the_box(&self, region: &Region) -> bool {
         let pose = region.middle.to_pose(self.centroid);
         let way = region.extent.way(region.middle.place.length() + region.extent.shift);
         pose.y_m.abs().max(pose.z_m.abs()) <= self.shift_m + way
     }
 
-    /// What a region must cost to be done, all points together.
+    /// Cost from which a region is done, summed over the points: it holds no pose that beats the best by more than the
+    /// gap.
     fn enough(&self) -> f64 {
         let points = self.clouds[0].len() as f64;
         let negligible = NEGLIGIBLE * self.kernel * self.kernel * points;

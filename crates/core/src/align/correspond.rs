@@ -9,7 +9,7 @@ use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 
-/// What contact points are compared with.
+/// Surface that contact points are compared with.
 #[derive(Clone, Copy, Debug)]
 pub enum Surface<'a> {
     /// The nearest point of the silhouette; points on the silhouette are where they should be.

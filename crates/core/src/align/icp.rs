@@ -39,17 +39,17 @@ const MIN_SHARE: f64 = 0.05;
 /// An ICP. Lengths in meters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct IcpConfig {
-    /// What the contacts are compared with.
+    /// Model that the contacts are compared with.
     pub target: Target,
-    /// How the distance of a pair is measured.
+    /// Measure of the distance of a pair.
     pub residual: Residual,
-    /// What residuals cost, one after the other; the last one decides. Not empty.
+    /// Kernels that make costs of residuals, one after the other; the last one decides. Not empty.
     pub kernels: Vec<Kernel>,
-    /// Which pairs are left out.
+    /// Rule by which pairs are left out.
     pub rejector: Rejector,
-    /// How a step is found.
+    /// Method that finds a step.
     pub solver: Solver,
-    /// Which motions are open.
+    /// Motions that are open.
     pub dof: Dof,
     /// Pull back to the start, as a share of the contacts' own pull: what the contacts do not tell stays put.
     pub anchor: f64,
@@ -246,7 +246,7 @@ impl Register for IcpConfig {
     }
 }
 
-/// Where the run from one start ended.
+/// End of the run from one start.
 struct End {
     state: State,
     sums: Sums,

@@ -1,4 +1,4 @@
-//! Which contact points a registered angle hangs on: [`influence`].
+//! Influence of each contact point on a registered angle: [`influence`].
 //!
 //! The registration ends where the pulls of its points balance. Without one of them the balance lies elsewhere, and to
 //! first order the pose moves there by the inverse curvature of the cost times the pull that is missing: one solved
@@ -33,9 +33,9 @@ pub enum InfluenceError {
     NoBalance,
 }
 
-/// What each point means for the angle: by how much the angle of `object_from_grasp` (the one that the lab reports,
-/// radians) changes when a point of the registration leaves it, and when another one joins it. `registered` says for
-/// each point whether it takes part. NaN for points that are not finite.
+/// Influence of each point: by how much the angle of `object_from_grasp` (the one that the lab reports, radians)
+/// changes when a point of the registration leaves it, and when another one joins it. `registered` says for each point
+/// whether it takes part. NaN for points that are not finite.
 ///
 /// Points are `(y, z)`, meters, grasp frame; the pose is where the registration on `field` ended, with a last kernel of
 /// `kernel_m`. Motions that the points leave open (a rod slides along itself) are left where they are.
@@ -95,7 +95,7 @@ pub fn influence(
     Ok(found.collect())
 }
 
-/// What a point does to the cost at a pose.
+/// Effect of a point on the cost at a pose.
 struct Pull {
     /// Change of its distance by (angle times [`ANGLE_SCALE_M`], y, z), grasp frame: of the point against the tool.
     slope: Vector3<f64>,

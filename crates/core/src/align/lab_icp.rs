@@ -62,7 +62,7 @@ pub enum PaperTrap {
 }
 
 impl PaperTrap {
-    /// What it does, in one line.
+    /// Effect of the trap, in one line.
     pub fn description(self) -> &'static str {
         match self {
             Self::WrongFrame => "Starts are applied in the wrong frame: 22.5° asked for turns the model by about 1°",
@@ -74,7 +74,7 @@ impl PaperTrap {
     }
 }
 
-/// What [`lab_icp()`] may vary; the default is what the lab evaluates with.
+/// Settings of [`lab_icp()`]; the default is what the lab evaluates with.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LabIcpConfig {
     /// Iterations; the lab always runs all 200.
@@ -109,12 +109,12 @@ pub fn lab_starts(seed: u64) -> Vec<PlanarPose> {
         .collect()
 }
 
-/// What the lab's loop compares with.
+/// Model that the lab's loop compares with.
 #[derive(Clone, Debug)]
 pub struct LabModel {
     /// Meters, object frame.
     points: Arc<[DVec3]>,
-    /// The same along the closing axis, in the same order.
+    /// Points along the closing axis (x = 0), in the same order.
     flat: Samples,
 }
 

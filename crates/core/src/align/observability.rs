@@ -1,4 +1,4 @@
-//! How well contact points determine a planar pose, and which motion they leave open.
+//! Observability of a planar pose: how well contact points determine it, and which motion they leave open.
 
 use glam::DVec2;
 use nalgebra::Matrix3;
@@ -34,7 +34,7 @@ pub struct Observability {
     pub center: DVec2,
     /// Points up to 2 mm outside the silhouette: those that tell.
     pub telling: usize,
-    /// Whether the weakest motion is not determined.
+    /// True where the weakest motion is not determined.
     pub degenerate: bool,
 }
 
@@ -54,7 +54,7 @@ impl Observability {
 
     /// The pose moved by `share` (-1 to 1) of at most 2 mm and 2 degrees along the weakest motion.
     pub fn moved_along_weakest(&self, grasp_from_object: PlanarPose, share: f64) -> PlanarPose {
-        /// How far the motion is shown: seen at a glance, and still next to the part.
+        /// Largest shift that is shown, meters, and turn, radians: seen at a glance, and still next to the part.
         const SHIFT_M: f64 = 0.002;
         const TURN_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
         let [turn, y, z] = self.weakest;
@@ -67,8 +67,8 @@ impl Observability {
         PlanarPose { theta_rad: grasp_from_object.theta_rad + turn * scale, y_m: moved.x, z_m: moved.y }
     }
 
-    /// How far the tool can move before the distances of the telling points change by `tolerance_m` (root mean
-    /// square): the inverse of the curvature. Nothing is larger than `limit_m` (angles: over [`ANGLE_SCALE_M`]).
+    /// Motions of the tool that change the distances of the telling points by `tolerance_m` (root mean square): the
+    /// inverse of the curvature. Nothing is larger than `limit_m` (angles: over [`ANGLE_SCALE_M`]).
     pub fn ellipse(&self, tolerance_m: f64, limit_m: f64) -> MotionEllipse {
         let mut c = [[0.0; 3]; 3];
         for (value, v) in self.eigenvalues.iter().zip(&self.motions) {
@@ -106,11 +106,11 @@ impl Observability {
 /// Shifts and turns of equal effect on the fit, about the mean of the telling points.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub struct MotionEllipse {
-    /// Its middle, `(y, z)`, meters, grasp frame.
+    /// Middle of the ellipse, `(y, z)`, meters, grasp frame.
     pub center: DVec2,
     /// Half axes of the shifts, `(y, z)`, meters, the longer one first.
     pub half_axes: [DVec2; 2],
-    /// The same for the angle, radians.
+    /// Largest turn of the same effect, radians.
     pub turn_rad: f64,
 }
 
@@ -123,7 +123,7 @@ pub fn observability(points_yz: &[DVec2], field: &DistanceField, grasp_from_obje
     of_cloud(&cloud, centroid, field, State::from_pose(grasp_from_object, centroid))
 }
 
-/// The same for a cloud about its centroid (`(y, z)`, meters, grasp frame).
+/// Observability from a cloud about its centroid (`(y, z)`, meters, grasp frame).
 pub(super) fn of_cloud(cloud: &Cloud, centroid: DVec2, field: &DistanceField, state: State) -> Observability {
     let moments = field.moments(cloud, state, REACH_M);
     let count = moments.count;

@@ -29,7 +29,7 @@ use crate::mesh::sampling::spread;
 const MIN_SHARE: f64 = 0.05;
 /// Points of the descent before the last.
 const MIDDLE_POINTS: usize = 512;
-/// What a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
+/// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
 const REACH_M: f64 = 0.012;
 
 /// Finds the planar pose under which the points lie on the tool's silhouette.
@@ -100,19 +100,19 @@ struct Problem<'a> {
 
 /// The answer of the rung before.
 struct Earlier {
-    /// Where its scouts ended.
+    /// State where its scouts ended.
     scouted: State,
     refined: Progress,
 }
 
-/// What a rung found.
+/// Answer of a rung.
 struct Answer {
     rung: Rung,
     /// `grasp_from_object` of every start.
     starts: Vec<PlanarPose>,
     runs: Vec<Progress>,
     winner: usize,
-    /// Where the winner's scouts ended.
+    /// State where the winner's scouts ended.
     scouted: State,
     pose: PlanarPose,
     inlier_share: f64,
@@ -267,7 +267,7 @@ impl<'a> Problem<'a> {
         &kernels[usize::from(kernels.len() > 1)..]
     }
 
-    /// Whether `a` is to be preferred to `b`: within the prior before outside, then the cheaper one.
+    /// True where `a` is to be preferred to `b`: within the prior before outside, then the cheaper one.
     fn is_better(&self, a: &Progress, b: &Progress) -> bool {
         let allowed = |run: &Progress| self.config.prior.allows(run.state.to_pose(self.centroid));
         match (allowed(a), allowed(b)) {

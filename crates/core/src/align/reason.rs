@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::{Fate, PointFit};
 use crate::grid::{Grid, Mask};
 
-/// What became of one pixel of an imprint in a registration.
+/// Reason why one pixel of an imprint does or does not pull in a registration.
 #[derive(
     Clone,
     Copy,
@@ -59,7 +59,7 @@ impl From<Fate> for Reason {
     }
 }
 
-/// How many pixels have each reason, in the order of [`Reason`].
+/// Number of pixels with each reason, in the order of [`Reason`].
 pub type ReasonCounts = [usize; <Reason as strum::EnumCount>::COUNT];
 
 /// The reason of every pixel of one finger.

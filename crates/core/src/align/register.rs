@@ -7,7 +7,7 @@ use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 
-/// What a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
+/// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
 const REACH_M: f64 = 0.012;
 /// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
 const MIN_SHARE: f64 = 0.05;
@@ -30,13 +30,13 @@ impl<'a> Scene<'a> {
         self.points
     }
 
-    /// The same points along the closing axis: `(y, z)`, meters.
+    /// Points along the closing axis: `(y, z)`, meters.
     pub fn yz(&self) -> &[DVec2] {
         &self.yz
     }
 }
 
-/// What is asked of a registration beyond its own settings.
+/// Options of one run of a registration, beyond its own settings.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Ask<'a> {
     /// Poses to start from, `grasp_from_object`; the registration's own without them. Not empty.

@@ -8,15 +8,15 @@ use crate::field::DistanceField;
 
 /// A step that moves no point by more than about this, meters, ends the search with the narrowest kernel.
 const STEP_FINE_M: f64 = 5e-6;
-/// The same for the wider kernels, whose end is only the next start.
+/// Step that ends the search with the wider kernels, meters: their end is only the next start.
 const STEP_COARSE_M: f64 = 5e-5;
-/// The same for the middle cloud, whose end is the start of the last descent.
+/// Step that ends the search with the middle cloud, meters: its end is the start of the last descent.
 const STEP_MIDDLE_M: f64 = 2e-5;
 /// Damping at the start and at the end of patience, per unit of weight.
 const DAMPING_START: f64 = 1e-3;
 const DAMPING_MAX: f64 = 1e4;
 
-/// Where the run from one start stands.
+/// Progress of the run from one start.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Progress {
     pub(super) state: State,

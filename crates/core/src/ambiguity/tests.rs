@@ -6,7 +6,7 @@ use crate::grid::Grid;
 use crate::rig::lab;
 use crate::sim::{self, SimConfig};
 
-/// What is found in both fingers' images of some grasps, half of them with randomised sensors.
+/// Ambiguity of both fingers' images of some grasps, half of them with randomised sensors.
 fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambiguity)> {
     seeds
         .into_par_iter()
@@ -17,11 +17,11 @@ fn survey(seeds: std::ops::Range<u64>, on_a_shaft: bool) -> Vec<(String, Ambigui
             let tool = if on_a_shaft { catalog::on_a_shaft(tool) } else { tool };
             let config = if seed % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(seed) };
             let sample = sim::simulate(&tool, sim::random_grasp(seed), seed, &config);
-            let found = lab::PADS.map(|finger| {
+            let touches = lab::PADS.map(|finger| {
                 let touch = sample.pad(finger).and_then(|t| t.color()).unwrap();
                 (name.clone(), ambiguity(&touch.difference).unwrap())
             });
-            found.into_iter()
+            touches.into_iter()
         })
         .collect()
 }
@@ -60,22 +60,25 @@ fn rates() {
 
 #[test]
 fn pictures_made_by_hand_are_judged_as_a_person_would() {
-    let at = |f: &dyn Fn(f32, f32) -> f32| {
+    let judged = |f: &dyn Fn(f32, f32) -> f32| {
         ambiguity(&Grid::from_fn(427, 320, |x, y| [f(x as f32, y as f32), 0.0, 0.0])).unwrap()
     };
     let ridge = |y: f32| if (y - 160.0).abs() < 30.0 { 30.0 } else { 0.0 };
-    assert_eq!(at(&|_, y| ridge(y)).kind, TouchKind::BareShaft);
-    assert!(at(&|_, y| ridge(y)).direction_rad.abs() < 0.06);
+    assert_eq!(judged(&|_, y| ridge(y)).kind, TouchKind::BareShaft);
+    assert!(judged(&|_, y| ridge(y)).direction_rad.abs() < 0.06);
     // Slanted, and two in parallel.
-    let slanted = at(&|x, y| ridge(y - 0.4 * (x - 213.0)) + ridge(y - 0.4 * (x - 213.0) - 110.0));
+    let slanted = judged(&|x, y| ridge(y - 0.4 * (x - 213.0)) + ridge(y - 0.4 * (x - 213.0) - 110.0));
     assert_eq!(slanted.kind, TouchKind::BareShaft);
     assert!((slanted.direction_rad - 0.4f64.atan()).abs() < 0.06, "{slanted:?}");
     // An end, a crossing, a ball.
-    assert_eq!(at(&|x, y| if x < 200.0 { ridge(y) } else { 0.0 }).kind, TouchKind::Distinct);
-    assert_eq!(at(&|x, y| ridge(y).max(if (x - 213.0).abs() < 30.0 { 30.0 } else { 0.0 })).kind, TouchKind::Distinct);
-    assert_eq!(at(&|x, y| if (x - 213.0).hypot(y - 160.0) < 60.0 { 30.0 } else { 0.0 }).kind, TouchKind::Distinct);
-    assert_eq!(at(&|x, y| 0.3 * (x * 12.9 + y * 78.2).sin()).kind, TouchKind::Nothing);
-    assert!(at(&|_, _| 7.0).warning().is_some(), "an even change of light is no touch");
+    assert_eq!(judged(&|x, y| if x < 200.0 { ridge(y) } else { 0.0 }).kind, TouchKind::Distinct);
+    assert_eq!(
+        judged(&|x, y| ridge(y).max(if (x - 213.0).abs() < 30.0 { 30.0 } else { 0.0 })).kind,
+        TouchKind::Distinct
+    );
+    assert_eq!(judged(&|x, y| if (x - 213.0).hypot(y - 160.0) < 60.0 { 30.0 } else { 0.0 }).kind, TouchKind::Distinct);
+    assert_eq!(judged(&|x, y| 0.3 * (x * 12.9 + y * 78.2).sin()).kind, TouchKind::Nothing);
+    assert!(judged(&|_, _| 7.0).warning().is_some(), "an even change of light is no touch");
 }
 
 #[test]
@@ -85,8 +88,8 @@ fn images_that_are_none_have_no_answer_and_holes_do_no_harm() {
     assert_eq!(ambiguity(&Grid::filled(32, 24, [f32::NAN; 3])), None);
     let mut holed = Grid::from_fn(128, 128, |_, y| if (50..70).contains(&y) { [30.0; 3] } else { [0.0; 3] });
     holed[(4, 4)] = [f32::NAN, f32::INFINITY, 0.0];
-    let found = ambiguity(&holed).unwrap();
-    assert_eq!(found.kind, TouchKind::BareShaft);
-    assert!(found.change.is_finite() && found.signal.is_finite());
+    let touch = ambiguity(&holed).unwrap();
+    assert_eq!(touch.kind, TouchKind::BareShaft);
+    assert!(touch.change.is_finite() && touch.signal.is_finite());
     assert!(ambiguity(&Grid::filled(2, 2, [1e30; 3])).is_some());
 }

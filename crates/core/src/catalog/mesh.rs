@@ -46,8 +46,8 @@ fn grid(tool: &ToolSpec, step: f64) -> PlanarMesh {
     }
     for j in 0..rows - 1 {
         for i in 0..columns - 1 {
-            let at = |di: usize, dj: usize| ((j + dj) * columns + i + di) as u32;
-            let (a, b, c, d) = (at(0, 0), at(1, 0), at(1, 1), at(0, 1));
+            let vertex = |di: usize, dj: usize| ((j + dj) * columns + i + di) as u32;
+            let (a, b, c, d) = (vertex(0, 0), vertex(1, 0), vertex(1, 1), vertex(0, 1));
             // cells wholly outside are never part of the tool
             if [a, b, c, d].iter().all(|&v| sheet.values[v as usize] > 2.0 * step) {
                 continue;

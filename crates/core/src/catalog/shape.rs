@@ -39,7 +39,7 @@ impl Bar {
 pub struct ToolSpec {
     /// The lab's name of the tool, or `random_...`.
     pub name: String,
-    /// Whether the lab trains on it; unseen tools are for testing.
+    /// True where the lab trains on it; unseen tools are for testing.
     pub seen: bool,
     /// The parts; the outline is their union.
     pub bars: Vec<Bar>,
@@ -47,7 +47,7 @@ pub struct ToolSpec {
     pub half_thickness_m: f64,
     /// Width of the bevel along the outline, meters.
     pub bevel_width_m: f64,
-    /// How much lower the bevel is at the outline, meters.
+    /// Drop of the surface from the inner edge of the bevel to the outline, meters.
     pub bevel_depth_m: f64,
 }
 

@@ -1,4 +1,4 @@
-//! How far imprints rise: out of their rest, out of the plane that fits them best, and out of what lies around a mask.
+//! Rise of imprints: out of their rest, out of the plane that fits them best, and out of what lies around a mask.
 
 use crate::grid::{DepthMap, Mask};
 
@@ -7,7 +7,7 @@ const SQUARES_ACROSS: usize = 25;
 /// Share of the squares that lie lower than the imprint's rest, and of those that lie higher than its top.
 const REST_SHARE: f64 = 0.25;
 const TOP_SHARE: f64 = 0.02;
-/// How far around a mask its surroundings reach, as a share of the imprint's width: 14 px of 175.
+/// Reach of the surroundings of a mask, as a share of the imprint's width: 14 px of 175.
 const AROUND_SHARE: f64 = 0.08;
 
 /// A small square of an imprint: its center, pixels, and the median of what was measured in it, meters.
@@ -20,7 +20,7 @@ struct Square {
 /// The medians over small squares, so that neither noise nor flying pixels count.
 fn squares(imprint: &DepthMap) -> Vec<Square> {
     let side = imprint.width().div_ceil(SQUARES_ACROSS).max(1);
-    let mut found = Vec::new();
+    let mut squares = Vec::new();
     let mut values: Vec<f32> = Vec::with_capacity(side * side);
     for y in (0..imprint.height()).step_by(side) {
         for x in (0..imprint.width()).step_by(side) {
@@ -30,25 +30,25 @@ fn squares(imprint: &DepthMap) -> Vec<Square> {
                 values.extend(imprint.row(row)[x..right].iter().copied().filter(|d| d.is_finite()));
             }
             if let Some(depth) = at_share(&mut values, 0.5) {
-                found.push(Square { x: (x + right) as f64 / 2.0, y: (y + below) as f64 / 2.0, depth });
+                squares.push(Square { x: (x + right) as f64 / 2.0, y: (y + below) as f64 / 2.0, depth });
             }
         }
     }
-    found
+    squares
 }
 
 /// The value that this share of the values stays below; `None` of nothing.
 fn at_share(values: &mut [f32], share: f64) -> Option<f32> {
     let last = values.len().checked_sub(1)?;
     // Of an even number in the middle the upper one.
-    let at = last.min((share * values.len() as f64) as usize);
-    Some(*values.select_nth_unstable_by(at, f32::total_cmp).1)
+    let rank = last.min((share * values.len() as f64) as usize);
+    Some(*values.select_nth_unstable_by(rank, f32::total_cmp).1)
 }
 
 fn between(mut depths: Vec<f32>) -> Option<[f32; 2]> {
     let last = depths.len().checked_sub(1)?;
-    let mut at = |share: f64| *depths.select_nth_unstable_by((share * last as f64) as usize, f32::total_cmp).1;
-    Some([at(REST_SHARE), at(1.0 - TOP_SHARE)])
+    let mut quantile = |share: f64| *depths.select_nth_unstable_by((share * last as f64) as usize, f32::total_cmp).1;
+    Some([quantile(REST_SHARE), quantile(1.0 - TOP_SHARE)])
 }
 
 /// Rest and top of an imprint, meters: the depth that a quarter of it stays below, and that of its deepest parts, both
@@ -69,7 +69,7 @@ impl Slope {
         (self.x * x + self.y * y) as f32
     }
 
-    /// That of the plane through some squares, by least squares; none where they do not determine one.
+    /// Slope of the plane through some squares, by least squares; none where they do not determine one.
     fn of(squares: &[Square]) -> Self {
         let n = squares.len().max(1) as f64;
         let mean = |of: fn(&Square) -> f64| squares.iter().map(of).sum::<f64>() / n;
@@ -89,7 +89,7 @@ impl Slope {
     }
 }
 
-/// How far an imprint rises out of its rest once the plane that fits it best is taken out, meters: a bubble that is held
+/// Rise of an imprint out of its rest once the plane that fits it best is taken out, meters: a bubble that is held
 /// askew gives a ramp and touches nothing. 0 if nothing was measured.
 pub fn rise(imprint: &DepthMap) -> f32 {
     let squares = squares(imprint);
@@ -121,12 +121,12 @@ pub fn stands_out(imprint: &DepthMap, mask: &Mask) -> Option<f32> {
 /// Pixels within `reach` of a mask's, along rows and columns.
 fn near(mask: &Mask, reach: usize) -> Mask {
     let [width, height] = mask.size();
-    let spread = |len: usize, at: &dyn Fn(usize) -> bool| -> Vec<bool> {
-        let mut found = vec![false; len];
-        for i in (0..len).filter(|&i| at(i)) {
-            found[i.saturating_sub(reach)..len.min(i + reach + 1)].fill(true);
+    let spread = |len: usize, is_set: &dyn Fn(usize) -> bool| -> Vec<bool> {
+        let mut reached = vec![false; len];
+        for i in (0..len).filter(|&i| is_set(i)) {
+            reached[i.saturating_sub(reach)..len.min(i + reach + 1)].fill(true);
         }
-        found
+        reached
     };
     let rows: Vec<bool> = (0..height).flat_map(|y| spread(width, &|x| mask[(x, y)])).collect();
     let columns: Vec<Vec<bool>> = (0..width).map(|x| spread(height, &|y| rows[y * width + x])).collect();

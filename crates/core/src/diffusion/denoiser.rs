@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::Tensor;
 
-/// What a denoiser's output means, with `x = √ᾱ·x₀ + √(1-ᾱ)·ε`.
+/// Meaning of a denoiser's output, with `x = √ᾱ·x₀ + √(1-ᾱ)·ε`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Prediction {
@@ -32,9 +32,9 @@ pub enum ModelError {
     Shape {
         /// The graph's role in its bundle.
         graph: String,
-        /// What the bundle says.
+        /// Shape that the bundle states.
         expected: Vec<usize>,
-        /// What came.
+        /// Shape that came.
         found: Vec<usize>,
     },
     /// NaN or infinity in an output.
@@ -44,7 +44,7 @@ pub enum ModelError {
     NonFinite {
         /// The graph's role in its bundle.
         graph: String,
-        /// How many.
+        /// Number of such values.
         count: usize,
     },
 }
@@ -59,7 +59,7 @@ pub trait Denoiser {
     /// [`ModelError`] if the model cannot be run.
     fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError>;
 
-    /// What the output of [`Denoiser::predict`] means.
+    /// Meaning of the output of [`Denoiser::predict`].
     fn prediction(&self) -> Prediction;
 
     /// Shape of one latent, without the batch.

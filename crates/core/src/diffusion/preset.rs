@@ -25,7 +25,7 @@ pub enum Preset {
     /// One step: for looking through a data set, and for a robot that waits. It draws about the mean of all plausible
     /// imprints, so seeds hardly differ.
     Fast,
-    /// What the bundle recommends.
+    /// The steps that the bundle recommends.
     #[default]
     Default,
     /// As many steps as still change anything: the sharpest picture. Whether it is also the one with the smallest

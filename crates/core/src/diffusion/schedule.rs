@@ -10,7 +10,7 @@ pub struct Schedule {
     alpha_bar: Vec<f64>,
 }
 
-/// Which training steps a sampler visits.
+/// Spacing of the training steps that a sampler visits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Spacing {
@@ -37,7 +37,7 @@ pub struct Step {
     pub alpha_bar_next: f64,
 }
 
-/// What keeps numbers from being a schedule, or a schedule from being used.
+/// Fault that keeps numbers from being a schedule, or a schedule from being used.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ScheduleError {
     /// No steps, or so many that they cannot be a schedule.
@@ -54,9 +54,9 @@ pub enum ScheduleError {
     /// A value outside [0, 1], or NaN.
     #[error("the signal share at training step {step} is {value}, outside 0 to 1")]
     Value {
-        /// Where.
+        /// Training step.
         step: usize,
-        /// What.
+        /// Signal share ᾱ there.
         value: f64,
     },
     /// The signal share grows with the noise.
@@ -226,8 +226,8 @@ mod tests {
         for (step, expected, tolerance) in
             [(0, 0.9985, 1e-9), (1, 0.996_995_6, 5e-8), (996, 0.000_700_70, 5e-9), (999, 0.000_668_67, 5e-9)]
         {
-            let found = schedule.alpha_bar()[step];
-            assert!((found - expected).abs() < tolerance, "step {step}: {found}");
+            let alpha_bar = schedule.alpha_bar()[step];
+            assert!((alpha_bar - expected).abs() < tolerance, "step {step}: {alpha_bar}");
         }
     }
 

@@ -72,7 +72,7 @@ impl Tensor {
         Some(Tensor { shape, data: items.iter().flat_map(|t| t.data.iter().copied()).collect() })
     }
 
-    /// How many values are NaN or infinite.
+    /// Number of values that are NaN or infinite.
     pub fn non_finite(&self) -> usize {
         self.data.iter().filter(|v| !v.is_finite()).count()
     }

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use super::Tensor;
 
-/// How far a generation is. Sent before each step; answer `Break` to cancel.
+/// Progress of a generation. Sent before each step; answer `Break` to cancel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Progress {
     /// Steps done.
@@ -18,8 +18,8 @@ pub trait Watch {
     /// Called before each step and once at the end; `Break` ends the run within one step.
     fn progress(&mut self, progress: Progress) -> ControlFlow<()>;
 
-    /// Whether the clean latent, as the model sees it `after` these steps, is wanted. Not asked after the last step,
-    /// whose estimate is the result. Nothing is computed for an answer of `false`.
+    /// Returns true where the clean latent, as the model sees it `after` these steps, is wanted. Not asked after the
+    /// last step, whose estimate is the result. Nothing is computed for an answer of `false`.
     fn wants_estimate(&mut self, after: Progress) -> bool {
         let _ = after;
         false

@@ -1,4 +1,4 @@
-//! How well imprints lie on the tool's outline at a pose: [`likeness`].
+//! Likeness: how well imprints lie on the tool's outline at a pose, see [`likeness`].
 
 use glam::{DVec2, DVec3};
 
@@ -66,7 +66,7 @@ pub(super) fn likeness(sample: &Sample, field: &DistanceField, grasp_from_object
     if felt.len() < FEWEST { 0.0 } else { correlation(&felt, &outline) }
 }
 
-/// Of values whose mean is 0; 0 where one does not vary.
+/// Correlation of values whose mean is 0; 0 where one does not vary.
 pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
     let size = (dot(a, a) * dot(b, b)).sqrt();
@@ -89,7 +89,7 @@ pub(super) fn registered(sample: &Sample, field: &DistanceField) -> Option<Plana
     Some(align(&yz, field, &AlignConfig { rungs, ..config }).ok()?.grasp_from_object)
 }
 
-/// How far the registered angle is from the true one, radians; `None` where one is not known.
+/// Error of the registered angle, radians; `None` where the true or the registered one is not known.
 pub(super) fn angle_error_rad(sample: &Sample, field: &DistanceField) -> Option<f64> {
     let truth = sample.grasp_from_object?;
     Some(angle_error(registered(sample, field)?.theta_rad, truth.theta_rad))

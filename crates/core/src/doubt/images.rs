@@ -16,8 +16,8 @@ const MOST: f64 = 0.8;
 const UNIT: f64 = 1.5;
 /// One whose brightest value is larger is on the scale 0..255.
 const BYTES: f64 = 8.0;
-/// Where nothing touches the gel the difference is about 0, levels of 255: sound images have a median of up to 5 in each
-/// channel.
+/// Largest sound median of a channel, levels of 255: where nothing touches the gel the difference is about 0, and sound
+/// images have a median of up to 5.
 const OFF: f64 = 12.0;
 /// A reading that brings that median down to this share of it explains it.
 const EXPLAINED: f64 = 0.4;
@@ -37,7 +37,7 @@ const LIGHTS_AGREE: f64 = 0.75;
 /// Side of the square that the light is read from, pixels.
 const SIDE: usize = 128;
 
-/// What is wrong with the color images of some pairs.
+/// Doubt about the color images of some pairs.
 pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
     let touches: Vec<&ColorTouch> =
         felt.iter().flat_map(|felt| felt.sample.pads.iter().flatten()).filter_map(|touch| touch.color()).collect();
@@ -50,9 +50,9 @@ pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
     plain(&faces, colored).or_else(|| stored(&images, &faces)).or_else(|| swapped(felt)).or_else(|| laid(felt, &faces))
 }
 
-/// What there is to say of one touch at a glance.
+/// Figures of one touch that tell at a glance.
 struct Face {
-    /// Whether touched and untouched image are equal, pixel by pixel.
+    /// True where touched and untouched image are equal, pixel by pixel.
     same: bool,
     touch: Plain,
     reference: Plain,
@@ -68,7 +68,7 @@ struct Plain {
     median: [f64; 3],
     /// Median of each channel, modulo 256 nearest to 0.
     wrapped: [f64; 3],
-    /// Whether the three channels are equal.
+    /// True where the three channels are equal.
     gray: bool,
 }
 
@@ -106,12 +106,12 @@ fn most(faces: &[Face], shows: impl Fn(&Face) -> bool) -> Option<String> {
     enough.then(|| format!("{count} of {}", counted(faces.len(), "image")))
 }
 
-/// Whether the color sensor is a GelSlim, of which is known that its light is colored, and where it comes from.
+/// True where the color sensor is a GelSlim, of which is known that its light is colored, and where it comes from.
 fn is_gelslim(rig: &Rig) -> bool {
     rig.color().is_some_and(|sensor| sensor.key == lab::GELSLIM.key)
 }
 
-/// What shows at a glance. `colored`: the sensor's light has colors.
+/// Doubt about what shows at a glance. `colored`: the sensor's light has colors.
 fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
     let broken = |cause, what: String, hint: &str| Some(Doubt { cause, what, hint: hint.into() });
     if let Some(of) = most(faces, |face| face.same && !face.touch.single()) {
@@ -215,8 +215,8 @@ fn wrapped_around(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
         }
     }
     let share = steps as f64 / count.max(1) as f64;
-    let found = negative.is_some() || (share > STEPS && smooth < SMOOTHER * rough);
-    found.then(|| {
+    let wrapped = negative.is_some() || (share > STEPS && smooth < SMOOTHER * rough);
+    wrapped.then(|| {
         let figures = format!(
             "{:.1} % of the differences are larger than 128 levels, and without the steps of 256 the images are {:.0} % smoother",
             100.0 * share,
@@ -290,7 +290,7 @@ fn laid(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
     Some(Doubt::stored(read_as, &figures))
 }
 
-/// How the images of a sample lie by their light, where it tells surely. Only a GelSlim's light is known.
+/// Turns of the images of a sample, read from their light, where it tells surely. Only a GelSlim's light is known.
 fn of_light(sample: &Sample) -> Vec<Turn> {
     if !is_gelslim(&sample.rig) {
         return Vec::new();

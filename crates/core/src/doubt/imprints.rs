@@ -16,9 +16,9 @@ use crate::units::counted;
 
 /// Mean likeness of imprints that lie on their tools. Simulated ones have 0.6 to 0.85, wrongly read ones 0.5 and less.
 const LIES_ON: f64 = 0.5;
-/// By how much more a reading must have it: what a sound data set gains by another reading is 0.01.
+/// Gain in mean likeness that a reading must have: what a sound data set gains by another reading is 0.01.
 const CLEARLY: f64 = 0.08;
-/// The same of a CAD model, of which there may be a single pair.
+/// Gain that a reading of a CAD model must have: of one tool there may be a single pair.
 const CLEARLY_OF_TOOL: f64 = 0.15;
 /// Pairs whose likeness is at least this are not tried with other CAD models.
 const GOOD: f64 = 0.65;
@@ -43,7 +43,7 @@ fn readings() -> Vec<ReadAs> {
     all
 }
 
-/// How a CAD model is to be turned or mirrored: which of its axes, with which sign, becomes x, y and z.
+/// Reordering of the axes of a CAD model: which of them, with which sign, becomes x, y and z.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Axes {
     from: [usize; 3],
@@ -130,7 +130,7 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// What is wrong with the imprints of some pairs, or with their CAD models.
+/// Doubt about the imprints of some pairs, or about their CAD models.
 pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
     let pairs = Pairs::of(samples, named, meshes);
     if pairs.samples.is_empty() {
@@ -197,7 +197,7 @@ fn best_reading(pairs: &Pairs<'_>, stored: &[f64]) -> Option<(ReadAs, Gain)> {
         .max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))
 }
 
-/// By what a reading of the imprints is better.
+/// Figures by which a reading of the imprints is better, in words.
 fn figures(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> String {
     let errors = |readings: &[ReadAs]| {
         let error = |(sample, tool): (&Sample, &&str)| {
@@ -280,16 +280,16 @@ fn of_models(
 
 /// For each tool in doubt the other one whose model its pairs lie on, with the gain.
 fn other_models<'a>(pairs: &Pairs<'a>, doubted: &[(&'a str, f64)]) -> Vec<(&'a str, &'a str, f64)> {
-    let mut found = Vec::new();
+    let mut better = Vec::new();
     for &(tool, as_is) in doubted {
         let others = pairs.fields.iter().filter(|(other, _)| **other != tool);
         let scores = others.map(|(other, field)| (*other, pairs.of_tool(tool, field)));
         let best = scores.max_by(|(_, a), (_, b)| a.total_cmp(b));
         if let Some((other, score)) = best.filter(|(_, score)| *score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL) {
-            found.push((tool, other, score - as_is));
+            better.push((tool, other, score - as_is));
         }
     }
-    found
+    better
 }
 
 /// The axes with which most of the tools in doubt are explained, and those with their gains.

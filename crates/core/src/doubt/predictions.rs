@@ -19,14 +19,14 @@ const CLEARLY: f64 = 0.12;
 /// From this likeness on nothing is tried.
 const GOOD: f64 = 0.6;
 
-/// What is wrong with the images, seen by their predictions. `sound`: nothing was found in the images themselves.
+/// Doubt about the images, seen by their predictions. `sound`: nothing was found in the images themselves.
 pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Option<Doubt> {
     let both: Vec<&Sample> = samples.iter().filter(|sample| fingers(sample).len() == 2).collect();
     if both.is_empty() {
         return None;
     }
-    let made = predict(&both)?;
-    let stored = scores(&both, &made, false);
+    let predicted = predict(&both)?;
+    let stored = scores(&both, &predicted, false);
     let mean = stored.iter().sum::<f64>() / stored.len().max(1) as f64;
     let mut best: Option<(ReadAs, Gain)> = None;
     let mut consider = |read_as: ReadAs, read: &[f64]| {
@@ -35,14 +35,14 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
             best = Some((read_as, gain));
         }
     };
-    consider(ReadAs::ImageSwapFingers, &scores(&both, &made, true));
+    consider(ReadAs::ImageSwapFingers, &scores(&both, &predicted, true));
     if sound && mean < GOOD {
         let lays = [Lay::MirrorColumns, Lay::MirrorRows, Lay::Turn].map(ReadAs::ImageLay);
         let others = [ReadAs::ImageBgr(Images::Both), ReadAs::ImageSwapReference];
         for read_as in lays.into_iter().chain(others) {
             let read: Vec<Sample> = both.iter().map(|sample| ReadAs::all(&[read_as], sample)).collect();
-            let Some(made) = predict(&read.iter().collect::<Vec<_>>()) else { break };
-            consider(read_as, &scores(&both, &made, false));
+            let Some(predicted) = predict(&read.iter().collect::<Vec<_>>()) else { break };
+            consider(read_as, &scores(&both, &predicted, false));
         }
     }
     let (read_as, gain) = best?;
@@ -62,19 +62,19 @@ fn fingers(sample: &Sample) -> Vec<PadId> {
 }
 
 /// The likeness of each pair's predictions, of their own finger's image or the other one's.
-fn scores(samples: &[&Sample], made: &[Placed], swapped: bool) -> Vec<f64> {
-    let score = |(sample, made): (&&Sample, &Placed)| {
+fn scores(samples: &[&Sample], predicted: &[Placed], swapped: bool) -> Vec<f64> {
+    let score = |(sample, predicted): (&&Sample, &Placed)| {
         let pads = fingers(sample);
-        let from = |at: usize| pads[if swapped { pads.len() - 1 - at } else { at }];
-        let of = |at: usize| {
-            let predicted = made[from(at)].as_ref()?[pads[at]].as_ref()?;
-            let measured = &sample.pad(pads[at])?.depth()?.imprint;
-            Some(likeness(predicted, measured, &sample.rig, pads[at]))
+        let from = |index: usize| pads[if swapped { pads.len() - 1 - index } else { index }];
+        let of = |index: usize| {
+            let predicted = predicted[from(index)].as_ref()?[pads[index]].as_ref()?;
+            let measured = &sample.pad(pads[index])?.depth()?.imprint;
+            Some(likeness(predicted, measured, &sample.rig, pads[index]))
         };
         let each: Vec<f64> = (0..pads.len()).filter_map(of).collect();
         each.iter().sum::<f64>() / each.len().max(1) as f64
     };
-    samples.iter().zip(made).map(score).collect()
+    samples.iter().zip(predicted).map(score).collect()
 }
 
 /// Correlation of what is pushed in in two imprints, where the color sensor's window lies, -1..1.

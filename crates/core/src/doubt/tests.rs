@@ -15,9 +15,9 @@ struct Set {
 
 fn set(condition: Condition, pairs: u64, config: &SimConfig) -> Set {
     let mut set = Set { pairs: Vec::new(), tools: BTreeMap::new() };
-    for at in 0..pairs {
-        let spec = condition.tool(&tools()[(at as usize * 5 + 1) % tools().len()], at);
-        let sample = condition.simulate(&spec, random_grasp(0x00d0_0b70 + at), at, config);
+    for index in 0..pairs {
+        let spec = condition.tool(&tools()[(index as usize * 5 + 1) % tools().len()], index);
+        let sample = condition.simulate(&spec, random_grasp(0x00d0_0b70 + index), index, config);
         set.tools.insert(spec.name.clone(), spec.mesh());
         set.pairs.push((spec.name, sample));
     }
@@ -88,20 +88,20 @@ fn predictions_tell_the_fingers_of_the_images() {
     // In place of a generator: the imprints of the fingers whose images they are.
     let sound = set(Condition::Plain, 3, &SimConfig::default());
     let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample }).collect();
-    let made = |swapped: bool| {
+    let predictor = |swapped: bool| {
         move |samples: &[&Sample]| {
             let imprint =
                 |sample: &Sample, pad| -> Option<DepthMap> { Some(sample.pad(pad)?.depth()?.imprint.clone()) };
             let of = |sample: &&Sample| -> Placed {
                 let pads = sample.rig.pad_list();
-                let from = |at: usize| if swapped { pads[pads.len() - 1 - at] } else { pads[at] };
-                (0..pads.len()).map(|at| Some(pads.iter().map(|_| imprint(sample, from(at))).collect())).collect()
+                let from = |index: usize| if swapped { pads[pads.len() - 1 - index] } else { pads[index] };
+                (0..pads.len()).map(|index| Some(pads.iter().map(|_| imprint(sample, from(index))).collect())).collect()
             };
             Some(samples.iter().map(of).collect())
         }
     };
-    assert!(judge(&felt, &BTreeMap::new(), Some(&mut made(false))).is_empty());
-    let swapped = judge(&felt, &BTreeMap::new(), Some(&mut made(true)));
+    assert!(judge(&felt, &BTreeMap::new(), Some(&mut predictor(false))).is_empty());
+    let swapped = judge(&felt, &BTreeMap::new(), Some(&mut predictor(true)));
     assert_eq!(swapped.iter().map(Doubt::read_as).collect::<Vec<_>>(), [Some(ReadAs::ImageSwapFingers)]);
     assert!(swapped[0].what.contains("3 of 3 pairs"), "{}", swapped[0].what);
 }

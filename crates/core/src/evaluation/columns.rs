@@ -27,7 +27,7 @@ pub struct Column {
     pub(super) of: Of,
 }
 
-/// How the figure of a group is made of its grasps.
+/// Reduction of a group's grasps to its figure.
 pub(super) enum Of {
     /// Of each tool's grasps, then the mean over the tools, with an interval.
     Tool(fn(&[&GraspScore]) -> Option<f64>),
@@ -205,7 +205,7 @@ pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
     COLUMNS.iter().filter(|column| rows.iter().flat_map(|r| &r.groups).any(|f| f.get(column).is_some())).collect()
 }
 
-/// What the columns mean, a line each.
+/// Notes on the meaning of the columns, a line each.
 pub const NOTES: [&str; 7] = [
     "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
@@ -219,7 +219,7 @@ pub const NOTES: [&str; 7] = [
     "tool: share of imprints whose tool the classifier names",
 ];
 
-/// What PSNR and SSIM mean.
+/// Conventions of PSNR and SSIM.
 pub fn conventions(scale: Scale) -> &'static str {
     match scale {
         Scale::Measured => {

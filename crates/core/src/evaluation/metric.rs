@@ -256,7 +256,7 @@ impl Metric {
         self.row().larger_is_better
     }
 
-    /// Whether `a` is worse than `b`: then it is less. A metric that is not a number (no pose was found) is the worst.
+    /// Order of two values, the worse one first. A metric that is not a number (no pose was found) is the worst.
     pub fn worse(self, a: f64, b: f64) -> Ordering {
         self.badness(b).total_cmp(&self.badness(a))
     }
@@ -288,7 +288,7 @@ pub struct Condition {
     pub metric: Metric,
     /// The bound, in the unit of the screen.
     bound: f64,
-    /// Which side of it passes.
+    /// Orders of a value and the bound that pass.
     passes: [Ordering; 2],
 }
 
@@ -296,8 +296,8 @@ impl Condition {
     /// The condition that a word states; `None` for a word that states none.
     pub fn parse(word: &str) -> Option<Self> {
         use strum::IntoEnumIterator as _;
-        let at = word.find(['<', '>'])?;
-        let (left, rest) = word.split_at(at);
+        let sign = word.find(['<', '>'])?;
+        let (left, rest) = word.split_at(sign);
         let side = if rest.starts_with('<') { Ordering::Less } else { Ordering::Greater };
         let (or_equal, number) = match rest[1..].strip_prefix('=') {
             Some(number) => (Ordering::Equal, number),
@@ -309,7 +309,7 @@ impl Condition {
         Some(Self { source: source.to_owned(), metric, bound, passes: [side, or_equal] })
     }
 
-    /// Whether a value passes. What failed is worse than any number.
+    /// True where a value passes. What failed is worse than any number.
     pub fn passes(&self, value: f64) -> bool {
         let worst = if self.metric.larger_is_better() { f64::NEG_INFINITY } else { f64::INFINITY };
         let shown = if value.is_nan() { worst } else { self.metric.shown(value) };

@@ -1,4 +1,4 @@
-//! What was published, on real data.
+//! Published figures, on real data.
 
 use super::{Estimate, Group, Row, TableMetrics};
 

@@ -141,10 +141,10 @@ pub fn latex(rows: &[Row]) -> String {
     for row in rows {
         out += &tex(&row.method);
         for (group, column) in groups.iter().flat_map(|group| columns.iter().map(move |column| (*group, *column))) {
-            let found = figure(row, group, column);
-            let text = number(found, column.decimals);
+            let estimate = figure(row, group, column);
+            let text = number(estimate, column.decimals);
             let own = !row.published && !row.upper_bound;
-            let bold = own && found.is_some_and(|e| Some(e.value) == best(group, column));
+            let bold = own && estimate.is_some_and(|e| Some(e.value) == best(group, column));
             out += &if bold { format!(" & \\textbf{{{text}}}") } else { format!(" & {text}") };
         }
         out += " \\\\\n";

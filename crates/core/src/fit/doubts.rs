@@ -19,9 +19,9 @@ const FEWEST: usize = 6;
 /// A pair whose measurement is far from what all others lead to expect.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Doubt {
-    /// Which case, counted from 0.
+    /// Case, counted from 0.
     pub case: usize,
-    /// Its root mean square residual when it is left out, meters.
+    /// Root mean square residual of the pair when it is left out, meters.
     pub residual_m: f64,
     /// The median of all.
     pub median_m: f64,
@@ -31,10 +31,10 @@ pub struct Doubt {
     pub turn: Option<String>,
 }
 
-/// The cases that are out of line, worst first. `made` are their left-out pictures.
-pub fn doubts(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Vec<Doubt> {
+/// The cases that are out of line, worst first. `left_out` are their predictions by fits without them.
+pub fn doubts(cases: &[FitPair<'_>], left_out: &[Option<DepthMap>]) -> Vec<Doubt> {
     let residuals: Vec<Option<f64>> =
-        cases.iter().zip(made).map(|(case, made)| rms(made.as_ref()?, case.target)).collect();
+        cases.iter().zip(left_out).map(|(case, prediction)| rms(prediction.as_ref()?, case.target)).collect();
     let mut sorted: Vec<f64> = residuals.iter().copied().flatten().collect();
     if sorted.len() < FEWEST {
         return Vec::new();
@@ -45,15 +45,16 @@ pub fn doubts(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Vec<Doubt> {
     apart.sort_by(f64::total_cmp);
     // The median distance is 0.6745 deviations of a bell.
     let above = |deviations: f64| median_m + deviations * apart[apart.len() / 2] / 0.6745;
-    let mut found: Vec<Doubt> = residuals
+    let mut doubts: Vec<Doubt> = residuals
         .par_iter()
         .enumerate()
         .filter_map(|(case, residual)| {
             let residual_m = residual.filter(|r| *r > above(SUSPECT))?;
             let target = cases[case].target;
-            let others = made.iter().enumerate().filter(|(other, _)| *other != case);
-            let partner = nearest(others.filter_map(|(other, made)| Some((other, rms(made.as_ref()?, target)?))));
-            let own = made[case].as_ref()?;
+            let others = left_out.iter().enumerate().filter(|(other, _)| *other != case);
+            let partner =
+                nearest(others.filter_map(|(other, prediction)| Some((other, rms(prediction.as_ref()?, target)?))));
+            let own = left_out[case].as_ref()?;
             let turn = nearest(Turn::all().skip(1).filter_map(|turn| Some((turn, rms(own, &turn.undo(target))?))));
             let explains = |v: f64| v < EXPLAINS * residual_m;
             let partner = partner.filter(|(_, v)| explains(*v)).map(|(other, _)| other);
@@ -62,8 +63,8 @@ pub fn doubts(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Vec<Doubt> {
             doubtful.then_some(Doubt { case, residual_m, median_m, partner, turn })
         })
         .collect();
-    found.sort_by(|a, b| b.residual_m.total_cmp(&a.residual_m));
-    found
+    doubts.sort_by(|a, b| b.residual_m.total_cmp(&a.residual_m));
+    doubts
 }
 
 fn nearest<T>(all: impl Iterator<Item = (T, f64)>) -> Option<(T, f64)> {
@@ -71,11 +72,11 @@ fn nearest<T>(all: impl Iterator<Item = (T, f64)>) -> Option<(T, f64)> {
 }
 
 /// Over the pixels that were measured; `None` for other sizes or without any.
-fn rms(made: &DepthMap, target: &DepthMap) -> Option<f64> {
-    if made.size() != target.size() {
+fn rms(prediction: &DepthMap, target: &DepthMap) -> Option<f64> {
+    if prediction.size() != target.size() {
         return None;
     }
-    let squares = made.as_slice().iter().zip(target.as_slice()).map(|(a, b)| f64::from(a - b).powi(2));
+    let squares = prediction.as_slice().iter().zip(target.as_slice()).map(|(a, b)| f64::from(a - b).powi(2));
     let (sum, n) = squares.filter(|v| v.is_finite()).fold((0.0, 0usize), |(sum, n), v| (sum + v, n + 1));
     (n > 0).then(|| (sum / n as f64).sqrt())
 }

@@ -10,7 +10,7 @@ use crate::postprocess::Correction;
 use crate::rig::{PadId, PerPad};
 use crate::sample::{Sample, Scale};
 
-/// From what a fit was made, as it stands in a bundle's manifest.
+/// Source of a fit: the data and the bundle that it was made from, as they stand in a bundle's manifest.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FitSource {
@@ -18,7 +18,7 @@ pub struct FitSource {
     pub data: String,
     /// The name of the rig.
     pub rig: String,
-    /// Whether meters were measured or assumed.
+    /// Scale: whether meters were measured or assumed.
     pub scale: Scale,
     /// The pairs.
     pub pairs: Vec<String>,
@@ -28,13 +28,13 @@ pub struct FitSource {
     pub pictures: Vec<String>,
     /// The name of the bundle that was fitted.
     pub from: String,
-    /// Its SHA-256.
+    /// SHA-256 of that bundle.
     pub from_sha256: String,
 }
 
 impl FitSource {
-    /// Whether both are of the same data, as far as can be told: of a picture in common, else of the same name, rig and a
-    /// pair in common.
+    /// True where both are of the same data, as far as can be told: of a picture in common, else of the same name, rig
+    /// and a pair in common.
     pub fn same_data(&self, other: &Self) -> bool {
         let common = |a: &[String], b: &[String]| a.iter().any(|one| b.contains(one));
         if self.pictures.is_empty() || other.pictures.is_empty() {
@@ -43,7 +43,7 @@ impl FitSource {
         common(&self.pictures, &other.pictures)
     }
 
-    /// What makes these data others than those it was fitted to, in words.
+    /// Difference of these data from those it was fitted to, in words; `None` where it sees none.
     pub fn misgiving(&self, sample: &Sample) -> Option<String> {
         let rig = (self.rig != sample.rig.name).then(|| format!("taken with the rig {}", self.rig));
         let scale = || format!("whose meters were {}", self.scale.key());
@@ -56,19 +56,19 @@ impl FitSource {
     }
 }
 
-/// What a fit knows of one pad.
+/// Fit of one pad.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PadFit {
-    /// What its predictions need.
+    /// Correction that its predictions need.
     pub correction: Arc<Correction>,
-    /// What the lattice of its GelSlim looks like, where pictures were fitted.
+    /// Lattice of its GelSlim, where pictures were fitted.
     pub lattice: Option<Grid<f32>>,
 }
 
 /// A fit of a generator to a rig.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fitted {
-    /// From what it was made.
+    /// Data and bundle that it was made from.
     pub source: FitSource,
     /// In the order of the rig's pads.
     pub pads: PerPad<PadFit>,

@@ -1,4 +1,4 @@
-//! Where a pad's predictions belong in its pictures.
+//! Offset of a pad's predictions from where they belong in its pictures.
 
 use super::{FitPair, GRAIN_PX};
 use crate::blur::gaussian;
@@ -44,25 +44,26 @@ fn offset(cases: &[&FitPair<'_>], start: [f64; 2], reach: f64) -> [f64; 2] {
     let whole =
         (-steps..=steps).flat_map(|dy| (-steps..=steps).map(move |dx| [from[0] + dx as f64, from[1] + dy as f64]));
     let border = (REACH * side / 2.0) as usize;
-    let scored = whole.map(|at| (likeness(&small_refs, &small.1, at, border), at));
+    let scored = whole.map(|offset| (likeness(&small_refs, &small.1, offset, border), offset));
     let Some((best, [dx, dy])) = scored.max_by(|a, b| a.0.total_cmp(&b.0)) else { return start };
     if best < LEAST_CORRELATION {
         return start;
     }
     let border = 2 * border;
-    let mut at = [2.0 * dx, 2.0 * dy];
-    let mut score = likeness(&predictions, &targets, at, border);
+    let mut offset = [2.0 * dx, 2.0 * dy];
+    let mut score = likeness(&predictions, &targets, offset, border);
     let mut step = 1.0;
     while step >= FINEST_PX {
-        let around = [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]].map(|d| [at[0] + d[0], at[1] + d[1]]);
+        let around =
+            [[step, 0.0], [-step, 0.0], [0.0, step], [0.0, -step]].map(|d| [offset[0] + d[0], offset[1] + d[1]]);
         let tried = around.map(|next| (likeness(&predictions, &targets, next, border), next));
-        let near = |at: &[f64; 2]| at.iter().zip(start).all(|(a, b)| (a - b).abs() <= reach * side);
-        match tried.into_iter().filter(|(_, at)| near(at)).max_by(|a, b| a.0.total_cmp(&b.0)) {
-            Some((better, next)) if better > score => (score, at) = (better, next),
+        let near = |offset: &[f64; 2]| offset.iter().zip(start).all(|(a, b)| (a - b).abs() <= reach * side);
+        match tried.into_iter().filter(|(_, offset)| near(offset)).max_by(|a, b| a.0.total_cmp(&b.0)) {
+            Some((better, next)) if better > score => (score, offset) = (better, next),
             _ => step /= 2.0,
         }
     }
-    at
+    offset
 }
 
 /// The target without the sensor's grain; where nothing was measured, the mean of the rest.
@@ -87,6 +88,6 @@ fn likeness(predictions: &[&DepthMap], targets: &[DepthMap], by: [f64; 2], borde
         }
     }
     let (a, b) = (xx - x * x / n, yy - y * y / n);
-    let found = (xy - x * y / n) / (a * b).sqrt();
-    if found.is_finite() { found } else { -1.0 }
+    let correlation = (xy - x * y / n) / (a * b).sqrt();
+    if correlation.is_finite() { correlation } else { -1.0 }
 }

@@ -1,4 +1,4 @@
-//! What predictions of some shapes are known to miss: ridge regression on the pictures' principal components.
+//! Residual that predictions of some shapes are known to leave: ridge regression on the pictures' principal components.
 
 use nalgebra::DMatrix;
 
@@ -39,9 +39,9 @@ pub(super) fn response(pictures: &[Pixels], missing: &[Grid<f64>]) -> Option<Res
         // In these components the pictures are uncorrelated, so that each has its answer by itself.
         let length = values[k].sqrt();
         let weights: Vec<f64> = (0..n).map(|i| vectors[(i, k)]).collect();
-        basis.push(summed(width, height, &weights, |i, at| rest[i][at] / length));
+        basis.push(summed(width, height, &weights, |i, pixel| rest[i][pixel] / length));
         let scale = length / (values[k] + RIDGE * largest);
-        answers.push(summed(width, height, &weights, |i, at| smooth[i].as_slice()[at] * scale));
+        answers.push(summed(width, height, &weights, |i, pixel| smooth[i].as_slice()[pixel] * scale));
     }
     (!basis.is_empty()).then(|| Response {
         center: Grid::from_fn(width, height, |x, y| center[y * width + x] as f32),

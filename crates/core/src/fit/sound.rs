@@ -1,4 +1,4 @@
-//! What speaks against a fit: figures that no sensor leads to, and predictions that do not know their own measurement.
+//! Objections to a fit: figures that no sensor leads to, and predictions that do not know their own measurement.
 
 use std::fmt;
 
@@ -32,9 +32,9 @@ const SIDE: usize = 32;
 pub struct FoundPad<'a> {
     /// The name for people.
     pub name: &'a str,
-    /// Its correction.
+    /// Correction of the pad.
     pub correction: &'a Correction,
-    /// Where the rig says that the drawn window lies, as an offset like the correction's own, and how far from there a
+    /// Window that the rig says is drawn: its place as an offset like the correction's own, and how far from there a
     /// window still overlaps it: half of its width and height. Pixels; `None` where the rig does not say.
     pub window: Option<[[f64; 2]; 2]>,
 }
@@ -149,7 +149,7 @@ pub fn absurd(fit: &PadFit) -> Option<String> {
     all.find_map(|(name, most, picture)| Some(format!("{:e} in \"{name}\"", over(most, picture)?)))
 }
 
-/// What the figures of a fit object to: its gains and offsets.
+/// Objections to the figures of a fit: its gains and offsets.
 pub fn figures(cases: &[FitPair<'_>], pads: &[Option<FoundPad<'_>>]) -> Vec<Objection> {
     let mut out = Vec::new();
     for (number, pad) in pads.iter().enumerate() {
@@ -187,7 +187,7 @@ fn slope(cases: &[&FitPair<'_>], correction: &Correction) -> Option<f64> {
     (spread > 1e-12 * xx).then(|| along / spread)
 }
 
-/// Whether the angle speaks against the fit.
+/// Objection to the fit by the angle's errors.
 pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
     let mean_rad = [before, after].map(|angle| angle.mean_deg.map(f64::to_radians));
     let worse = match mean_rad {
@@ -199,20 +199,21 @@ pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
     (worse || lost).then_some(Objection::Angle { mean_rad, failed })
 }
 
-/// Whether predictions know their own measurements: `made` are the left-out pictures. Says nothing of few touches.
-pub fn strangers(cases: &[FitPair<'_>], made: &[Option<DepthMap>]) -> Option<Objection> {
+/// Objection that predictions do not know their own measurements: `left_out` are those by fits without the case. `None`
+/// for few touches.
+pub fn strangers(cases: &[FitPair<'_>], left_out: &[Option<DepthMap>]) -> Option<Objection> {
     let pads = cases.iter().map(|case| case.pad + 1).max().unwrap_or_default();
-    let ranks: Vec<f64> = (0..pads).flat_map(|pad| nearness(cases, made, pad)).collect();
+    let ranks: Vec<f64> = (0..pads).flat_map(|pad| nearness(cases, left_out, pad)).collect();
     let nearness = ranks.iter().sum::<f64>() / ranks.len() as f64;
     (nearness < LEAST_NEARNESS).then_some(Objection::Strangers { nearness, touches: ranks.len() })
 }
 
 /// For each touch of a pad the share of the others whose deviation from the pad's mean is less like its own prediction's
 /// than its own measurement's is, and the other way round.
-fn nearness(cases: &[FitPair<'_>], made: &[Option<DepthMap>], pad: usize) -> Vec<f64> {
+fn nearness(cases: &[FitPair<'_>], left_out: &[Option<DepthMap>], pad: usize) -> Vec<f64> {
     let own: Vec<(&DepthMap, &DepthMap)> = cases
         .iter()
-        .zip(made)
+        .zip(left_out)
         .filter(|(c, _)| c.pad == pad)
         .filter_map(|(c, m)| Some((m.as_ref()?, c.target)))
         .collect();
@@ -221,12 +222,12 @@ fn nearness(cases: &[FitPair<'_>], made: &[Option<DepthMap>], pad: usize) -> Vec
     }
     let stride = own.len().div_ceil(MOST);
     let own: Vec<_> = own.into_iter().step_by(stride).collect();
-    let made = deviations(own.iter().map(|(made, _)| *made));
+    let predictions = deviations(own.iter().map(|(prediction, _)| *prediction));
     let targets = deviations(own.iter().map(|(_, target)| *target));
     let n = own.len();
     let likeness: Vec<f64> = (0..n * n)
         .into_par_iter()
-        .map(|at| made[at / n].iter().zip(&targets[at % n]).map(|(a, b)| a * b).sum())
+        .map(|pair| predictions[pair / n].iter().zip(&targets[pair % n]).map(|(a, b)| a * b).sum())
         .collect();
     let like = |i: usize, j: usize| likeness[i * n + j];
     let beaten = |i: usize, of: &dyn Fn(usize) -> f64| {
@@ -250,11 +251,11 @@ fn deviations<'a>(images: impl Iterator<Item = &'a DepthMap>) -> Vec<Vec<f64>> {
         .collect();
     let mut all: Vec<Vec<f64>> = small.iter().map(|g| g.as_slice().iter().map(|&v| f64::from(v)).collect()).collect();
     let length = all.first().map_or(0, Vec::len);
-    for at in 0..length {
-        let finite = || all.iter().map(|image| image[at]).filter(|v| v.is_finite());
+    for pixel in 0..length {
+        let finite = || all.iter().map(|image| image[pixel]).filter(|v| v.is_finite());
         let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
         for image in &mut all {
-            image[at] = if image[at].is_finite() { image[at] - mean } else { 0.0 };
+            image[pixel] = if image[pixel].is_finite() { image[pixel] - mean } else { 0.0 };
         }
     }
     for image in &mut all {
@@ -289,10 +290,10 @@ mod tests {
             .collect();
         let corrections = closed_form(&cases, 1).unwrap();
         let parts: Vec<usize> = (0..12).map(|i| i % 3).collect();
-        let made = left_out(&cases, 1, &parts).unwrap();
-        let found = FoundPad { name: "thumb", correction: corrections[0].as_ref().unwrap(), window };
-        let mut out = figures(&cases, &[Some(found)]);
-        out.extend(strangers(&cases, &made));
+        let predictions = left_out(&cases, 1, &parts).unwrap();
+        let pad = FoundPad { name: "thumb", correction: corrections[0].as_ref().unwrap(), window };
+        let mut out = figures(&cases, &[Some(pad)]);
+        out.extend(strangers(&cases, &predictions));
         out
     }
 
@@ -305,7 +306,8 @@ mod tests {
 
     #[test]
     fn another_unit_sign_place_or_touch_is() {
-        let said = |found: Vec<Objection>| found.iter().map(Objection::to_string).collect::<Vec<_>>().join("; ");
+        let said =
+            |objections: Vec<Objection>| objections.iter().map(Objection::to_string).collect::<Vec<_>>().join("; ");
         assert!(said(objections(|i| bump(i, 4.0), None)).contains("another unit"));
         assert!(said(objections(|i| bump(i, -0.004), None)).contains("less is measured"));
         assert!(said(objections(|i| bump(i, 0.004), Some([[20.0, 0.0], [9.0, 9.0]]))).contains("off the window"));

@@ -5,15 +5,15 @@ const SIDE: usize = 64;
 
 /// A touch somewhere: two bumps of some millimeters.
 fn touch(seed: usize) -> DepthMap {
-    let at = |k: usize| [(seed * 37 + k * 17) % 29 + 18, (seed * 23 + k * 41) % 27 + 19].map(|v| v as f64);
-    let (a, b) = (at(0), at(1));
+    let center = |k: usize| [(seed * 37 + k * 17) % 29 + 18, (seed * 23 + k * 41) % 27 + 19].map(|v| v as f64);
+    let (a, b) = (center(0), center(1));
     Grid::from_fn(SIDE, SIDE, |x, y| {
         let bump = |c: [f64; 2], w: f64| (-((x as f64 - c[0]).powi(2) + (y as f64 - c[1]).powi(2)) / (w * w)).exp();
         (0.006 * bump(a, 7.0) + 0.004 * bump(b, 4.0)) as f32
     })
 }
 
-/// What a rig makes of a touch: moved, on another scale, under a fixed pattern, half as strong at the left.
+/// Picture that a rig makes of a touch: moved, on another scale, under a fixed pattern, half as strong at the left.
 fn measured(touch: &DepthMap, offset_px: [f64; 2]) -> DepthMap {
     let there = moved(touch, offset_px);
     Grid::from_fn(SIDE, SIDE, |x, y| {
@@ -45,10 +45,10 @@ fn cases<'a>((predictions, targets, pads): &'a (Vec<DepthMap>, Vec<DepthMap>, Ve
 #[test]
 fn a_known_offset_field_and_gain_are_recovered_and_serve_unseen_touches() {
     let rig = rig(40);
-    let found = closed_form(&cases(&rig), 3).unwrap();
-    assert!(found[2].is_none(), "a pad without pairs");
+    let corrections = closed_form(&cases(&rig), 3).unwrap();
+    assert!(corrections[2].is_none(), "a pad without pairs");
     for (pad, expected) in [[-5.25, -3.0], [-1.0, -4.5]].into_iter().enumerate() {
-        let fit = found[pad].as_ref().unwrap();
+        let fit = corrections[pad].as_ref().unwrap();
         let off = fit.offset_px.iter().zip(expected).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
         // A half-strength side pulls the best correlation a little towards the other.
         assert!(off < 0.6, "pad {pad}: {:?}", fit.offset_px);
@@ -56,7 +56,7 @@ fn a_known_offset_field_and_gain_are_recovered_and_serve_unseen_touches() {
         let ratio = f64::from(fit.gain[(18, 30)]) / f64::from(fit.gain[(46, 30)]);
         assert!((ratio - 0.5).abs() < 0.15, "pad {pad}: {ratio}");
     }
-    let fit = found[0].as_ref().unwrap();
+    let fit = corrections[0].as_ref().unwrap();
     let (mut before, mut after) = (0.0, 0.0);
     for seed in 100..110 {
         let truth = measured(&touch(seed), [-5.25, -3.0]);
@@ -108,8 +108,8 @@ fn what_is_left_out_is_judged_by_the_others() {
     let all = cases(&rig);
     let folds = folds(&[None; 24], &(0..24).map(|i| i / 2).collect::<Vec<_>>(), 3);
     assert_eq!(&folds[..8], [0, 0, 1, 1, 2, 2, 0, 0]);
-    let made = left_out(&all, 2, &folds).unwrap();
-    let error = |i: usize| rms(made[i].as_ref().unwrap(), all[i].target) / rms(all[i].prediction, all[i].target);
+    let predictions = left_out(&all, 2, &folds).unwrap();
+    let error = |i: usize| rms(predictions[i].as_ref().unwrap(), all[i].target) / rms(all[i].prediction, all[i].target);
     assert!((0..24).all(|i| error(i) < 0.5), "{:?}", (0..24).map(error).collect::<Vec<_>>());
     // With a single fold nothing is left to learn from.
     assert_eq!(left_out(&all[..1], 2, &[0]).unwrap(), [None]);
@@ -124,11 +124,11 @@ fn a_wrong_partner_and_a_turned_picture_are_found() {
     rig.1.swap(3, 9);
     rig.1[14] = rig.1[14].rotated_180();
     let all = cases(&rig);
-    let made = left_out(&all, 2, &folds(&[None; 24], &(0..24).collect::<Vec<_>>(), 6)).unwrap();
-    let found = doubts(&all, &made);
-    let of = |case: usize| found.iter().find(|d| d.case == case);
-    assert_eq!((of(3).unwrap().partner, of(9).unwrap().partner), (Some(9), Some(3)), "{found:?}");
-    assert_eq!(of(14).unwrap().turn.as_deref(), Some("turned by 180°"), "{found:?}");
-    assert_eq!(found.len(), 3, "{found:?}");
-    assert!(doubts(&all[..4], &made[..4]).is_empty(), "too few to tell");
+    let predictions = left_out(&all, 2, &folds(&[None; 24], &(0..24).collect::<Vec<_>>(), 6)).unwrap();
+    let in_doubt = doubts(&all, &predictions);
+    let of = |case: usize| in_doubt.iter().find(|d| d.case == case);
+    assert_eq!((of(3).unwrap().partner, of(9).unwrap().partner), (Some(9), Some(3)), "{in_doubt:?}");
+    assert_eq!(of(14).unwrap().turn.as_deref(), Some("turned by 180°"), "{in_doubt:?}");
+    assert_eq!(in_doubt.len(), 3, "{in_doubt:?}");
+    assert!(doubts(&all[..4], &predictions[..4]).is_empty(), "too few to tell");
 }

@@ -1,4 +1,4 @@
-//! What a fit is worth on pairs that it was not made from.
+//! Validation: the worth of a fit on pairs that it was not made from.
 
 use std::collections::BTreeMap;
 
@@ -39,6 +39,7 @@ pub fn left_out(cases: &[FitPair<'_>], pads: usize, folds: &[usize]) -> Result<V
             if others.is_empty() { Ok(vec![None; pads]) } else { closed_form(&others, pads) }
         })
         .collect::<Result<Vec<_>, FitError>>()?;
-    let made = |(case, &fold): (&FitPair<'_>, &usize)| Some(fits[fold].get(case.pad)?.as_ref()?.apply(case.prediction));
-    Ok(cases.par_iter().zip(folds).map(made).collect())
+    let picture =
+        |(case, &fold): (&FitPair<'_>, &usize)| Some(fits[fold].get(case.pad)?.as_ref()?.apply(case.prediction));
+    Ok(cases.par_iter().zip(folds).map(picture).collect())
 }

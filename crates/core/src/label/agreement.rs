@@ -1,10 +1,10 @@
-//! How far two masks of the same imprint agree.
+//! Agreement of two masks of the same imprint.
 
 use serde::Serialize;
 
 use crate::grid::Mask;
 
-/// How far two masks agree.
+/// Agreement of two masks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Agreement {
     /// Pixels in both over pixels in either; 1 where both are empty.
@@ -17,7 +17,7 @@ pub struct Agreement {
     pub alone_px: [usize; 2],
 }
 
-/// How far `a` and `b` agree; `None` if they are not of one size.
+/// Agreement of `a` and `b`; `None` if they are not of one size.
 pub fn agreement(a: &Mask, b: &Mask, px_per_mm: f64) -> Option<Agreement> {
     if a.size() != b.size() {
         return None;
@@ -58,18 +58,18 @@ fn share(n: usize, of: usize) -> f64 {
 
 /// The pixels of a mask that touch the outside, or the edge of the image.
 fn edge(mask: &Mask) -> Vec<[f64; 2]> {
-    let mut found = Vec::new();
+    let mut edge = Vec::new();
     for y in 0..mask.height() {
         for x in 0..mask.width() {
             let inside = |nx: usize, ny: usize| mask.get(nx, ny) == Some(&true);
             let enclosed =
                 inside(x.wrapping_sub(1), y) && inside(x + 1, y) && inside(x, y.wrapping_sub(1)) && inside(x, y + 1);
             if mask[(x, y)] && !enclosed {
-                found.push([x as f64, y as f64]);
+                edge.push([x as f64, y as f64]);
             }
         }
     }
-    found
+    edge
 }
 
 /// Mean over both edges of the distance to the nearest pixel of the other, pixels.
@@ -95,14 +95,14 @@ mod tests {
 
     #[test]
     fn what_is_moved_by_two_pixels_agrees_by_what_overlaps() {
-        let found = agreement(&square(5), &square(7), 2.0).unwrap();
-        assert_eq!(found.alone_px, [20, 20]);
-        assert!((found.iou - 80.0 / 120.0).abs() < 1e-12 && (found.dice - 160.0 / 200.0).abs() < 1e-12);
+        let agreed = agreement(&square(5), &square(7), 2.0).unwrap();
+        assert_eq!(agreed.alone_px, [20, 20]);
+        assert!((agreed.iou - 80.0 / 120.0).abs() < 1e-12 && (agreed.dice - 160.0 / 200.0).abs() < 1e-12);
         // Two sides lie 1 mm apart, of the two others all but two pixels of ten on each other.
-        let edge = found.edge_mm.unwrap();
+        let edge = agreed.edge_mm.unwrap();
         assert!((0.2..0.6).contains(&edge), "{edge}");
         let back = agreement(&square(7), &square(5), 2.0).unwrap();
-        assert_eq!((back.iou, back.dice), (found.iou, found.dice));
+        assert_eq!((back.iou, back.dice), (agreed.iou, agreed.dice));
         assert!((back.edge_mm.unwrap() - edge).abs() < 1e-12);
     }
 

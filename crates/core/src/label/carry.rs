@@ -9,9 +9,9 @@ use crate::sample::DepthCamera;
 /// An imprint with the camera that felt it.
 #[derive(Clone, Copy, Debug)]
 pub struct Surface<'a> {
-    /// Meters.
+    /// Imprint, meters.
     pub imprint: &'a DepthMap,
-    /// Of the same finger.
+    /// Camera of the same finger.
     pub camera: &'a DepthCamera,
 }
 
@@ -52,15 +52,15 @@ pub fn carry(
     let carried = Mask::from_fn(to.imprint.width(), to.imprint.height(), |x, y| {
         let Some(there) = cloud::lift_pixel(to.imprint, to.camera, x, y) else { return false };
         let there = from_to.transform_point3(there);
-        let Some(at) = cloud::project(from.camera, there).map(|at| at.round()) else { return false };
-        if at.x < 0.0 || at.y < 0.0 {
+        let Some(pixel) = cloud::project(from.camera, there).map(|pixel| pixel.round()) else { return false };
+        if pixel.x < 0.0 || pixel.y < 0.0 {
             return false;
         }
-        let at = (at.x as usize, at.y as usize);
-        if mask.get(at.0, at.1) != Some(&true) {
+        let pixel = (pixel.x as usize, pixel.y as usize);
+        if mask.get(pixel.0, pixel.1) != Some(&true) {
             return false;
         }
-        let Some(here) = cloud::lift_pixel(from.imprint, from.camera, at.0, at.1) else { return false };
+        let Some(here) = cloud::lift_pixel(from.imprint, from.camera, pixel.0, pixel.1) else { return false };
         let drift = here.distance(there);
         let near = drift <= gate_m;
         if near {
@@ -82,8 +82,8 @@ mod tests {
     use crate::sample::Sample;
     use crate::sim::{Grasp, SimConfig, simulate};
 
-    fn grasp(at: Grasp, seed: u64) -> Sample {
-        simulate(&catalog::tools()[0], at, seed, &SimConfig::default())
+    fn grasp(held: Grasp, seed: u64) -> Sample {
+        simulate(&catalog::tools()[0], held, seed, &SimConfig::default())
     }
 
     /// The noise-free imprint of a finger: the grain is somebody else's.

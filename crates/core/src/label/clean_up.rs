@@ -69,7 +69,7 @@ impl CleanKind {
         }
     }
 
-    /// Whether it has a size.
+    /// True where the kind has a size.
     pub fn is_sized(self) -> bool {
         !matches!(self, Self::FillHoles | Self::LargestIsland | Self::ClearBorder | Self::Clear)
     }
@@ -78,7 +78,7 @@ impl CleanKind {
 /// A clean-up.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CleanUp {
-    /// What is done.
+    /// Kind of clean-up.
     pub kind: CleanKind,
     /// Radius, distance or (of [`CleanKind::DropSmall`]) diameter, millimeters; without meaning where the kind has none.
     pub size_mm: f64,

@@ -1,4 +1,5 @@
-//! How sure a mask model is of an imprint, and how far a mask drawn by hand is from what it says.
+//! Doubt about the mask of an imprint: how sure a mask model is of it, and how far one drawn by hand is from what it
+//! says.
 
 use serde::{Deserialize, Serialize};
 
@@ -28,7 +29,7 @@ impl Doubt {
     /// Of one finger: the model's probability of contact at any size, its mask of the imprint, and the one drawn by hand
     /// where there is one (of another size there is none).
     pub fn of(probability: &Grid<f32>, model: &Mask, hand: Option<&Mask>) -> Self {
-        let disagreement = hand.and_then(|hand| agreement(hand, model, 1.0)).map(|found| 1.0 - found.dice);
+        let disagreement = hand.and_then(|hand| agreement(hand, model, 1.0)).map(|agreement| 1.0 - agreement.dice);
         Self { unsure: unsure_share(probability), disagreement }
     }
 

@@ -18,9 +18,9 @@ pub enum DrawTool {
         /// Half its width, pixels of what is drawn on.
         radius_px: f32,
     },
-    /// What the pointer's way encloses, closed by a straight line.
+    /// The area that the pointer's way encloses, closed by a straight line.
     Lasso,
-    /// What straight lines between clicks enclose.
+    /// The area that straight lines between clicks enclose.
     Polygon,
     /// Between the first and the last point.
     Rectangle,
@@ -35,16 +35,16 @@ pub enum DrawTool {
 /// Pixels of dragging that double or halve the tolerance of the wand.
 const DOUBLES_PX: f32 = 24.0;
 
-/// What a hand does on a mask.
+/// One stroke or shape that a hand draws on a mask.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Drawing {
-    /// With what.
+    /// Tool that it is drawn with.
     #[serde(flatten)]
     pub tool: DrawTool,
     /// The pointer's way or the corners, pixels of the image, or of the picture of [`Self::sight`]: `(0, 0)` is the center of
     /// the first one.
     pub points: Vec<[f32; 2]>,
-    /// What it makes of the pixels.
+    /// Value that the pixels it touches get.
     #[serde(default)]
     pub paint: Paint,
     /// The picture of points in space that it was drawn on; `None` on the image itself.
@@ -52,17 +52,17 @@ pub struct Drawing {
     pub sight: Option<Box<Sight>>,
 }
 
-/// What a drawing falls on.
+/// Imprint that a drawing falls on, with what limits it.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground<'a> {
     /// The imprint, meters; as large as the mask.
     pub imprint: &'a DepthMap,
     /// The pixels that may change; `None` = all.
     pub allowed: Option<&'a Mask>,
-    /// What [`Paint::LetThrough`] lets through.
+    /// Mask that [`Paint::LetThrough`] takes the values from.
     pub proposed: Option<&'a Mask>,
-    /// Where the pixels lie in the picture of a drawing that has a [`Drawing::sight`]; without it such a drawing touches
-    /// nothing.
+    /// Places of the pixels in the picture of a drawing that has a [`Drawing::sight`]; without them such a drawing
+    /// touches nothing.
     pub seen: Option<&'a VisiblePixels>,
 }
 
@@ -93,7 +93,7 @@ impl Drawing {
         Self { tool, points, paint, sight: None }
     }
 
-    /// Whether it can touch anything.
+    /// Checks that it can touch anything.
     ///
     /// # Errors
     /// In words: too few points, or numbers that are none or of no size.
@@ -122,7 +122,7 @@ impl Drawing {
         Ok(())
     }
 
-    /// Whether it is made of clicks, and not of one drag.
+    /// True where it is made of clicks, and not of one drag.
     pub fn is_by_clicks(&self) -> bool {
         self.tool == DrawTool::Polygon
     }

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::grid::{DepthMap, Mask};
 
-/// Where a hand may change a mask: painting over the edge of a tool then stays on the tool.
+/// Gate: the pixels where a hand may change a mask. Painting over the edge of a tool then stays on the tool.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Gate {
@@ -17,7 +17,7 @@ pub struct Gate {
 }
 
 impl Gate {
-    /// Whether it keeps anything out.
+    /// True where it keeps nothing out.
     pub fn is_open(&self) -> bool {
         self.depth_m.is_none() && self.cad_m.is_none()
     }

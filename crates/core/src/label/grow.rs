@@ -5,7 +5,7 @@ use std::collections::BinaryHeap;
 
 use crate::grid::{DepthMap, Grid, Mask};
 
-/// What a step from pixel to pixel costs besides the depth that it climbs, meters: on a plateau the nearer seed wins.
+/// Cost of a step from pixel to pixel besides the depth that it climbs, meters: on a plateau the nearer seed wins.
 const STEP_M: f64 = 0.000_02;
 /// Micrometers, so that costs have an order without doubt.
 const UNITS_PER_M: f64 = 1e6;

@@ -5,8 +5,8 @@ use super::paint::Paint;
 use super::provenance::Provenance;
 use crate::grid::{Grid, Mask};
 
-/// What stands behind the pixels of a corrected mask: where the value of each comes from, and which are *ignored*, so that
-/// they count neither as contact nor as free of it.
+/// Marks of the pixels of a corrected mask: where the value of each comes from, and which are *ignored*, so that they
+/// count neither as contact nor as free of it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marks {
     /// Each provenance once; the first is what the correction began from.
@@ -21,7 +21,7 @@ pub struct Marks {
 const MOST_LAYERS: usize = 256;
 
 impl Marks {
-    /// Those of a mask whose pixels are all of one provenance; none is ignored.
+    /// Marks of a mask whose pixels are all of one provenance; none is ignored.
     pub fn all([width, height]: [usize; 2], provenance: Provenance) -> Self {
         Self { layers: vec![provenance], of: Grid::filled(width, height, 0), ignored: None }
     }
@@ -38,12 +38,12 @@ impl Marks {
         self.of.size()
     }
 
-    /// What the correction began from.
+    /// Provenance that the correction began from.
     pub fn base(&self) -> &Provenance {
         &self.layers[0]
     }
 
-    /// Where the value of a pixel comes from; `None` outside.
+    /// Provenance of a pixel's value; `None` outside.
     pub fn at(&self, x: usize, y: usize) -> Option<&Provenance> {
         self.layers.get(usize::from(*self.of.get(x, y)?))
     }
@@ -66,7 +66,7 @@ impl Marks {
         self.ignored.as_ref()
     }
 
-    /// Whether a pixel is ignored.
+    /// True where a pixel is ignored.
     pub fn is_ignored(&self, x: usize, y: usize) -> bool {
         self.ignored.as_ref().is_some_and(|ignored| ignored.get(x, y) == Some(&true))
     }
@@ -77,15 +77,15 @@ impl Marks {
         self.of.map(|&i| by_hand[usize::from(i)])
     }
 
-    /// Whether a person painted any of it.
+    /// True where a person painted any of it.
     pub fn has_hand_work(&self) -> bool {
         self.layers().iter().any(|(layer, px)| *px > 0 && layer.is_hand())
     }
 
     /// The index of a provenance; a new layer where there is none.
     fn layer(&mut self, provenance: Provenance) -> u8 {
-        if let Some(at) = self.layers.iter().position(|layer| *layer == provenance) {
-            return at as u8;
+        if let Some(index) = self.layers.iter().position(|layer| *layer == provenance) {
+            return index as u8;
         }
         if self.layers.len() == MOST_LAYERS {
             self.drop_unused();
@@ -117,11 +117,11 @@ impl Marks {
     }
 
     /// Sets what stands behind one pixel, which must be inside.
-    pub(super) fn put(&mut self, at: (usize, usize), ignored: bool, provenance: &Provenance) {
+    pub(super) fn put(&mut self, pixel: (usize, usize), ignored: bool, provenance: &Provenance) {
         let known = self.layers.iter().position(|layer| layer == provenance);
-        let layer = known.map_or_else(|| self.layer(provenance.clone()), |at| at as u8);
-        self.set_ignored(at, ignored);
-        self.of[at] = layer;
+        let layer = known.map_or_else(|| self.layer(provenance.clone()), |index| index as u8);
+        self.set_ignored(pixel, ignored);
+        self.of[pixel] = layer;
         if !ignored {
             self.tidy();
         }
@@ -146,8 +146,8 @@ impl Marks {
                 if touched.get(x, y) != Some(&true) || mask.get(x, y).is_none() {
                     continue;
                 }
-                let at = (x, y);
-                mask[at] = match paint {
+                let pixel = (x, y);
+                mask[pixel] = match paint {
                     Paint::Contact => true,
                     Paint::Free | Paint::Ignore => false,
                     Paint::LetThrough => match proposed.and_then(|proposed| proposed.get(x, y)) {
@@ -155,8 +155,8 @@ impl Marks {
                         None => continue,
                     },
                 };
-                self.set_ignored(at, paint == Paint::Ignore);
-                self.of[at] = layer;
+                self.set_ignored(pixel, paint == Paint::Ignore);
+                self.of[pixel] = layer;
             }
         }
         self.tidy();
@@ -203,19 +203,19 @@ impl Marks {
         let layer = self.layer(by);
         let [width, height] = self.size();
         let mut counts = [0; 2];
-        for at in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
-            let ignore = ignored.is_some_and(|ignored| ignored[at]);
+        for pixel in (0..height).flat_map(|y| (0..width).map(move |x| (x, y))) {
+            let ignore = ignored.is_some_and(|ignored| ignored[pixel]);
             // What is ignored is neither contact nor free of it.
-            let contact = new[at] && !ignore;
-            if mask[at] == contact && self.is_ignored(at.0, at.1) == ignore {
+            let contact = new[pixel] && !ignore;
+            if mask[pixel] == contact && self.is_ignored(pixel.0, pixel.1) == ignore {
                 continue;
             }
-            let stays = keep_manual && by_hand[at];
+            let stays = keep_manual && by_hand[pixel];
             counts[usize::from(stays)] += 1;
             if !stays {
-                mask[at] = contact;
-                self.set_ignored(at, ignore);
-                self.of[at] = layer;
+                mask[pixel] = contact;
+                self.set_ignored(pixel, ignore);
+                self.of[pixel] = layer;
             }
         }
         self.tidy();

@@ -7,8 +7,8 @@ use crate::grid::Mask;
 /// A mask with its marks.
 type Marked<'a> = (&'a Mask, &'a Marks);
 
-/// What two people made of `base`, each without the other: where `ours` changed a pixel (its value, or who looked at it) it is
-/// ours, everywhere else it is theirs. `None` if the sizes differ.
+/// Merge of what two people made of `base`, each without the other: where `ours` changed a pixel (its value, or who
+/// looked at it) it is ours, everywhere else it is theirs. `None` if the sizes differ.
 pub fn merge(base: Marked<'_>, ours: Marked<'_>, theirs: Marked<'_>) -> Option<(Mask, Marks)> {
     let size = base.0.size();
     if [ours, theirs].iter().any(|(mask, marks)| mask.size() != size || marks.size() != size) || base.1.size() != size {

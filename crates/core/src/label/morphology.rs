@@ -22,9 +22,9 @@ fn components(mask: &Mask, value: bool, corners: bool) -> (Grid<u32>, Vec<usize>
         let mut size = 0;
         labels.as_mut_slice()[start] = label;
         stack.push(start);
-        while let Some(at) = stack.pop() {
+        while let Some(pixel) = stack.pop() {
             size += 1;
-            let (x, y) = (at % width, at / width);
+            let (x, y) = (pixel % width, pixel / width);
             for ny in y.saturating_sub(1)..=(y + 1).min(height - 1) {
                 for nx in x.saturating_sub(1)..=(x + 1).min(width - 1) {
                     let next = ny * width + nx;

@@ -24,7 +24,7 @@ pub struct PackedMask {
     /// The ignored pixels, as `runs`; empty if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     ignored: Vec<u32>,
-    /// What the correction began from, as older files say it.
+    /// Words for what the correction began from, in older files.
     #[serde(default, skip_serializing)]
     base: String,
     /// The provenances.

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-/// What a drawing makes of the pixels it touches.
+/// Value that a drawing gives the pixels it touches.
 #[derive(
     Clone,
     Copy,
@@ -30,7 +30,7 @@ pub enum Paint {
     Free,
     /// Neither: a network does not learn from them, and no score counts them.
     Ignore,
-    /// What the proposal says that is shown over the mask.
+    /// The value of the proposal that is shown over the mask.
     LetThrough,
 }
 
@@ -40,7 +40,7 @@ impl Paint {
         self.into()
     }
 
-    /// What the other button of the pointer makes of them.
+    /// Value that the other button of the pointer gives them.
     #[must_use]
     pub fn reversed(self) -> Self {
         match self {

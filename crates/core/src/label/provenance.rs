@@ -7,7 +7,7 @@ use crate::frames::PlanarPose;
 use crate::manual::ManualPose;
 use crate::units::{text_deg, text_mm};
 
-/// Which pose of the tool a CAD distance was measured at. Poses are `grasp_from_object`.
+/// Pose of the tool that a CAD distance was measured at. Poses are `grasp_from_object`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CadPose {
@@ -28,13 +28,13 @@ impl CadPose {
         };
         match self {
             Self::Truth => "the true pose".into(),
-            Self::Registered(at) => format!("the registered pose ({})", pose(at)),
-            Self::Nudged(at) => format!("a pose moved by hand ({})", pose(at.planar)),
+            Self::Registered(planar) => format!("the registered pose ({})", pose(planar)),
+            Self::Nudged(manual) => format!("a pose moved by hand ({})", pose(manual.planar)),
         }
     }
 }
 
-/// Where the value of a pixel comes from.
+/// Provenance of the value of a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum Provenance {
@@ -43,7 +43,7 @@ pub enum Provenance {
     Nothing,
     /// A person looked at it and painted it.
     Hand {
-        /// Who.
+        /// Name of the person; empty where nobody knows.
         person: String,
     },
     /// Imprint above a depth.
@@ -60,12 +60,12 @@ pub enum Provenance {
     Cad {
         /// The greatest distance of contact, meters.
         within_m: f32,
-        /// Where the model lay.
+        /// Pose of the model.
         at: CadPose,
     },
     /// A mask model.
     Model {
-        /// Its name.
+        /// Name of the model.
         name: String,
         /// The identity of its bundle: a hash of its files.
         id: String,
@@ -81,38 +81,38 @@ pub enum Provenance {
     Depth {
         /// The depth, meters.
         min_m: f32,
-        /// What was asked.
+        /// Words for the provenance that was asked for.
         instead_of: String,
     },
     /// Grown from what a person painted.
     Grown,
     /// A copy of another mask.
     Copied {
-        /// Of which, in words.
+        /// Words for the mask it was copied from.
         from: String,
-        /// How it was moved in the grasp frame before, where it was.
+        /// Motion in the grasp frame before it was copied, where it was moved.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         moved: Option<PlanarPose>,
     },
     /// A clean-up of what was there.
     CleanUp {
-        /// Which.
+        /// Clean-up.
         what: CleanUp,
     },
     /// A file that another program wrote.
     Imported {
-        /// Its name.
+        /// Name of the file.
         file: String,
     },
-    /// What a file says that knew no other provenance.
+    /// Words of a file that knew no other provenance.
     Told {
-        /// Its words.
+        /// Words of the file.
         text: String,
     },
 }
 
 impl Provenance {
-    /// What a file says in words.
+    /// Provenance from the words of a file; [`Self::Nothing`] without any.
     pub fn told(text: impl Into<String>) -> Self {
         let text = text.into();
         if text.is_empty() { Self::Nothing } else { Self::Told { text } }
@@ -123,7 +123,7 @@ impl Provenance {
         Self::Hand { person: person.into() }
     }
 
-    /// Whether a person looked at this very pixel.
+    /// True where a person looked at this very pixel.
     pub(crate) fn is_hand(&self) -> bool {
         matches!(self, Self::Hand { .. })
     }

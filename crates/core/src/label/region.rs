@@ -13,13 +13,13 @@ pub(super) fn enclosed([width, height]: [usize; 2], points: &[DVec2]) -> Mask {
     }
     let mut crossings: Vec<f64> = Vec::new();
     for y in 0..height {
-        let at = y as f64;
+        let row = y as f64;
         crossings.clear();
         for (i, a) in points.iter().enumerate() {
             let b = points[(i + 1) % points.len()];
             // Half open, so that a corner on a row is met once.
-            if (a.y <= at) != (b.y <= at) {
-                crossings.push(a.x + (at - a.y) / (b.y - a.y) * (b.x - a.x));
+            if (a.y <= row) != (b.y <= row) {
+                crossings.push(a.x + (row - a.y) / (b.y - a.y) * (b.x - a.x));
             }
         }
         crossings.sort_by(f64::total_cmp);
@@ -33,7 +33,7 @@ pub(super) fn enclosed([width, height]: [usize; 2], points: &[DVec2]) -> Mask {
     mask
 }
 
-/// Whether a closed line encloses a point, as [`enclosed`] has it.
+/// True where a closed line encloses a point, as [`enclosed`] has it.
 pub(super) fn encloses(points: &[DVec2], p: DVec2) -> bool {
     if points.len() < 3 {
         return false;
@@ -62,11 +62,16 @@ pub(super) fn rectangle([width, height]: [usize; 2], a: DVec2, b: DVec2) -> Mask
 pub(super) fn about_as_deep(imprint: &DepthMap, seed: DVec2, tolerance_m: f64) -> Mask {
     let (width, height) = (imprint.width(), imprint.height());
     let mut mask = Mask::filled(width, height, false);
-    let at = seed.round();
-    if !at.is_finite() || at.x < 0.0 || at.y < 0.0 || at.x >= width as f64 || at.y >= height as f64 {
+    let start_px = seed.round();
+    if !start_px.is_finite()
+        || start_px.x < 0.0
+        || start_px.y < 0.0
+        || start_px.x >= width as f64
+        || start_px.y >= height as f64
+    {
         return mask;
     }
-    let start = (at.x as usize, at.y as usize);
+    let start = (start_px.x as usize, start_px.y as usize);
     let depth = f64::from(imprint[start]);
     let fits = |x, y| (f64::from(imprint[(x, y)]) - depth).abs() <= tolerance_m;
     if !fits(start.0, start.1) {

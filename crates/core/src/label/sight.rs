@@ -9,11 +9,11 @@ use strum::EnumIter;
 
 use super::region;
 
-/// Which of several points that lie behind each other a drawing reaches.
+/// Layers of points that lie behind each other: which of them a drawing reaches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum Layers {
-    /// Those that nothing hides.
+    /// Points that nothing hides.
     #[default]
     Front,
     /// All of them.
@@ -21,7 +21,7 @@ pub enum Layers {
 }
 
 impl Layers {
-    /// What is reached, in words.
+    /// Points that are reached, in words.
     pub fn name(self) -> &'static str {
         match self {
             Self::Front => "front-most points",
@@ -39,13 +39,13 @@ impl Layers {
     }
 }
 
-/// How far behind the nearest point a point may lie and still belong to the same layer, meters.
+/// Largest distance of a point behind the nearest one, meters, at which it still belongs to the same layer.
 const LAYER_M: f64 = 0.0025;
 /// Width of the cells in which the nearest point is looked for, in distances between neighboring points: in each cell of a
 /// layer there is one.
 const CELL: f64 = 2.0;
 
-/// How a picture of points in space was taken: what a drawing on it is a drawing on.
+/// View that a picture of points in space was taken from: what a drawing on it is a drawing on.
 ///
 /// In single precision, so that it is the same after it was written and read as text.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,7 +54,7 @@ pub struct Sight {
     pub clip_from_grasp: Mat4,
     /// Columns and rows of the picture.
     pub size_px: [u32; 2],
-    /// What is reached.
+    /// Layers that are reached.
     #[serde(default)]
     pub layers: Layers,
     /// Planes that cut it open: what has `xyz · p + w < 0` (meters) is neither reached nor hides anything.
@@ -79,9 +79,9 @@ impl Projection {
         let clip = self.clip * p.extend(1.0);
         // Reversed depth: in front of the near plane means z <= w.
         let inside = clip.w > 0.0 && clip.z <= clip.w && clip.z >= 0.0;
-        let at = (DVec2::new(1.0 + clip.x / clip.w, 1.0 - clip.y / clip.w)) * self.half_size - 0.5;
+        let place_px = (DVec2::new(1.0 + clip.x / clip.w, 1.0 - clip.y / clip.w)) * self.half_size - 0.5;
         let depth = self.depth(clip);
-        (inside && at.is_finite() && depth.is_finite()).then_some((at, depth))
+        (inside && place_px.is_finite() && depth.is_finite()).then_some((place_px, depth))
     }
 
     /// In perspective `w` grows with the depth, in a parallel projection `z` falls with it.
@@ -98,8 +98,8 @@ impl Projection {
 }
 
 impl Sight {
-    /// Where a point (meters, grasp frame) appears, `(0, 0)` being the center of the first pixel; `None` behind the eye and
-    /// for a point that is not finite.
+    /// Place of a point (meters, grasp frame) in the picture, pixels, `(0, 0)` being the center of the first pixel;
+    /// `None` behind the eye and for a point that is not finite.
     pub fn project(&self, p_in_grasp: DVec3) -> Option<DVec2> {
         Some(Projection::of(self).place(p_in_grasp)?.0)
     }
@@ -114,7 +114,7 @@ impl Sight {
     }
 }
 
-/// Where the pixels of one finger's mask lie in a picture: those that a drawing on it reaches.
+/// Pixels of one finger's mask that a drawing on a picture reaches, with their places in it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VisiblePixels {
     /// Column and row in the mask, and place in the picture.
@@ -129,32 +129,38 @@ impl VisiblePixels {
     pub fn new(sight: &Sight, (own, pixels): (&[DVec3], &[[u16; 2]]), others: &[&[DVec3]]) -> Self {
         let projection = Projection::of(sight);
         let place = |p: &DVec3| projection.place(*p).filter(|_| !sight.cuts_away(*p));
-        let placed: Vec<([u16; 2], DVec2, f64)> =
-            own.iter().zip(pixels).filter_map(|(p, pixel)| place(p).map(|(at, depth)| (*pixel, at, depth))).collect();
+        let placed: Vec<([u16; 2], DVec2, f64)> = own
+            .iter()
+            .zip(pixels)
+            .filter_map(|(p, pixel)| place(p).map(|(place_px, depth)| (*pixel, place_px, depth)))
+            .collect();
         let spacing_px = median(own.iter().filter_map(|p| projection.px_per_m(*p)))
             .zip(spacing(own, pixels))
             .map_or(1.0, |(scale, spacing_m)| scale * spacing_m);
         let cell_px = (CELL * spacing_px).max(1.0);
-        let cell = |at: DVec2| ((at.x / cell_px).floor() as i64, (at.y / cell_px).floor() as i64);
+        let cell = |place_px: DVec2| ((place_px.x / cell_px).floor() as i64, (place_px.y / cell_px).floor() as i64);
         let mut nearest: HashMap<(i64, i64), f64> = HashMap::new();
         if sight.layers == Layers::Front {
             let hiding = others.iter().flat_map(|points| points.iter()).filter_map(place);
-            for (at, depth) in placed.iter().map(|(_, at, depth)| (*at, *depth)).chain(hiding) {
-                let least = nearest.entry(cell(at)).or_insert(depth);
+            for (place_px, depth) in placed.iter().map(|(_, place_px, depth)| (*place_px, *depth)).chain(hiding) {
+                let least = nearest.entry(cell(place_px)).or_insert(depth);
                 *least = least.min(depth);
             }
         }
-        let is_reached = |at: DVec2, depth: f64| nearest.get(&cell(at)).is_none_or(|least| depth <= least + LAYER_M);
-        let points =
-            placed.into_iter().filter(|(_, at, depth)| is_reached(*at, *depth)).map(|(pixel, at, _)| (pixel, at));
+        let is_reached =
+            |place_px: DVec2, depth: f64| nearest.get(&cell(place_px)).is_none_or(|least| depth <= least + LAYER_M);
+        let points = placed
+            .into_iter()
+            .filter(|(_, place_px, depth)| is_reached(*place_px, *depth))
+            .map(|(pixel, place_px, _)| (pixel, place_px));
         Self { points: points.collect(), reach_px: 0.5 * spacing_px }
     }
 
     /// The pixel whose point is nearest to a place in the picture.
     pub(super) fn nearest(&self, at_px: DVec2) -> Option<[u16; 2]> {
-        let distance = |at: &DVec2| (*at - at_px).length_squared();
-        let found = self.points.iter().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
-        Some(found.0)
+        let distance = |place_px: &DVec2| (*place_px - at_px).length_squared();
+        let nearest = self.points.iter().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)))?;
+        Some(nearest.0)
     }
 
     /// The pixels whose points lie within `radius_px` of the segment from `a` to `b` of the picture.
@@ -165,7 +171,7 @@ impl VisiblePixels {
             let t = if length2 > 0.0 { ((p - a).dot(along) / length2).clamp(0.0, 1.0) } else { 0.0 };
             (p - (a + along * t)).length_squared() <= radius * radius
         };
-        self.points.iter().filter(move |(_, at)| hit(*at)).map(|(pixel, _)| *pixel)
+        self.points.iter().filter(move |(_, place_px)| hit(*place_px)).map(|(pixel, _)| *pixel)
     }
 
     /// The pixels whose points a closed line of the picture encloses, or with `box_only` the rectangle between its first and
@@ -177,7 +183,10 @@ impl VisiblePixels {
         };
         let (lo, hi) = bounds(if box_only { &ends } else { corners });
         let in_box = |p: DVec2| p.cmpge(lo).all() && p.cmple(hi).all();
-        let points = self.points.iter().filter(|(_, at)| in_box(*at) && (box_only || region::encloses(corners, *at)));
+        let points = self
+            .points
+            .iter()
+            .filter(|(_, place_px)| in_box(*place_px) && (box_only || region::encloses(corners, *place_px)));
         points.map(|(pixel, _)| *pixel).collect()
     }
 }
@@ -190,8 +199,10 @@ fn median(values: impl Iterator<Item = f64>) -> Option<f64> {
 
 /// The distance between points of neighboring pixels of a row, meters, median.
 fn spacing(points: &[DVec3], pixels: &[[u16; 2]]) -> Option<f64> {
-    let neighbors =
-        points.windows(2).zip(pixels.windows(2)).filter(|(_, at)| at[0][1] == at[1][1] && at[1][0] - at[0][0] == 1);
+    let neighbors = points
+        .windows(2)
+        .zip(pixels.windows(2))
+        .filter(|(_, pixels)| pixels[0][1] == pixels[1][1] && pixels[1][0] - pixels[0][0] == 1);
     median(neighbors.map(|(p, _)| p[0].distance(p[1])).filter(|d| d.is_finite()))
 }
 
@@ -214,9 +225,9 @@ pub(super) mod testing {
 
     /// A sheet of 21 x 21 points half a millimeter apart around the axis, at a height.
     pub(crate) fn sheet(z: f64) -> (Vec<DVec3>, Vec<[u16; 2]>) {
-        let at = |i: u16| (f64::from(i) - 10.0) * 0.0005;
+        let coordinate = |i: u16| (f64::from(i) - 10.0) * 0.0005;
         let pixels: Vec<[u16; 2]> = (0..21).flat_map(|y| (0..21).map(move |x| [x, y])).collect();
-        (pixels.iter().map(|[x, y]| DVec3::new(at(*x), at(*y), z)).collect(), pixels)
+        (pixels.iter().map(|[x, y]| DVec3::new(coordinate(*x), coordinate(*y), z)).collect(), pixels)
     }
 }
 
@@ -227,8 +238,8 @@ mod tests {
 
     const CENTER: DVec2 = DVec2::new(199.5, 149.5);
 
-    fn stamp(seen: &VisiblePixels, at: DVec2, radius_px: f64) -> usize {
-        seen.along([at, at], radius_px).count()
+    fn stamp(seen: &VisiblePixels, place_px: DVec2, radius_px: f64) -> usize {
+        seen.along([place_px, place_px], radius_px).count()
     }
 
     #[test]
@@ -236,8 +247,8 @@ mod tests {
         let sight = from_above(4000.0, Layers::Front);
         assert!((sight.project(DVec3::ZERO).unwrap() - CENTER).length() < 1e-4);
         // x to the right, y up on the screen.
-        let at = sight.project(DVec3::new(0.005, 0.005, 0.0)).unwrap();
-        assert!((at - CENTER - DVec2::new(20.0, -20.0)).length() < 1e-3, "{at}");
+        let place_px = sight.project(DVec3::new(0.005, 0.005, 0.0)).unwrap();
+        assert!((place_px - CENTER - DVec2::new(20.0, -20.0)).length() < 1e-3, "{place_px}");
         assert!((sight.px_per_m(DVec3::ZERO).unwrap() - 4000.0).abs() < 1e-3);
         assert!((sight.px_per_m(DVec3::Z * 0.1).unwrap() - 8000.0).abs() < 1e-2, "twice as large at half the way");
         for p in [DVec3::NAN, DVec3::Z * 0.3, DVec3::Z * 0.195] {

@@ -104,7 +104,7 @@ impl MeshDistance {
         if distance.is_finite() && self.contains(p) { -distance } else { distance }
     }
 
-    /// Whether `p` is inside the mesh: the size of its winding number is above one half.
+    /// True where `p` is inside the mesh: the size of its winding number is above one half.
     pub fn contains(&self, p: DVec3) -> bool {
         let root = &self.nodes[0];
         if !p.is_finite() || root.distance_squared(p) > 0.0 {
@@ -199,7 +199,7 @@ impl MeshDistance {
     }
 }
 
-/// What a search found.
+/// Result of a search.
 struct Nearest {
     /// Squared distance to the triangle; the limit if there is none.
     squared: f64,
@@ -296,7 +296,7 @@ mod tests {
         q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
     }
 
-    /// Whether a normal is one of the six of an axis-aligned box.
+    /// True where a normal is one of the six of an axis-aligned box.
     fn exact_axis(normal: DVec3) -> bool {
         let n = normal.abs();
         (n.max_element() - 1.0).abs() < 1e-12 && (n.element_sum() - 1.0).abs() < 1e-12

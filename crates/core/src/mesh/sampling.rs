@@ -9,13 +9,13 @@ use super::{TriMesh, triangle_area};
 impl TriMesh {
     /// `count` points on the surface, meters, object frame; each triangle gets a share by its area.
     ///
-    /// The same seed gives the same points on every machine. Triangles without an area or with corners that are
+    /// One seed gives the same points on every machine. Triangles without an area or with corners that are
     /// not finite get none; a mesh without any area gives an empty list.
     pub fn sample_surface(&self, count: usize, seed: u64) -> Vec<DVec3> {
         self.sample_surface_with_normals(count, seed).into_iter().map(|(point, _)| point).collect()
     }
 
-    /// The same points as [`Self::sample_surface`], each with the unit normal of its triangle.
+    /// Points of [`Self::sample_surface`], each with the unit normal of its triangle.
     pub(crate) fn sample_surface_with_normals(&self, count: usize, seed: u64) -> Vec<(DVec3, DVec3)> {
         let mut upto = Vec::with_capacity(self.triangles.len());
         let mut total = 0.0;
@@ -32,8 +32,8 @@ impl TriMesh {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         (0..count)
             .map(|_| {
-                let at = rng.random::<f64>() * total;
-                let triangle = upto.partition_point(|&t| t <= at).min(upto.len() - 1);
+                let area = rng.random::<f64>() * total;
+                let triangle = upto.partition_point(|&t| t <= area).min(upto.len() - 1);
                 let [a, b, c] = self.corners(triangle);
                 // The square root makes the density uniform over the triangle instead of denser at one corner.
                 let (r, v) = (rng.random::<f64>().sqrt(), rng.random::<f64>());
@@ -47,8 +47,8 @@ impl TriMesh {
 
 /// Indices of at most `count` of `len` items, spread evenly and in order: one from each of `count` equal blocks.
 ///
-/// Which item of a block is taken is hashed from the block's number, so that the choice neither locks onto the rows
-/// of an image (as a fixed stride does) nor changes between runs.
+/// The item taken of a block is hashed from the block's number, so that the choice neither locks onto the rows of an
+/// image (as a fixed stride does) nor changes between runs.
 pub fn spread(len: usize, count: usize) -> Vec<usize> {
     if len <= count {
         return (0..len).collect();

@@ -19,13 +19,13 @@ pub fn planes(picture: &RgbGrid, scale: f64) -> Grid<f32> {
 /// # Errors
 /// As [`psnr()`] and [`ssim()`].
 pub fn color(prediction: &RgbGrid, truth: &RgbGrid) -> Result<(Psnr, f64), MetricError> {
-    let found = psnr(&planes(prediction, 1.0), &planes(truth, 1.0), LEVELS)?;
+    let psnr = psnr(&planes(prediction, 1.0), &planes(truth, 1.0), LEVELS)?;
     let mut similar = 0.0;
     for channel in 0..3 {
         let plane = |picture: &RgbGrid| picture.map(|pixel| pixel[channel]);
         similar += ssim(&plane(prediction), &plane(truth), SsimRange::Explicit(LEVELS))?.mean / 3.0;
     }
-    Ok((found, similar))
+    Ok((psnr, similar))
 }
 
 #[cfg(test)]

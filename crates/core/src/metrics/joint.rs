@@ -16,7 +16,7 @@ const RELATIVE_NO_SPREAD: f64 = 1e-6;
 /// Half the range of a histogram of equal values, meters.
 const HALF_RANGE_M: f64 = 5e-4;
 
-/// How many pixels have which truth and which prediction.
+/// Joint histogram: number of pixels by truth and prediction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
     /// `counts[(truth bin, prediction bin)]`, from [`Joint::lo`] to [`Joint::hi`] on both axes.
@@ -140,7 +140,7 @@ mod tests {
         assert!(line.deviation < 1e-7);
         assert_eq!(joint.counts.as_slice().iter().sum::<u32>() as usize, joint.pixels);
         // Below the diagonal of the histogram nothing lies: every prediction is too deep.
-        let below = (0..64).flat_map(|t| (0..t).map(move |p| (t, p))).map(|at| joint.counts[at]).sum::<u32>();
+        let below = (0..64).flat_map(|t| (0..t).map(move |p| (t, p))).map(|bins| joint.counts[bins]).sum::<u32>();
         assert_eq!(below, 0);
     }
 
@@ -189,8 +189,8 @@ mod tests {
         #[test]
         fn an_exact_line_is_found(slope in -3.0f64..3.0, offset in -0.05f64..0.05) {
             let pairs: Vec<[f64; 2]> = (0..500).map(|i| { let t = 2e-5 * f64::from(i); [t, slope * t + offset] }).collect();
-            let found = line(&pairs).unwrap();
-            prop_assert!((found.slope - slope).abs() < 1e-9 && (found.offset - offset).abs() < 1e-9, "{:?}", found);
+            let line = line(&pairs).unwrap();
+            prop_assert!((line.slope - slope).abs() < 1e-9 && (line.offset - offset).abs() < 1e-9, "{:?}", line);
         }
     }
 }

@@ -24,7 +24,7 @@ pub struct PixelMetrics {
     pub bias: Option<f64>,
 }
 
-/// The same figures over the whole image, and over its two parts.
+/// Figures over the whole image, and over its two parts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Split {
     /// All pixels.
@@ -99,25 +99,25 @@ mod tests {
         for (p, s) in prediction.as_mut_slice().iter_mut().zip(seen.as_slice()) {
             *p += if *s { 0.0 } else { -0.001 };
         }
-        let found = split(&prediction, &truth, &seen, 0.0225).unwrap();
-        assert_eq!((found.seen.mae, found.seen.bias, found.seen.psnr_db), (Some(0.0), Some(0.0), None));
-        assert!((found.invented.mae.unwrap() - 0.001).abs() < 1e-8);
-        assert!((found.invented.bias.unwrap() + 0.001).abs() < 1e-8);
-        assert!((found.invented.psnr_db.unwrap() - 27.04).abs() < 0.01);
-        assert!(found.seen.ssim.unwrap() > found.invented.ssim.unwrap());
-        assert_eq!(found.seen.pixels + found.invented.pixels, found.whole.pixels);
+        let metrics = split(&prediction, &truth, &seen, 0.0225).unwrap();
+        assert_eq!((metrics.seen.mae, metrics.seen.bias, metrics.seen.psnr_db), (Some(0.0), Some(0.0), None));
+        assert!((metrics.invented.mae.unwrap() - 0.001).abs() < 1e-8);
+        assert!((metrics.invented.bias.unwrap() + 0.001).abs() < 1e-8);
+        assert!((metrics.invented.psnr_db.unwrap() - 27.04).abs() < 0.01);
+        assert!(metrics.seen.ssim.unwrap() > metrics.invented.ssim.unwrap());
+        assert_eq!(metrics.seen.pixels + metrics.invented.pixels, metrics.whole.pixels);
         let n = |f: PixelMetrics| f.pixels as f64;
-        let mean = (n(found.seen) * found.seen.mae.unwrap() + n(found.invented) * found.invented.mae.unwrap())
-            / n(found.whole);
-        assert!((found.whole.mae.unwrap() - mean).abs() < 1e-12);
+        let mean = (n(metrics.seen) * metrics.seen.mae.unwrap() + n(metrics.invented) * metrics.invented.mae.unwrap())
+            / n(metrics.whole);
+        assert!((metrics.whole.mae.unwrap() - mean).abs() < 1e-12);
     }
 
     #[test]
     fn parts_without_a_pixel_have_no_figures() {
         let image = Grid::filled(8, 8, 0.001f32);
         let all = Grid::filled(8, 8, true);
-        let found = split(&image, &image.map(|v| v + 0.001), &all, 0.0225).unwrap();
-        assert_eq!(found.invented, PixelMetrics { pixels: 0, psnr_db: None, ssim: None, mae: None, bias: None });
+        let metrics = split(&image, &image.map(|v| v + 0.001), &all, 0.0225).unwrap();
+        assert_eq!(metrics.invented, PixelMetrics { pixels: 0, psnr_db: None, ssim: None, mae: None, bias: None });
         let holes = Grid::filled(8, 8, f32::NAN);
         assert_eq!(split(&holes, &image, &all, 0.0225), Err(MetricError::Nothing));
         assert!(split(&image, &image, &Grid::filled(4, 4, true), 0.0225).is_err());

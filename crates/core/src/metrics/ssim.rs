@@ -167,10 +167,10 @@ mod tests {
                 Some(range) => SsimRange::Explicit(range),
                 None => SsimRange::OfPrediction,
             };
-            let found = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
+            let similarity = ssim(&grid("prediction"), &grid("truth"), range).unwrap();
             let expected = case["ssim"].as_f64().unwrap();
             // Both sides work in f64 on the same f32 pixels.
-            assert!((found.mean - expected).abs() < 1e-9, "{} for {expected}", found.mean);
+            assert!((similarity.mean - expected).abs() < 1e-9, "{} for {expected}", similarity.mean);
         }
     }
 
@@ -178,8 +178,8 @@ mod tests {
     fn an_image_equals_itself_and_a_constant_equals_a_constant() {
         let (prediction, truth) = textured(0.01);
         for image in [&prediction, &truth, &Grid::filled(5, 3, 0.09)] {
-            let found = ssim(image, image, SsimRange::Explicit(0.0225)).unwrap();
-            assert!((found.mean - 1.0).abs() < 1e-12);
+            let similarity = ssim(image, image, SsimRange::Explicit(0.0225)).unwrap();
+            assert!((similarity.mean - 1.0).abs() < 1e-12);
         }
         let flat = Grid::filled(20, 20, 0.09f32);
         assert_eq!(ssim(&flat, &truth, SsimRange::Explicit(1.0)).err().map(|e| e.to_string().is_empty()), Some(false));
@@ -191,8 +191,8 @@ mod tests {
     fn a_large_offset_does_not_spoil_the_variances() {
         for offset in [0.0, 0.09, 1.0] {
             let (prediction, truth) = textured(offset);
-            let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
-            assert!(found.map.as_slice().iter().all(|s| (-1.0..=1.0).contains(s)), "offset {offset}");
+            let similarity = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
+            assert!(similarity.map.as_slice().iter().all(|s| (-1.0..=1.0).contains(s)), "offset {offset}");
         }
         // In f64 from f64 images there is no rounding of the pixels: the f32 images must agree within their own.
         let (prediction, truth) = textured(1.0);
@@ -207,8 +207,8 @@ mod tests {
     fn invalid_pixels_are_counted() {
         let (mut prediction, truth) = textured(0.0);
         prediction[(3, 3)] = f32::NAN;
-        let found = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
-        assert!(found.ignored == 1 && found.mean.is_finite());
+        let similarity = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
+        assert!(similarity.ignored == 1 && similarity.mean.is_finite());
         let none = Grid::filled(31, 24, f32::NAN);
         assert_eq!(ssim(&none, &truth, SsimRange::Explicit(1.0)), Err(MetricError::Nothing));
     }

@@ -28,7 +28,7 @@ pub struct Unstretched {
 pub fn unstretched(prediction: &Grid<f32>, truth: &Grid<f32>, range: f64) -> Result<Unstretched, MetricError> {
     Ok(Unstretched {
         psnr_raw_db: psnr(prediction, truth, range)?.db(),
-        ssim_raw: ssim(prediction, truth, SsimRange::Explicit(range)).ok().map(|found| found.mean),
+        ssim_raw: ssim(prediction, truth, SsimRange::Explicit(range)).ok().map(|similarity| similarity.mean),
         psnr_line_db: psnr_of_mse(line_mse(prediction, truth)?, range)?.db(),
     })
 }
@@ -60,8 +60,8 @@ mod tests {
     fn a_line_is_forgiven_only_where_it_says_so() {
         let truth = Grid::from_fn(40, 30, |x, y| ((x * 7 + y * 3) % 11) as f32 / 11.0);
         let off = truth.map(|v| 0.5 * v + 0.3);
-        let found = unstretched(&off, &truth, 1.0).unwrap();
-        assert!(found.psnr_raw_db.unwrap() < 20.0 && found.psnr_line_db.is_none_or(|db| db > 100.0), "{found:?}");
+        let metrics = unstretched(&off, &truth, 1.0).unwrap();
+        assert!(metrics.psnr_raw_db.unwrap() < 20.0 && metrics.psnr_line_db.is_none_or(|db| db > 100.0), "{metrics:?}");
         assert_eq!(unstretched(&truth, &truth, 1.0).unwrap().psnr_raw_db, None);
         // Noise of known size is what the line leaves: 20 dB for a tenth.
         let noisy = Grid::from_fn(40, 30, |x, y| truth[(x, y)] + if (x + y) % 2 == 0 { 0.1 } else { -0.1 });

@@ -14,14 +14,14 @@ const GATE_M: std::ops::RangeInclusive<f64> = 1e-5..=0.05;
 /// Shares of the contacts that can be trimmed.
 const TRIM: std::ops::RangeInclusive<f64> = 0.0..=0.9;
 
-/// Which contacts a registration leaves out. A whole number of nanometers or of millionths is the same number in a key,
-/// in a text and in the arithmetic.
+/// Rejection: which contacts a registration leaves out. A whole number of nanometers or of millionths is the same
+/// number in a key, in a text and in the arithmetic.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rejection {
     /// As the registration does by itself.
     #[default]
     Own,
-    /// Those farther than so many nanometers from the model. The registrations on the distance field let them go
+    /// Contacts farther than so many nanometers from the model. The registrations on the distance field let them go
     /// gradually: for them it is the width of the last kernel.
     Gate(u32),
     /// The farthest, so many of a million.
@@ -85,7 +85,7 @@ impl Rejection {
 pub struct RegistrationChoice {
     /// The registration.
     pub by: Registration,
-    /// What it leaves out.
+    /// Contacts that it leaves out.
     pub rejection: Rejection,
 }
 
@@ -171,7 +171,7 @@ impl RegistrationChoice {
 }
 
 impl Registration {
-    /// Those put together as an ICP.
+    /// Settings of a registration that is put together as an ICP; `None` for the others.
     fn icp(self) -> Option<IcpConfig> {
         match self {
             Self::DistanceField | Self::Certified | Self::LabIcp | Self::Refined => None,
@@ -184,17 +184,17 @@ impl Registration {
         }
     }
 
-    /// Whether it can be given a gate.
+    /// True where it can be given a gate.
     pub(crate) fn has_gate(self) -> bool {
         self != Self::LabIcp
     }
 
-    /// Whether it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.
+    /// True where it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.
     pub fn may_prove(self) -> bool {
         matches!(self, Self::DistanceField | Self::Refined)
     }
 
-    /// Whether it can leave out a share of the contacts.
+    /// True where it can leave out a share of the contacts.
     pub(crate) fn can_trim(self) -> bool {
         self == Self::Refined || self.icp().is_some()
     }

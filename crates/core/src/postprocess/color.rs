@@ -7,11 +7,11 @@ use crate::resample::Resampling;
 /// The steps to a color sensor's difference of touched and untouched image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorChain {
-    /// What -1 and 1 mean, differences on the 0..255 scale.
+    /// Differences that -1 and 1 stand for, on the 0..255 scale.
     pub range: [f64; 2],
     /// `[width, height]` of the sensor's picture.
     pub size: [usize; 2],
-    /// How the decoder's picture is brought to that size.
+    /// Resampling that brings the decoder's picture to that size.
     pub resampling: Resampling,
     /// Rotation to the sensor's raw orientation: 0 or 180 degrees.
     pub rotation_deg: u32,

@@ -39,7 +39,7 @@ pub enum CorrectionPart {
     Field,
     /// The share of the deviation from the mean prediction.
     Gain,
-    /// What is known to be missing from such a prediction.
+    /// The residual that predictions of such a shape are known to leave.
     Response,
 }
 
@@ -54,7 +54,7 @@ impl CorrectionPart {
         }
     }
 
-    /// What it does, in a sentence.
+    /// Effect of the part, in a sentence.
     pub fn tip(self) -> &'static str {
         match self {
             Self::Offset => "moves the prediction to where the pad's sensors lie",
@@ -65,7 +65,7 @@ impl CorrectionPart {
     }
 }
 
-/// Which parts are applied.
+/// Set of parts that are applied.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "Vec<CorrectionPart>", into = "Vec<CorrectionPart>")]
 pub struct CorrectionParts(u8);
@@ -76,7 +76,7 @@ impl CorrectionParts {
     /// No part: the prediction as the model draws it.
     pub const NONE: Self = Self(0);
 
-    /// Whether a part is applied.
+    /// True where a part is applied.
     pub fn has(self, part: CorrectionPart) -> bool {
         self.0 & (1 << part as u8) != 0
     }
@@ -100,14 +100,14 @@ impl From<CorrectionParts> for Vec<CorrectionPart> {
     }
 }
 
-/// What predictions of some shapes are known to miss: linear in the picture's components.
+/// Residual that predictions of some shapes are known to leave: linear in the picture's components.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Response {
     /// Subtracted first, meters.
     pub center: Grid<f32>,
     /// Unit pictures that the rest is projected on.
     pub basis: Vec<Grid<f32>>,
-    /// What is added per meter of each component.
+    /// Pictures added per meter of each component.
     pub answers: Vec<Grid<f32>>,
 }
 
@@ -126,17 +126,17 @@ pub struct Correction {
     pub gain: Grid<f32>,
     /// Shared by the pads of a fit.
     pub response: Option<Arc<Response>>,
-    /// What of it is applied.
+    /// Parts of it that are applied.
     pub parts: CorrectionParts,
 }
 
 impl Correction {
-    /// Whether a part is applied.
+    /// True where a part is applied.
     pub fn has(&self, part: CorrectionPart) -> bool {
         self.parts.has(part)
     }
 
-    /// Whether every picture is of this size and every number finite.
+    /// True where every picture is of this size and every number finite.
     pub fn fits(&self, size: [usize; 2]) -> bool {
         let response = self.response.iter().flat_map(|r| r.basis.iter().chain(&r.answers).chain([&r.center]));
         let finite = |g: &Grid<f32>| g.size() == size && g.as_slice().iter().all(|v| v.is_finite());
@@ -159,7 +159,7 @@ impl Correction {
         self.zipped(&self.on_line(placed), |i, v| v + self.field.as_slice()[i])
     }
 
-    /// How far a placed picture's deviation from the mean is changed, meters: [`CorrectionPart::Gain`].
+    /// Picture with the gain on a placed picture's deviation from the mean, meters: [`CorrectionPart::Gain`].
     pub(crate) fn weighed(&self, placed: &DepthMap, leveled: &DepthMap) -> DepthMap {
         if !self.has(CorrectionPart::Gain) {
             return leveled.clone();
@@ -168,7 +168,7 @@ impl Correction {
         self.zipped(leveled, |i, v| v + (gain[i] - 1.0) * (own.as_slice()[i] - mean[i]))
     }
 
-    /// What is known to be missing added: [`CorrectionPart::Response`].
+    /// Picture with the known residual added, meters: [`CorrectionPart::Response`].
     pub fn answered(&self, placed: &DepthMap, weighed: &DepthMap) -> DepthMap {
         let Some(response) = self.response.as_ref().filter(|_| self.has(CorrectionPart::Response)) else {
             return weighed.clone();

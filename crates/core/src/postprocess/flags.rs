@@ -1,4 +1,4 @@
-//! What is implausible about a depth chain, each with what was seen, why that is odd, and what to do.
+//! Flags: implausible things about a depth chain, each with what was seen, why that is odd, and what to do.
 
 use serde::Serialize;
 
@@ -15,13 +15,13 @@ const TURNED_AT_LEAST: f64 = 0.3;
 const UNLIKE: f64 = 0.3;
 /// Root mean square disagreement of the channels that is worth a word, meters.
 const CHANNELS_APART_M: f64 = 5e-4;
-/// How far a fitted slope may be from 1, and an offset from 0 (meters).
+/// Largest sound distance of a fitted slope from 1, and of an offset from 0 (meters).
 const SLOPE_OFF: f64 = 0.15;
 const OFFSET_OFF_M: f64 = 1e-3;
-/// How far a shift's gain may be from the exact inverse's 2.
+/// Largest sound distance of a shift's gain from the exact inverse's 2.
 const GAIN_OFF: f64 = 0.03;
 
-/// How much a person should care.
+/// Severity: how much a person should care.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Severity {
@@ -33,7 +33,7 @@ pub enum Severity {
     Info,
 }
 
-/// What is implausible.
+/// Kind of implausible thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum FlagKind {
@@ -66,17 +66,17 @@ pub enum FlagKind {
 /// One thing that is implausible.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Flag {
-    /// How much a person should care.
+    /// Severity: how much a person should care.
     pub severity: Severity,
-    /// What kind of thing.
+    /// Kind of thing.
     pub kind: FlagKind,
     /// The stage at which it shows.
     pub stage: String,
-    /// What was seen, with its numbers.
+    /// Observation, with its numbers.
     pub what: String,
     /// Why that is odd.
     pub why: String,
-    /// What to do.
+    /// Remedy.
     pub action: String,
 }
 
@@ -245,7 +245,7 @@ impl List {
         let [gain, offset_m] = stats.affine(chain.range.max_m);
         // What undoes the doubled mapping has the gain 2 and the offset -max.
         if chain.mapping == Mapping::Doubled && (gain / 2.0 - 1.0).abs() > GAIN_OFF {
-            let at = |depth_m: f64| gain * (depth_m + chain.range.max_m) / 2.0 + offset_m - depth_m;
+            let error_m = |depth_m: f64| gain * (depth_m + chain.range.max_m) / 2.0 + offset_m - depth_m;
             let steeper = if gain > 2.0 { "steep" } else { "flat" };
             self.add(
                 Severity::Info,
@@ -258,9 +258,9 @@ impl List {
                     ),
                     format!(
                         "A depth the model gives as 0 becomes {}, 10 mm becomes {} (off by {}).",
-                        text_mm(at(0.0)),
-                        text_mm(0.01 + at(0.01)),
-                        text_mm(at(0.01))
+                        text_mm(error_m(0.0)),
+                        text_mm(0.01 + error_m(0.01)),
+                        text_mm(error_m(0.01))
                     ),
                     "Choose the exact inverse for depths as the model means them.".into(),
                 ],

@@ -20,7 +20,7 @@ pub struct Ledger {
     pub stages: Vec<StageRecord>,
     /// The result against the truth; `None` without a truth, or if they share no finite pixel.
     pub against: Option<Against>,
-    /// What is implausible, the worst first.
+    /// Flags: what is implausible, the worst first.
     pub flags: Vec<Flag>,
 }
 
@@ -85,12 +85,12 @@ pub fn correlation(a: &Grid<f32>, b: &Grid<f32>) -> Option<f64> {
     (spread(aa, size_a) && spread(bb, size_b)).then(|| ab / (aa.sqrt() * bb.sqrt())).filter(|r| r.is_finite())
 }
 
-/// What another way to meters would have made of the same picture.
+/// Result that another way to meters would have made of the same picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ChainReading {
-    /// Its name.
+    /// Name of that way.
     pub name: String,
-    /// How the decoder's range is read.
+    /// Mapping of the decoder's range to meters.
     pub mapping: Mapping,
     /// Gain and offset (meters) of the shift after it.
     pub shift: [f64; 2],
@@ -104,8 +104,8 @@ pub struct ChainReading {
     pub rms_m: Option<f64>,
 }
 
-/// The same picture read in every way there is: the correct mapping, and the doubled one with each shift of `modes`.
-/// `chain` is any of the bundle's; a mode that has no statistics is left out. `peak_m` is PSNR's peak.
+/// Readings of one picture in every way there is: by the correct mapping, and by the doubled one with each shift of
+/// `modes`. `chain` is any of the bundle's; a mode that has no statistics is left out. `peak_m` is PSNR's peak.
 pub fn readings(
     chain: &DepthChain,
     modes: &[(ShiftMode, DepthChain)],

@@ -1,4 +1,4 @@
-//! What one step of the depth chain leaves behind, and how its result compares with the truth.
+//! Record of one step of the depth chain, and how its result compares with the truth.
 
 use serde::Serialize;
 
@@ -44,7 +44,7 @@ impl Stage {
         }
     }
 
-    /// Whether the image is in meters; before that it is in the decoder's -1 to 1.
+    /// True where the image is in meters; before that it is in the decoder's -1 to 1.
     pub fn is_meters(self) -> bool {
         !matches!(self, Stage::Channel(_) | Stage::Reduced)
     }
@@ -84,13 +84,13 @@ impl Stats {
         }
     }
 
-    /// Whether the spread is no more than rounding.
+    /// True where the spread is no more than rounding.
     pub(crate) fn is_flat(&self) -> bool {
         self.count > 0 && self.std <= RELATIVE_NO_SPREAD * self.min.abs().max(self.max.abs())
     }
 }
 
-/// How many pixels have which value.
+/// Histogram of an image's values.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Histogram {
     /// Value at the left end of the first bar.
@@ -114,27 +114,27 @@ impl Histogram {
         };
         let mut counts = vec![0; bars];
         for v in image.as_slice().iter().filter(|v| v.is_finite()) {
-            let at = (f64::from(*v) - lo) / (hi - lo) * bars as f64;
-            counts[(at as usize).min(bars - 1)] += 1;
+            let bar = (f64::from(*v) - lo) / (hi - lo) * bars as f64;
+            counts[(bar as usize).min(bars - 1)] += 1;
         }
         Self { lo, hi, counts }
     }
 }
 
-/// What one step of the chain left behind.
+/// Record of one step of the chain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StageRecord {
     /// The step.
     pub stage: Stage,
-    /// What it does, with its numbers.
+    /// Description of the step, with its numbers.
     pub how: String,
     /// The image after it.
     pub image: Grid<f32>,
-    /// Its numbers.
+    /// Figures of the image.
     pub stats: Stats,
-    /// Its pixels that are not finite.
+    /// Pixels of the image that are not finite.
     pub invalid: usize,
-    /// Its values.
+    /// Histogram of the image's values.
     pub histogram: Histogram,
     /// Something the user should know, e.g. that a spread of zero was not divided by.
     pub note: Option<String>,
@@ -148,7 +148,7 @@ impl StageRecord {
     }
 }
 
-/// How alike prediction and truth are, as they lie and turned: Pearson's correlation, `None` for a flat image.
+/// Likeness of prediction and truth, as they lie and turned: Pearson's correlation, `None` for a flat image.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Orientation {
     /// As they lie.

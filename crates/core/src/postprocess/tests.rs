@@ -197,14 +197,14 @@ fn a_turn_too_many_and_a_mirror_image_are_told_apart() {
         (decoded(&truth.rotated_180(), 1), FlagKind::TurnedBy180),
         (decoded(&truth.rows_reversed(), 1), FlagKind::Mirrored),
     ] {
-        let found = ledger(&whole(ShiftMode::ExactInverse), &raw, Some(&truth)).unwrap();
-        assert_eq!(found.flags[0].kind, expected, "{:?}", found.flags);
-        assert_eq!(found.flags[0].severity, Severity::Wrong);
-        assert!(found.flags[0].text().contains("with the truth"));
+        let ledger = ledger(&whole(ShiftMode::ExactInverse), &raw, Some(&truth)).unwrap();
+        assert_eq!(ledger.flags[0].kind, expected, "{:?}", ledger.flags);
+        assert_eq!(ledger.flags[0].severity, Severity::Wrong);
+        assert!(ledger.flags[0].text().contains("with the truth"));
     }
     let other = Grid::from_fn(60, 48, |x, y| if (x / 3 + y / 3) % 2 == 0 { 0.004f32 } else { 0.0 });
-    let found = ledger(&whole(ShiftMode::ExactInverse), &decoded(&other, 1), Some(&truth)).unwrap();
-    assert_eq!(kinds(&found), [FlagKind::Unlike]);
+    let unlike = ledger(&whole(ShiftMode::ExactInverse), &decoded(&other, 1), Some(&truth)).unwrap();
+    assert_eq!(kinds(&unlike), [FlagKind::Unlike]);
 }
 
 #[test]
@@ -222,9 +222,9 @@ fn holes_constants_clamps_and_disagreeing_channels_are_flagged() {
     assert!(of(&flat).contains(&FlagKind::Constant));
     let mut raw = decoded(&imprint(), 1);
     raw.channels[0].as_mut_slice()[..600].fill(1.5);
-    let found = ledger(&exact, &raw, None).unwrap();
-    assert_eq!((found.flags[0].kind, found.flags[0].severity), (FlagKind::Clamped, Severity::Caution));
-    assert!(found.flags[0].what.starts_with("600 of 2880"), "{}", found.flags[0].what);
+    let clamped = ledger(&exact, &raw, None).unwrap();
+    assert_eq!((clamped.flags[0].kind, clamped.flags[0].severity), (FlagKind::Clamped, Severity::Caution));
+    assert!(clamped.flags[0].what.starts_with("600 of 2880"), "{}", clamped.flags[0].what);
     let mut raw = decoded(&imprint(), 3);
     raw.channels[1] = raw.channels[1].map(|v| v + 0.2);
     assert!(of(&raw).contains(&FlagKind::ChannelsApart));
@@ -232,8 +232,8 @@ fn holes_constants_clamps_and_disagreeing_channels_are_flagged() {
 
 #[test]
 fn the_published_shift_is_said_to_be_too_steep() {
-    let found = ledger(&whole(ShiftMode::PaperShift), &decoded(&imprint(), 1), None).unwrap();
-    let flag = found.flags.iter().find(|f| f.kind == FlagKind::ShiftGain).unwrap();
+    let steep = ledger(&whole(ShiftMode::PaperShift), &decoded(&imprint(), 1), None).unwrap();
+    let flag = steep.flags.iter().find(|f| f.kind == FlagKind::ShiftGain).unwrap();
     // 2.2 against 2; 10 mm become 10.73 mm.
     assert!(flag.what.contains("10.0 % too steep") && flag.why.contains("10.73 mm"), "{}", flag.text());
 }
@@ -241,9 +241,9 @@ fn the_published_shift_is_said_to_be_too_steep() {
 #[test]
 fn every_reading_of_a_picture_is_there_to_be_compared() {
     let modes = ShiftMode::ALL.map(|mode| (mode, whole(mode)));
-    let found = readings(&whole(ShiftMode::Raw), &modes, &decoded(&imprint(), 3), Some(&imprint()), 0.0225);
-    let of = |name: &str| found.iter().find(|r| r.name == name).unwrap();
-    assert_eq!(found.len(), 4);
+    let readings = readings(&whole(ShiftMode::Raw), &modes, &decoded(&imprint(), 3), Some(&imprint()), 0.0225);
+    let of = |name: &str| readings.iter().find(|r| r.name == name).unwrap();
+    assert_eq!(readings.len(), 4);
     assert!(of("Correct mapping").psnr_db.unwrap() > 100.0 && of("Exact inverse").psnr_db.unwrap() > 100.0);
     assert!(of("Raw (released script)").psnr_db.unwrap() < 10.0);
     assert!((of("Paper shift").line.unwrap().slope - 1.1).abs() < 1e-3);

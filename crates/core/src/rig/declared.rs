@@ -25,7 +25,7 @@ impl Rig {
     /// A rig declared in JSON.
     ///
     /// # Errors
-    /// What is wrong with it.
+    /// Fault of the declaration, in words.
     pub fn parse(json: &[u8]) -> Result<Self, String> {
         let rig: Self = serde_json::from_slice(json).map_err(|err| err.to_string())?;
         rig.check()?;
@@ -39,9 +39,9 @@ impl Rig {
             return Err(format!("it needs 1 to {MOST} sensors and 1 to {MOST} pads"));
         }
         for keys in [&sensors, &pads] {
-            for (at, key) in keys.iter().enumerate() {
+            for (index, key) in keys.iter().enumerate() {
                 check_key(key)?;
-                if keys[..at].contains(key) {
+                if keys[..index].contains(key) {
                     return Err(format!("the key {key:?} is there twice; each must be its own"));
                 }
             }
@@ -51,11 +51,11 @@ impl Rig {
         for sensor in &self.sensors {
             sensor.check().map_err(|why| format!("sensor {}: {why}", sensor.key))?;
         }
-        for (at, window) in self.windows.iter().enumerate() {
-            self.check_window(window).map_err(|why| format!("window {at}, counted from 0: {why}"))?;
+        for (index, window) in self.windows.iter().enumerate() {
+            self.check_window(window).map_err(|why| format!("window {index}, counted from 0: {why}"))?;
             let same = |w: &Window| (w.pad, w.of, w.within) == (window.pad, window.of, window.within);
-            if self.windows[..at].iter().any(same) {
-                return Err(format!("window {at}, counted from 0: an earlier one has the same pad and sensors"));
+            if self.windows[..index].iter().any(same) {
+                return Err(format!("window {index}, counted from 0: an earlier one has the same pad and sensors"));
             }
         }
         Ok(())
@@ -98,10 +98,10 @@ impl Sensor {
 }
 
 impl Crop {
-    /// Whether a stored picture of this size can be a part of the full one.
+    /// Checks that a stored picture of this size can be a part of the full one.
     fn check(self, stored: [usize; 2]) -> Result<(), String> {
         if self.full == [0, 0] {
-            return match self.offset.iter().all(|at| *at <= LARGEST_FULL) {
+            return match self.offset.iter().all(|offset| *offset <= LARGEST_FULL) {
                 true => Ok(()),
                 false => Err(format!("crop.offset must be at most {LARGEST_FULL} px")),
             };

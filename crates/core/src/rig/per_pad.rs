@@ -50,10 +50,10 @@ impl<T> PerPad<T> {
 
     /// The values with their pads.
     pub fn entries(&self) -> impl Iterator<Item = (PadId, &T)> {
-        self.0.iter().enumerate().filter_map(|(at, value)| Some((PadId::new(at), value.as_ref()?)))
+        self.0.iter().enumerate().filter_map(|(index, value)| Some((PadId::new(index), value.as_ref()?)))
     }
 
-    /// Whether no pad has a value.
+    /// True where no pad has a value.
     pub fn is_empty(&self) -> bool {
         self.0.iter().all(Option::is_none)
     }

@@ -1,4 +1,4 @@
-//! What can be wrong with a pair: the data conditions of the paper's Table I, for test sets and for training data.
+//! Conditions of a pair: what can be wrong with it, after the paper's Table I, for test sets and for training data.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,7 +14,7 @@ pub(crate) const MISALIGNMENT_M: f64 = 0.008;
 /// Standard deviation of the noise on the condition, 0..255 scale, RGB: half that of the lab's difference images.
 const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0.0576 * 255.0];
 
-/// What is wrong with the pairs of a data set.
+/// Condition of the pairs of a data set: what is wrong with them.
 #[derive(
     Clone,
     Copy,
@@ -51,7 +51,7 @@ impl Condition {
         self.into()
     }
 
-    /// What it means, in one line.
+    /// Meaning of the condition, in one line.
     pub fn description(self) -> &'static str {
         match self {
             Self::Plain => "both sensors felt the same grasp of the pattern",
@@ -168,7 +168,7 @@ mod tests {
         };
         // The same noise in both, so that only the patterns differ.
         let between = |form: fn(ToolSpec) -> ToolSpec| {
-            let of = |at: usize| simulate(&form(tools()[at].clone()), Grasp::default(), 1, &config);
+            let of = |tool: usize| simulate(&form(tools()[tool].clone()), Grasp::default(), 1, &config);
             let (a, b) = (of(0), of(3));
             assert_ne!(imprint(&a), imprint(&b), "the bubbles see the patterns");
             difference(gelslim(&a), gelslim(&b))

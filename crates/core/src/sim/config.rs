@@ -17,13 +17,13 @@ pub struct SimConfig {
 /// A Soft Bubble and its depth camera. Lengths in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BubbleConfig {
-    /// How far the dome would reach past the tool's surface if the tool were not there.
+    /// Distance that the dome would reach past the tool's surface if the tool were not there.
     pub press_m: f64,
     /// Height of the dome over its rim.
     pub dome_rise_m: f64,
     /// Semi-axes of the rim along y and z.
     pub rim_semi_axes_m: [f64; 2],
-    /// Where the rim's center is along z.
+    /// Place of the rim's center along z.
     pub rim_center_z_m: f64,
     /// Share of the displaced air that stays in the bubble and makes the rest bulge, 0..1.
     pub air_kept: f64,
@@ -47,7 +47,7 @@ pub struct BubbleConfig {
     pub calibration_m: f64,
     /// Deviation of the calibration's angle error, radians.
     pub calibration_rad: f64,
-    /// Which sensor: the seed of its fixed texture.
+    /// Seed of the sensor's fixed texture: one sensor has one.
     pub texture_seed: u64,
 }
 
@@ -77,13 +77,13 @@ impl Default for BubbleConfig {
 /// A GelSlim. Lengths in meters, brightness on the 0..255 scale.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GelSlimConfig {
-    /// How deep the tool is pushed in.
+    /// Depth to which the tool is pushed in.
     pub indentation_m: f64,
     /// Relative deviation of the depth from grasp to grasp.
     pub indentation_spread: f64,
     /// Deviation of the angle between gel and tool, radians.
     pub tilt_rad: f64,
-    /// How much less deep the gel presses towards the tool's tip, radians.
+    /// Tilt by which the gel presses less deep towards the tool's tip, radians.
     pub lean_rad: f64,
     /// Length over which the gel rises beside a dent.
     pub decay_m: f64,
@@ -113,7 +113,7 @@ pub struct GelSlimConfig {
     pub marker_angle_rad: f64,
     /// Widening of the marker grid at the picture's edge, relative.
     pub marker_fan: f64,
-    /// How much of the light a marker takes, 0..1.
+    /// Share of the light that a marker takes, 0..1.
     pub marker_darkness: f64,
     /// Sideways movement per unit slope of the bulk.
     pub marker_push_m: f64,
@@ -125,7 +125,7 @@ pub struct GelSlimConfig {
     pub twist_rad: f64,
     /// Deviation of the camera's noise.
     pub noise: f64,
-    /// Which sensor: the seed of its fixed traits.
+    /// Seed of the sensor's fixed traits: one sensor has one.
     pub sensor_seed: u64,
 }
 

@@ -1,4 +1,4 @@
-//! What the bubble's depth camera sees of a membrane, and what it makes of it.
+//! Depth camera of the bubble: what it sees of a membrane, and what it makes of it.
 
 use glam::{DAffine3, DVec2, DVec3};
 

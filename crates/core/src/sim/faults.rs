@@ -8,7 +8,7 @@ use crate::mesh::TriMesh;
 use crate::rig::lab;
 use crate::sample::Sample;
 
-/// What is wrong with a touch.
+/// Fault of a touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::Display)]
 #[strum(serialize_all = "snake_case")]
 pub enum Fault {
@@ -58,7 +58,7 @@ impl Fault {
         tool
     }
 
-    /// How it is held.
+    /// Grasp in which it is held.
     fn grasp(self) -> Grasp {
         Grasp { theta_rad: 11f64.to_radians(), x_m: 0.002, y_m: -0.001_5 }
     }

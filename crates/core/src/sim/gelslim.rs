@@ -18,14 +18,14 @@ use crate::sample::{ColorImages, ColorTouch};
 
 /// Spacing of the grid that the gel is solved on, meters.
 const STEP_M: f64 = 0.000_15;
-/// How far the gel goes on beyond the picture, meters.
+/// Margin of the gel beyond the picture, meters.
 const MARGIN_M: f64 = 0.002_4;
 /// Pixels of the picture per grid step.
 const PX_PER_STEP: f64 = STEP_M * lab::GELSLIM.px_per_m;
 /// Grid steps from the first node to the first pixel.
 const MARGIN_STEPS: f64 = MARGIN_M / STEP_M;
 
-/// How deep the tool pushes into the gel, in picture axes (x right, y down), meters.
+/// Gel, by the depth that the tool pushes into it, in picture axes (x right, y down), meters.
 struct Gel {
     pushed: Field,
 }
@@ -94,12 +94,12 @@ fn blur(field: &mut Field, sigma: f64) {
     let mut pass = |values: &mut [f32], start: usize, stride: usize, count: usize| {
         line.clear();
         line.extend((0..count).map(|k| values[start + k * stride]));
-        let at = |line: &[f32], k: isize| line[k.clamp(0, count as isize - 1) as usize];
-        let mut sum: f32 = (-(radius as isize)..=radius as isize).map(|k| at(&line, k)).sum();
+        let value = |line: &[f32], k: isize| line[k.clamp(0, count as isize - 1) as usize];
+        let mut sum: f32 = (-(radius as isize)..=radius as isize).map(|k| value(&line, k)).sum();
         for k in 0..count {
             values[start + k * stride] = sum / (2 * radius + 1) as f32;
             let k = k as isize;
-            sum += at(&line, k + radius as isize + 1) - at(&line, k - radius as isize);
+            sum += value(&line, k + radius as isize + 1) - value(&line, k - radius as isize);
         }
     };
     for _ in 0..3 {
@@ -141,15 +141,15 @@ pub(super) fn touch(
     let base = illumination(config, finger);
     let markers = marker_grid(config, finger);
     let mut reference = base.clone();
-    for &(at, size) in &markers {
-        stamp(&mut reference, at, size, config.marker_darkness);
+    for &(center, size) in &markers {
+        stamp(&mut reference, center, size, config.marker_darkness);
     }
     add_noise(&mut reference, config.noise, &mut Noise::new(config.sensor_seed, Stream::GelReference, finger.index()));
 
     let mut raw = base;
     shade(&mut raw, config, &gel, &mut noise);
-    for (at, size) in moved(&markers, config, &gel, &mut noise) {
-        stamp(&mut raw, at, size, config.marker_darkness);
+    for (center, size) in moved(&markers, config, &gel, &mut noise) {
+        stamp(&mut raw, center, size, config.marker_darkness);
     }
     add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
     let difference = RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
@@ -302,12 +302,12 @@ fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mu
 }
 
 /// Darkens a soft round spot.
-fn stamp(image: &mut RgbGrid, at: DVec2, radius: f64, darkness: f64) {
+fn stamp(image: &mut RgbGrid, center: DVec2, radius: f64, darkness: f64) {
     let reach = radius + 2.5;
     let span = |c: f64, n: usize| (c - reach).max(0.0) as usize..((c + reach).max(0.0) as usize + 1).min(n);
-    for y in span(at.y, image.height()) {
-        for x in span(at.x, image.width()) {
-            let r = (DVec2::new(x as f64, y as f64) - at).length();
+    for y in span(center.y, image.height()) {
+        for x in span(center.x, image.width()) {
+            let r = (DVec2::new(x as f64, y as f64) - center).length();
             let cover = (0.5 + (radius - r) / 2.4).clamp(0.0, 1.0);
             let keep = (1.0 - darkness * cover * cover * (3.0 - 2.0 * cover)) as f32;
             for value in &mut image[(x, y)] {

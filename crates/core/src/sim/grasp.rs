@@ -1,4 +1,4 @@
-//! Where the tool is held: the lab's grid of grasps, and random ones.
+//! Grasps of the tool: the lab's grid, and random ones.
 
 use crate::frames::PlanarPose;
 use crate::noise::{Noise, Stream};

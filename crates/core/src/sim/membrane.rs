@@ -123,10 +123,10 @@ impl<'a> Membrane<'a> {
 
     /// Height of the membrane at `(y, z)`, meters.
     pub fn height(&self, yz: DVec2) -> f64 {
-        let at = (yz - self.origin) / MEMBRANE_STEP_M;
-        let free = self.dome.height(yz) - self.pushed.at(at.x, at.y);
+        let grid = (yz - self.origin) / MEMBRANE_STEP_M;
+        let free = self.dome.height(yz) - self.pushed.at(grid.x, grid.y);
         // between the nodes the tool's edges are sharper than the grid
-        if self.is_near(at) {
+        if self.is_near(grid) {
             let s = self.tool.outline_distance(self.object_from_grasp.transform_yz(yz));
             if s <= 0.0 {
                 return free.min(-self.tool.height_at(s));
@@ -135,12 +135,12 @@ impl<'a> Membrane<'a> {
         free
     }
 
-    fn is_near(&self, at: DVec2) -> bool {
+    fn is_near(&self, grid: DVec2) -> bool {
         let columns = self.pushed.columns;
-        if at.x < 0.0 || at.y < 0.0 {
+        if grid.x < 0.0 || grid.y < 0.0 {
             return false;
         }
-        let (i, j) = (at.x as usize, at.y as usize);
+        let (i, j) = (grid.x as usize, grid.y as usize);
         if i + 1 >= columns || j + 1 >= self.pushed.rows {
             return false;
         }
@@ -185,8 +185,8 @@ impl<'a> Membrane<'a> {
     }
 }
 
-/// What the slopes of the sheet add to the load `extra`: a pressure p (over tension) bends a sheet of slope s by
-/// p (1 + s²)^1.5, the flat-sheet equation by p. The dome's own pressure and slopes are in its shape already.
+/// Load that the slopes of the sheet add to the load `extra`: a pressure p (over tension) bends a sheet of slope s by p
+/// (1 + s²)^1.5, the flat-sheet equation by p. The dome's own pressure and slopes are in its shape already.
 fn bending(pushed: &Field, dome: &Dome, extra: f32, origin: DVec2) -> Field {
     let (columns, rows) = (pushed.columns, pushed.rows);
     let rest = 2.0 * dome.rise * dome.semi.powf(-2.0).element_sum();

@@ -1,4 +1,4 @@
-//! Where the sensors sit around the tool.
+//! Poses of the sensors around the tool.
 //!
 //! Both depth cameras look at the tool obliquely, 35 degrees off the closing axis, from the side of the wrist,
 //! with the lab's rotations. Their position follows from what the two sensors must agree on: the surface point of
@@ -36,7 +36,7 @@ pub fn grasp_from_camera(finger: PadId, half_thickness_m: f64) -> DAffine3 {
     DAffine3 { matrix3: rotation, translation }
 }
 
-/// What the GelSlim sees, in the bubble's pixels.
+/// Window that the GelSlim sees, in the bubble's pixels.
 fn footprint(finger: PadId) -> Window {
     *Rig::lab().color_window(finger).expect("the lab's rig has a window for each finger")
 }

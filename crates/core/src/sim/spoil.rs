@@ -4,7 +4,7 @@ use crate::grid::{Grid, Mask};
 use crate::noise::{Noise, Stream};
 use crate::rig::PadId;
 
-/// How badly a mask is spoilt. Lengths in pixels; ranges are drawn from uniformly.
+/// Strength of the spoiling of a mask. Lengths in pixels; ranges are drawn from uniformly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Spoil {
     /// Deviation of the outline from its true place, from spot to spot (bumps about 7 pixels wide).

@@ -12,7 +12,7 @@ const DRAWN_TOOLS: f64 = 0.4;
 /// Share of touches by nominal sensors in [`Mix::Train`].
 const NOMINAL: f64 = 0.4;
 
-/// What touches are drawn from.
+/// Mix that touches are drawn from.
 #[derive(
     Clone,
     Copy,
@@ -31,8 +31,9 @@ pub enum Mix {
     /// The seen tools and drawn ones, most of them stretched and felt by drawn sensors; never an unseen tool.
     #[default]
     Train,
-    /// The same, felt by drawn sensors alone, with bubbles of any size pressed 2 to 15 mm deep: for contact masks only. A
-    /// GelSlim image does not tell how deep the bubble is pressed, so a generator would learn to draw the mean of all.
+    /// The tools of [`Mix::Train`], felt by drawn sensors alone, with bubbles of any size pressed 2 to 15 mm deep: for
+    /// contact masks only. A GelSlim image does not tell how deep the bubble is pressed, so a generator would learn to
+    /// draw the mean of all.
     Depths,
     /// The seen tools, felt by nominal sensors: for validation.
     Seen,
@@ -47,7 +48,7 @@ pub struct Drawn {
     pub sample: Sample,
     /// The tool's place in the catalog; `None` for a drawn one.
     pub tool: Option<usize>,
-    /// Whether the sensors are the nominal ones and the tool as the catalog has it.
+    /// True where the sensors are the nominal ones and the tool as the catalog has it.
     pub nominal: bool,
 }
 

@@ -4,15 +4,15 @@ use super::MaskTouch;
 use crate::error::{Error, Result};
 use crate::random::Random;
 
-/// How far imprints are varied. What makes a pixel contact is the shape around it, not its depth: another gripper presses
-/// another bubble less, and another camera has another level, grain and place.
+/// Ranges in which imprints are varied. What makes a pixel contact is the shape around it, not its depth: another
+/// gripper presses another bubble less, and another camera has another level, grain and place.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sensors {
     /// Half of the measured imprints are drawn shallower, by factors from here to 1.
     pub shallowest: f64,
     /// Down to this depth at most, meters: of what is shallower, the grain leaves no shape.
     pub least_m: f64,
-    /// How far the depth of the others varies, as a share.
+    /// Largest change of the depth of the others, as a share.
     pub gain: f64,
     /// Standard deviation of the level, meters.
     pub level_m: f64,
@@ -24,7 +24,7 @@ pub struct Sensors {
     pub smoothed: f64,
     /// Largest shift along each axis, pixels. What comes in from outside does not count.
     pub shift_px: usize,
-    /// Whether imprints are mirrored along either axis.
+    /// True where imprints are mirrored along either axis.
     pub mirrored: bool,
 }
 
@@ -107,8 +107,9 @@ impl Sensors {
         // What lies outside the picture is as its border, and is not known to be contact or not.
         let from: Vec<(usize, bool)> = place.origins().collect();
         let outside = touch.counted.is_some() || from.iter().any(|(_, inside)| !inside);
-        let counts = |&(at, inside): &(usize, bool)| inside && touch.counted.as_ref().is_none_or(|counted| counted[at]);
-        let mut imprint_m: Vec<f32> = from.iter().map(|&(at, _)| touch.imprint_m[at]).collect();
+        let counts =
+            |&(index, inside): &(usize, bool)| inside && touch.counted.as_ref().is_none_or(|counted| counted[index]);
+        let mut imprint_m: Vec<f32> = from.iter().map(|&(index, _)| touch.imprint_m[index]).collect();
         if smooths {
             imprint_m = boxed(&imprint_m, size);
         }
@@ -124,22 +125,22 @@ impl Sensors {
         }
         MaskTouch {
             imprint_m,
-            contact: from.iter().map(|&(at, _)| touch.contact[at]).collect(),
+            contact: from.iter().map(|&(index, _)| touch.contact[index]).collect(),
             counted: outside.then(|| from.iter().map(counts).collect()),
             predicted: touch.predicted,
         }
     }
 }
 
-/// How deep an imprint is: a hundredth of what was measured is deeper. Meters, above 0.
+/// Depth of an imprint: a hundredth of what was measured is deeper. Meters, above 0.
 fn depth(imprint_m: &[f32]) -> f64 {
     let mut measured: Vec<f32> = imprint_m.iter().copied().filter(|v| v.is_finite()).collect();
-    let at = measured.len() * 99 / 100;
-    let deep = if measured.is_empty() { 0.0 } else { *measured.select_nth_unstable_by(at, f32::total_cmp).1 };
+    let rank = measured.len() * 99 / 100;
+    let deep = if measured.is_empty() { 0.0 } else { *measured.select_nth_unstable_by(rank, f32::total_cmp).1 };
     f64::from(deep).max(1e-6)
 }
 
-/// How a picture is moved and mirrored.
+/// Shift and mirroring of a picture.
 struct Place {
     size: [usize; 2],
     /// Right and down, pixels.
@@ -152,12 +153,12 @@ impl Place {
     /// For each pixel the one that it comes from, and whether that lies within the picture.
     fn origins(&self) -> impl Iterator<Item = (usize, bool)> {
         let [width, height] = self.size;
-        let origin = |axis: usize, at: usize| {
+        let origin = |axis: usize, coordinate: usize| {
             let size = self.size[axis] as isize;
-            let at = at as isize - self.by[axis];
-            let held = at.clamp(0, size - 1);
+            let coordinate = coordinate as isize - self.by[axis];
+            let held = coordinate.clamp(0, size - 1);
             let mirrored = if self.mirrors[axis] { size - 1 - held } else { held };
-            (mirrored as usize, held == at)
+            (mirrored as usize, held == coordinate)
         };
         (0..width * height).map(move |i| {
             let ((x, in_x), (y, in_y)) = (origin(0, i % width), origin(1, i / width));
@@ -168,8 +169,8 @@ impl Place {
 
 /// A small grid drawn over the whole picture, without edges between its cells.
 fn interpolated(grid: &[f32], [width, height]: [usize; 2], i: usize) -> f32 {
-    let along = |at: usize, size: usize, cells: usize| {
-        let place = at as f32 * (cells - 1) as f32 / (size - 1).max(1) as f32;
+    let along = |coordinate: usize, size: usize, cells: usize| {
+        let place = coordinate as f32 * (cells - 1) as f32 / (size - 1).max(1) as f32;
         let low = (place as usize).min(cells - 2);
         let part = place - low as f32;
         (low, part * part * (3.0 - 2.0 * part))

@@ -14,9 +14,9 @@ fn start() -> MaskStart {
 fn touches(count: usize) -> Vec<MaskTouch> {
     let mut random = fixture::random(8);
     let mut make = |i: usize| {
-        let at = [6.0 + 9.0 * random.uniform(), 5.0 + 7.0 * random.uniform()];
+        let center = [6.0 + 9.0 * random.uniform(), 5.0 + 7.0 * random.uniform()];
         let inside = |k: usize| {
-            let [x, y] = [(k % SIZE[0]) as f64 - at[0], (k / SIZE[0]) as f64 - at[1]];
+            let [x, y] = [(k % SIZE[0]) as f64 - center[0], (k / SIZE[0]) as f64 - center[1]];
             if i.is_multiple_of(2) { x.hypot(y) < 4.5 } else { x.abs() < 5.0 && y.abs() < 3.0 }
         };
         let contact: Vec<bool> = (0..SIZE[0] * SIZE[1]).map(inside).collect();

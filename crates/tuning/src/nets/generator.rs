@@ -95,16 +95,16 @@ impl Sizes {
     /// Reads the sizes off some weights; [`Layout::read`] then holds all weights against them.
     fn of(files: &Files) -> Result<Self> {
         let size = |network: &'static str, file: &Onnx, weight: &str, axis: usize| {
-            let found = file.weights().iter().find(|w| w.name() == weight);
+            let entry = file.weights().iter().find(|w| w.name() == weight);
             let missing = || Error::Missing { network, weight: weight.to_owned() };
-            found.and_then(|w| w.shape().get(axis).copied()).ok_or_else(missing)
+            entry.and_then(|w| w.shape().get(axis).copied()).ok_or_else(missing)
         };
         let encoder = |weight, axis| size("condition encoder", &files.encoder, weight, axis);
         let denoiser = |weight, axis| size("denoiser", &files.denoiser, weight, axis);
         let decoder = |weight, axis| size("decoder", &files.decoder, weight, axis);
         let shape = |weight: &str| {
-            let found = files.decoder.weights().iter().find(|w| w.name() == weight);
-            found.map(|w| w.shape().to_vec()).unwrap_or_default()
+            let entry = files.decoder.weights().iter().find(|w| w.name() == weight);
+            entry.map(|w| w.shape().to_vec()).unwrap_or_default()
         };
         let cells = encoder("query", 1)?;
         let sizes = Self {
@@ -125,7 +125,7 @@ impl Sizes {
         sizes.check()
     }
 
-    /// What shapes alone do not say: sizes that norms, heads and halvings divide.
+    /// Checks what shapes alone do not say: sizes that norms, heads and halvings divide.
     fn check(self) -> Result<Self> {
         let cells = (self.side / CELL).pow(2);
         let [.., dim] = self.trunk;
@@ -149,7 +149,7 @@ impl Sizes {
         }
         let broadcasts = |shape: &[usize]| {
             let whole = [1, LATENT, self.side / CELL, self.side / CELL];
-            shape.len() == 4 && shape.iter().zip(whole).all(|(&found, whole)| found == whole || found == 1)
+            shape.len() == 4 && shape.iter().zip(whole).all(|(&size, whole)| size == whole || size == 1)
         };
         for (weight, found) in [("mean", &self.mean), ("std", &self.deviation)] {
             if !broadcasts(found) {

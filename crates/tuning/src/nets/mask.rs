@@ -18,7 +18,7 @@ pub(crate) const NETWORK: &str = "mask network";
 const LEVELS: usize = 4;
 /// Classes of a pixel: no contact, contact.
 const CLASSES: usize = 2;
-/// What is taken from the imprint, which is 0..1.
+/// Value that is subtracted from the imprint, which is 0..1.
 const MIDDLE: f32 = 0.5;
 
 /// Reads the network's weights; its widths may be others than those of the shipped one.
@@ -93,15 +93,15 @@ mod tests {
         let bytes = std::fs::read(SHIPPED).unwrap();
         let params = read(&Onnx::parse(bytes.clone()).unwrap()).unwrap();
         let imprints: Vec<f32> = fixture::random(1).normals(2 * 140 * 175).iter().map(|v| 0.5 + 0.2 * v).collect();
-        let found = segment(&params.leaves(|_| false), &Tensor::new(&[2, 1, 140, 175], imprints.clone()));
-        assert_eq!(found.shape(), [2, 2, 140, 175]);
+        let logits = segment(&params.leaves(|_| false), &Tensor::new(&[2, 1, 140, 175], imprints.clone()));
+        assert_eq!(logits.shape(), [2, 2, 140, 175]);
 
         let model = Model::load(bytes).unwrap();
         let input: ValueOrView<'_> = ValueView::from_shape(&[2, 1, 140, 175], &imprints).unwrap().into();
         let (input_id, output_id) = (model.input_ids()[0], model.output_ids()[0]);
         let expected = model.run(vec![(input_id, input)], &[output_id], None).unwrap().remove(0);
         let expected = expected.into_tensor::<f32>().unwrap().into_data();
-        let worst = found.values().iter().zip(&expected).map(|(f, e)| (f - e).abs()).fold(0.0, f32::max);
+        let worst = logits.values().iter().zip(&expected).map(|(f, e)| (f - e).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-4, "{worst}");
     }
 
@@ -109,8 +109,8 @@ mod tests {
     fn other_widths_are_read_and_other_networks_refused() {
         let narrow = Onnx::parse(fixture::file(&layout(2), 1)).unwrap();
         let params = read(&narrow).unwrap();
-        let found = segment(&params.leaves(|_| false), &Tensor::new(&[1, 1, 9, 14], vec![0.5; 126]));
-        assert_eq!(found.shape(), [1, 2, 9, 14]);
+        let logits = segment(&params.leaves(|_| false), &Tensor::new(&[1, 1, 9, 14], vec![0.5; 126]));
+        assert_eq!(logits.shape(), [1, 2, 9, 14]);
         let decoder = Onnx::parse(fixture::start().decoder).unwrap();
         assert!(matches!(read(&decoder), Err(Error::Missing { network: NETWORK, .. })));
     }

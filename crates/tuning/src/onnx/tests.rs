@@ -59,8 +59,8 @@ fn both_precisions_and_both_forms_of_shapes_are_read() {
     let cast = [field(1, b"h_f16"), field(2, b"h"), field(4, b"Cast")].concat();
     let graph = [field(5, &half), field(5, &initializer("s", &[2, 1], &[3.0, 4.0])), field(1, &cast)].concat();
     let file = Onnx::parse(field(7, &graph)).unwrap();
-    let found: Vec<_> = file.weights().iter().map(|w| (w.name(), w.shape().to_vec(), file.values(w))).collect();
-    assert_eq!(found, [("h", vec![1, 2], vec![1.5, -2.0]), ("s", vec![2, 1], vec![3.0, 4.0])]);
+    let weights: Vec<_> = file.weights().iter().map(|w| (w.name(), w.shape().to_vec(), file.values(w))).collect();
+    assert_eq!(weights, [("h", vec![1, 2], vec![1.5, -2.0]), ("s", vec![2, 1], vec![3.0, 4.0])]);
 }
 
 #[test]

@@ -29,14 +29,14 @@ impl Sizes {
 
     /// One head of queries, results or their slopes.
     fn of_tokens(self, all: &[f32], item: usize, head: usize) -> Matrix<'_> {
-        let at = item * self.tokens * self.dim + head * self.per_head();
-        Matrix::within(&all[at..], self.tokens, self.per_head(), self.dim)
+        let start = item * self.tokens * self.dim + head * self.per_head();
+        Matrix::within(&all[start..], self.tokens, self.per_head(), self.dim)
     }
 
     /// One head of keys (which = 0) or values (1).
     fn of_sources(self, both: &[f32], item: usize, head: usize, which: usize) -> Matrix<'_> {
-        let at = item * self.sources * 2 * self.dim + which * self.dim + head * self.per_head();
-        Matrix::within(&both[at..], self.sources, self.per_head(), 2 * self.dim)
+        let start = item * self.sources * 2 * self.dim + which * self.dim + head * self.per_head();
+        Matrix::within(&both[start..], self.sources, self.per_head(), 2 * self.dim)
     }
 
     fn heads(self) -> impl Iterator<Item = (usize, usize)> {
@@ -63,21 +63,21 @@ pub(crate) fn attention(queries: &Tensor, both: &Tensor, heads: usize) -> Tensor
     }
     let (of_queries, of_both) = (queries.shared(), both.shared());
     Tensor::made([queries, both], queries.shape(), values, move |slope, [to_queries, to_both], slopes| {
-        let found = backward(sizes, &slope, &weights, &of_queries, &of_both);
-        slopes.add(to_queries, || found.queries);
-        slopes.add(to_both, || found.both);
+        let input_slopes = backward(sizes, &slope, &weights, &of_queries, &of_both);
+        slopes.add(to_queries, || input_slopes.queries);
+        slopes.add(to_both, || input_slopes.both);
     })
 }
 
-struct Found {
+struct InputSlopes {
     queries: Vec<f32>,
     both: Vec<f32>,
 }
 
-fn backward(sizes: Sizes, slope: &[f32], weights: &[f32], queries: &[f32], both: &[f32]) -> Found {
+fn backward(sizes: Sizes, slope: &[f32], weights: &[f32], queries: &[f32], both: &[f32]) -> InputSlopes {
     let Sizes { tokens, sources, dim, .. } = sizes;
     let per_head = sizes.per_head();
-    let mut found = Found { queries: vec![0.0; queries.len()], both: vec![0.0; both.len()] };
+    let mut input_slopes = InputSlopes { queries: vec![0.0; queries.len()], both: vec![0.0; both.len()] };
     let mut along = vec![0.0; sizes.read()];
     let mut one = vec![0.0; tokens.max(sources) * per_head];
     for ((item, head), weights) in sizes.heads().zip(weights.chunks_exact(sizes.read())) {
@@ -85,7 +85,7 @@ fn backward(sizes: Sizes, slope: &[f32], weights: &[f32], queries: &[f32], both:
         let result = sizes.of_tokens(slope, item, head);
         let read = Matrix::new(weights, tokens, sources);
         product(&mut one, Into::New, read.transposed(), result);
-        scatter(&one[..sources * per_head], &mut found.both[of_source + dim..], per_head, 2 * dim);
+        scatter(&one[..sources * per_head], &mut input_slopes.both[of_source + dim..], per_head, 2 * dim);
 
         product(&mut along, Into::New, result, sizes.of_sources(both, item, head, 1).transposed());
         for (along, weights) in along.chunks_exact_mut(sources).zip(weights.chunks_exact(sources)) {
@@ -95,12 +95,12 @@ fn backward(sizes: Sizes, slope: &[f32], weights: &[f32], queries: &[f32], both:
         }
         let likeness = Matrix::new(&along, tokens, sources);
         product(&mut one, Into::New, likeness, sizes.of_sources(both, item, head, 0));
-        let to = &mut found.queries[item * tokens * dim + head * per_head..];
+        let to = &mut input_slopes.queries[item * tokens * dim + head * per_head..];
         scatter(&one[..tokens * per_head], to, per_head, dim);
         product(&mut one, Into::New, likeness.transposed(), sizes.of_tokens(queries, item, head));
-        scatter(&one[..sources * per_head], &mut found.both[of_source..], per_head, 2 * dim);
+        scatter(&one[..sources * per_head], &mut input_slopes.both[of_source..], per_head, 2 * dim);
     }
-    found
+    input_slopes
 }
 
 /// Rows of a head to their places among the other heads.

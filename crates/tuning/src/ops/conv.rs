@@ -17,9 +17,9 @@ pub(crate) fn conv2d(input: &Tensor, weight: &Tensor, bias: &Tensor, stride: usi
     let (of_input, of_weight) = (input.shared(), weight.shared());
     Tensor::made([input, weight, bias], &shape, output, move |slope, [to_input, to_weight, to_bias], slopes| {
         let wanted = [slopes.wants(to_input), slopes.wants(to_weight)];
-        let found = Found::new(&slope, &of_input, &of_weight, g, wanted);
-        slopes.add(to_input, || found.input);
-        slopes.add(to_weight, || found.weight);
+        let input_slopes = InputSlopes::new(&slope, &of_input, &of_weight, g, wanted);
+        slopes.add(to_input, || input_slopes.input);
+        slopes.add(to_weight, || input_slopes.weight);
         slopes.add(to_bias, || {
             let mut sums = vec![0.0; g.filters];
             for (i, channel) in slope.chunks_exact(g.out_pixels()).enumerate() {
@@ -88,8 +88,8 @@ struct Tile {
 
 /// One output row of one row of the matrix of patches.
 struct Run {
-    /// Where it begins in the matrix.
-    at: usize,
+    /// Index in the matrix where it begins.
+    start: usize,
     /// The columns that see the picture, not its padding, and where in the input they begin.
     seen: Option<(std::ops::Range<usize>, usize)>,
 }
@@ -109,13 +109,13 @@ impl Tile {
             let high = (g.width + g.padding).saturating_sub(x).div_ceil(g.stride).min(g.out_width).max(low);
             for out in 0..self.rows {
                 let (picture, out_y) = ((self.first + out) / g.out_height, (self.first + out) % g.out_height);
-                let at = row * self.columns() + out * g.out_width;
+                let start = row * self.columns() + out * g.out_width;
                 let in_y = (out_y * g.stride + y).checked_sub(g.padding).filter(|&y| y < g.height);
                 let seen = in_y.filter(|_| low < high).map(|in_y| {
                     let line = ((picture * g.channels + channel) * g.height + in_y) * g.width;
                     (low..high, line + low * g.stride + x - g.padding)
                 });
-                act(Run { at, seen });
+                act(Run { start, seen });
             }
         }
     }
@@ -123,7 +123,7 @@ impl Tile {
     fn unroll(&self, input: &[f32], patches: &mut [f32]) {
         let (width, stride) = (self.g.out_width, self.g.stride);
         self.for_each_run(|run| {
-            let to = &mut patches[run.at..run.at + width];
+            let to = &mut patches[run.start..run.start + width];
             let Some((columns, from)) = run.seen else { return to.fill(0.0) };
             to[..columns.start].fill(0.0);
             to[columns.end..].fill(0.0);
@@ -141,7 +141,7 @@ impl Tile {
         let (width, stride) = (self.g.out_width, self.g.stride);
         self.for_each_run(|run| {
             let Some((columns, to)) = run.seen else { return };
-            let from = &patches[run.at..run.at + width][columns];
+            let from = &patches[run.start..run.start + width][columns];
             if stride == 1 {
                 input[to..to + from.len()].iter_mut().zip(from).for_each(|(to, from)| *to += from);
             } else {
@@ -173,10 +173,10 @@ fn forward(input: &[f32], weight: &[f32], bias: &[f32], g: Geometry) -> Vec<f32>
         tile.unroll(input, &mut patches);
         let (kernels, seen) = (Matrix::new(weight, g.filters, g.patch()), Matrix::new(&patches, g.patch(), columns));
         product(&mut out, Into::New, kernels, seen);
-        tile.for_each_piece(|at, length, place| {
+        tile.for_each_piece(|column, length, place| {
             for (filter, bias) in bias.iter().enumerate() {
                 let to = &mut output[place + filter * g.out_pixels()..][..length];
-                let from = &out[filter * columns + at..][..length];
+                let from = &out[filter * columns + column..][..length];
                 to.iter_mut().zip(from).for_each(|(to, from)| *to = from + bias);
             }
         });
@@ -184,38 +184,38 @@ fn forward(input: &[f32], weight: &[f32], bias: &[f32], g: Geometry) -> Vec<f32>
     output
 }
 
-/// What the loss's slope along the output means for input and weights; empty where not asked for.
-struct Found {
+/// Slopes of the loss along input and weights; empty where not asked for.
+struct InputSlopes {
     input: Vec<f32>,
     weight: Vec<f32>,
 }
 
-impl Found {
+impl InputSlopes {
     fn new(slope: &[f32], input: &[f32], weight: &[f32], g: Geometry, [of_input, of_weight]: [bool; 2]) -> Self {
         let zeros = |wanted: bool, like: &[f32]| vec![0.0; if wanted { like.len() } else { 0 }];
-        let mut found = Self { input: zeros(of_input, input), weight: zeros(of_weight, weight) };
+        let mut input_slopes = Self { input: zeros(of_input, input), weight: zeros(of_weight, weight) };
         let most = g.tile_rows() * g.out_width;
         let (mut patches, mut out) = (vec![0.0; g.patch() * most], vec![0.0; g.filters * most]);
         for tile in g.tiles() {
             let columns = tile.columns();
-            tile.for_each_piece(|at, length, place| {
+            tile.for_each_piece(|column, length, place| {
                 for filter in 0..g.filters {
                     let from = &slope[place + filter * g.out_pixels()..][..length];
-                    out[filter * columns + at..][..length].copy_from_slice(from);
+                    out[filter * columns + column..][..length].copy_from_slice(from);
                 }
             });
             let along = Matrix::new(&out, g.filters, columns);
             if of_weight {
                 tile.unroll(input, &mut patches);
                 let seen = Matrix::new(&patches, g.patch(), columns);
-                product(&mut found.weight, Into::Sum, along, seen.transposed());
+                product(&mut input_slopes.weight, Into::Sum, along, seen.transposed());
             }
             if of_input {
                 let kernels = Matrix::new(weight, g.filters, g.patch());
                 product(&mut patches, Into::New, kernels.transposed(), along);
-                tile.roll(&patches, &mut found.input);
+                tile.roll(&patches, &mut input_slopes.input);
             }
         }
-        found
+        input_slopes
     }
 }

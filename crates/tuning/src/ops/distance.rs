@@ -29,14 +29,14 @@ pub fn distance(drawn: &Tensor, measured: &[f32], weights: &[f32]) -> Tensor {
     })
 }
 
-/// What pixels add to the loss, and their slopes.
+/// Loss of the pixels, and its slopes.
 fn pixel_terms(difference: &[f32]) -> (f64, Vec<f32>) {
     let share = 1.0 / difference.len() as f32;
     let sum: f64 = difference.iter().map(|&d| f64::from(SQUARES * d * d + d.abs())).sum();
     (sum * f64::from(share), difference.iter().map(|&d| (2.0 * SQUARES * d + sign(d)) * share).collect())
 }
 
-/// What gradients add to the loss; their slopes are added to those of the pixels.
+/// Loss of the gradients; its slopes are added to those of the pixels.
 fn edge_terms(difference: &[f32], side: usize, along: &mut [f32]) -> f64 {
     let small = side - BOX + 1;
     let smooth = boxes(difference, side);
@@ -49,16 +49,16 @@ fn edge_terms(difference: &[f32], side: usize, along: &mut [f32]) -> f64 {
         of_smooth[next] += sign(step) * share;
         of_smooth[one] -= sign(step) * share;
     };
-    for at in 0..smooth.len() {
-        if at % small + 1 < small {
-            edge(at, at + 1);
+    for pixel in 0..smooth.len() {
+        if pixel % small + 1 < small {
+            edge(pixel, pixel + 1);
         }
-        if at + small < smooth.len() {
-            edge(at, at + small);
+        if pixel + small < smooth.len() {
+            edge(pixel, pixel + small);
         }
     }
-    for (at, slope) in of_smooth.iter().enumerate() {
-        let (y, x) = (at / small, at % small);
+    for (pixel, slope) in of_smooth.iter().enumerate() {
+        let (y, x) = (pixel / small, pixel % small);
         for row in y..y + BOX {
             let to = &mut along[row * side + x..][..BOX];
             to.iter_mut().for_each(|to| *to += slope / (BOX * BOX) as f32);
@@ -70,8 +70,8 @@ fn edge_terms(difference: &[f32], side: usize, along: &mut [f32]) -> f64 {
 /// Means over all squares that lie within the image.
 fn boxes(image: &[f32], side: usize) -> Vec<f32> {
     let small = side - BOX + 1;
-    let mean = |at: usize| {
-        let (y, x) = (at / small, at % small);
+    let mean = |pixel: usize| {
+        let (y, x) = (pixel / small, pixel % small);
         let sum: f32 = (y..y + BOX).map(|row| image[row * side + x..][..BOX].iter().sum::<f32>()).sum();
         sum / (BOX * BOX) as f32
     };

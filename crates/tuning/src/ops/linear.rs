@@ -3,7 +3,7 @@
 use super::product::{Into, Matrix, product};
 use crate::tape::Tensor;
 
-/// How a product's weights lie.
+/// Order of a product's weights.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Weights {
     /// `[in, out]`.

@@ -11,7 +11,7 @@ use crate::tape::Tensor;
 pub(crate) const GROUPS: usize = 8;
 const EPSILON: f32 = 1e-5;
 
-/// What follows the normalization.
+/// Activation that follows the normalization.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Activation {
     /// Nothing.
@@ -36,10 +36,10 @@ fn normalized(input: &Tensor, scale: &Tensor, shift: &Tensor, layout: Layout, th
     let (output, moments) = forward(input.values(), scale.values(), shift.values(), layout, then);
     let saved = Saved { input: input.shared(), scale: scale.shared(), shift: shift.shared(), moments, layout, then };
     Tensor::made([input, scale, shift], input.shape(), output, move |slope, [to_input, to_scale, to_shift], slopes| {
-        let found = Found::new(slope, &saved);
-        slopes.add(to_input, || found.input);
-        slopes.add(to_scale, || found.scale);
-        slopes.add(to_shift, || found.shift);
+        let input_slopes = InputSlopes::new(slope, &saved);
+        slopes.add(to_input, || input_slopes.input);
+        slopes.add(to_scale, || input_slopes.scale);
+        slopes.add(to_shift, || input_slopes.shift);
     })
 }
 
@@ -112,20 +112,20 @@ struct Saved {
     then: Activation,
 }
 
-/// What the loss's slope along the output means for the three inputs.
-struct Found {
+/// Slopes of the loss along the three inputs.
+struct InputSlopes {
     input: Vec<f32>,
     scale: Vec<f32>,
     shift: Vec<f32>,
 }
 
-impl Found {
+impl InputSlopes {
     fn new(slope: Vec<f32>, saved: &Saved) -> Self {
         let Saved { layout, then, moments, .. } = saved;
         let (block, zeros) = (layout.block(), vec![0.0; layout.channels]);
-        let mut found = Self { input: slope, scale: zeros.clone(), shift: zeros };
+        let mut input_slopes = Self { input: slope, scale: zeros.clone(), shift: zeros };
         let (scale, shift) = (&saved.scale, &saved.shift);
-        let blocks = saved.input.chunks_exact(block).zip(found.input.chunks_exact_mut(block));
+        let blocks = saved.input.chunks_exact(block).zip(input_slopes.input.chunks_exact_mut(block));
         for (i, ((values, slopes_in), &Moments { mean, inverse })) in blocks.zip(moments).enumerate() {
             // The block's mean slope, and its mean slope along the normalized values, both scaled: what mean and
             // deviation take back.
@@ -144,8 +144,8 @@ impl Found {
                 }
                 let of_shift = sum(du.len(), |i| du[i]);
                 let of_scale = sum(du.len(), |i| du[i] * (values[i] - mean)) * inverse;
-                found.shift[channel] += of_shift;
-                found.scale[channel] += of_scale;
+                input_slopes.shift[channel] += of_shift;
+                input_slopes.scale[channel] += of_scale;
                 along_mean += of_shift * scale;
                 along_deviation += of_scale * scale;
             }
@@ -158,6 +158,6 @@ impl Found {
                 }
             }
         }
-        found
+        input_slopes
     }
 }

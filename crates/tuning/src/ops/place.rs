@@ -12,9 +12,9 @@ pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, p
     let mut values = drawn.values().to_vec();
     for (seen, pad) in values.chunks_exact_mut(pixels).zip(pads) {
         let Some(pad) = *pad else { continue };
-        let at = Place::new(side, shifts.values(), pad);
+        let place = Place::new(side, shifts.values(), pad);
         let lined: Vec<f32> = seen.iter().map(|v| v * line.values()[0] + line.values()[1]).collect();
-        let moved = at.down(&at.across(&lined));
+        let moved = place.down(&place.across(&lined));
         let field = &fields.values()[pad * pixels..][..pixels];
         seen.iter_mut().zip(moved).zip(field).for_each(|((seen, moved), field)| *seen = moved + field);
     }
@@ -23,22 +23,22 @@ pub fn placed(drawn: &Tensor, line: &Tensor, shifts: &Tensor, fields: &Tensor, p
     let sizes = [shifts.values().len(), fields.values().len()];
     let inputs = [drawn, line, shifts, fields];
     Tensor::made(inputs, drawn.shape(), values, move |slope, [to_drawn, to_line, to_shifts, to_fields], slopes| {
-        let mut found =
-            Found { drawn: slope, line: [0.0; 2], shifts: vec![0.0; sizes[0]], fields: vec![0.0; sizes[1]] };
+        let mut input_slopes =
+            InputSlopes { drawn: slope, line: [0.0; 2], shifts: vec![0.0; sizes[0]], fields: vec![0.0; sizes[1]] };
         for (item, pad) in pads.iter().enumerate() {
             if let Some(pad) = *pad {
                 let range = item * pixels..(item + 1) * pixels;
-                found.follow(range.clone(), &of_drawn[range], &of_line, &Place::new(side, &of_shifts, pad), pad);
+                input_slopes.follow(range.clone(), &of_drawn[range], &of_line, &Place::new(side, &of_shifts, pad), pad);
             }
         }
-        slopes.add(to_drawn, || found.drawn);
-        slopes.add(to_line, || found.line.iter().map(|&v| v as f32).collect());
-        slopes.add(to_shifts, || found.shifts);
-        slopes.add(to_fields, || found.fields);
+        slopes.add(to_drawn, || input_slopes.drawn);
+        slopes.add(to_line, || input_slopes.line.iter().map(|&v| v as f32).collect());
+        slopes.add(to_shifts, || input_slopes.shifts);
+        slopes.add(to_fields, || input_slopes.fields);
     })
 }
 
-/// Where each row and column reads.
+/// Taps that each row and column reads with.
 struct Place {
     side: usize,
     rows: Vec<Tap>,
@@ -71,28 +71,28 @@ impl Place {
 }
 
 /// Slopes along the inputs; that along the drawn pictures begins as the one along the result.
-struct Found {
+struct InputSlopes {
     drawn: Vec<f32>,
     line: [f64; 2],
     shifts: Vec<f32>,
     fields: Vec<f32>,
 }
 
-impl Found {
+impl InputSlopes {
     /// Takes one picture's slope back.
-    fn follow(&mut self, range: std::ops::Range<usize>, drawn: &[f32], line: &[f32], at: &Place, pad: usize) {
-        let side = at.side;
+    fn follow(&mut self, range: std::ops::Range<usize>, drawn: &[f32], line: &[f32], place: &Place, pad: usize) {
+        let side = place.side;
         let slope = &mut self.drawn[range];
         let field = &mut self.fields[pad * side * side..][..side * side];
         field.iter_mut().zip(slope.iter()).for_each(|(field, slope)| *field += slope);
 
         let lined: Vec<f32> = drawn.iter().map(|v| v * line[0] + line[1]).collect();
-        let across = at.across(&lined);
+        let across = place.across(&lined);
         // Moving on by a shift reads further back: hence the minus.
         let mut along_across = vec![0.0; slope.len()];
         let mut down = 0.0f64;
-        for (tap, slope) in at.rows.iter().zip(slope.chunks_exact(side)) {
-            let (upper, lower) = at.two_rows(&across, tap);
+        for (tap, slope) in place.rows.iter().zip(slope.chunks_exact(side)) {
+            let (upper, lower) = place.two_rows(&across, tap);
             let (to_upper, to_lower) = along_across[tap.low * side..][..2 * side].split_at_mut(side);
             for (x, &slope) in slope.iter().enumerate() {
                 to_upper[x] += slope * (1.0 - tap.part);
@@ -104,7 +104,7 @@ impl Found {
         slope.fill(0.0);
         let rows = slope.chunks_exact_mut(side).zip(lined.chunks_exact(side)).zip(along_across.chunks_exact(side));
         for ((to, lined), along) in rows {
-            for (tap, &along) in at.columns.iter().zip(along) {
+            for (tap, &along) in place.columns.iter().zip(along) {
                 to[tap.low] += along * (1.0 - tap.part);
                 to[tap.low + 1] += along * tap.part;
                 right -= f64::from(along * (lined[tap.low + 1] - lined[tap.low]) * tap.inside);

@@ -32,7 +32,7 @@ impl<'a> Matrix<'a> {
     }
 }
 
-/// Whether a product is added to what lies in its place.
+/// Destination of a product: a new matrix, or a sum with what lies in its place.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum Into {
     New,

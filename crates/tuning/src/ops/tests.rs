@@ -54,16 +54,19 @@ impl Case<'_> {
     fn check(&self, tolerance: f64) {
         let expected = (self.plain)(&self.inputs);
         assert_eq!(expected.len(), self.output.len());
-        for (expected, found) in expected.iter().zip(&self.output) {
-            assert!((expected - f64::from(*found)).abs() < tolerance * (1.0 + expected.abs()), "{expected} {found}");
+        for (expected, computed) in expected.iter().zip(&self.output) {
+            assert!(
+                (expected - f64::from(*computed)).abs() < tolerance * (1.0 + expected.abs()),
+                "{expected} {computed}"
+            );
         }
         for (which, input) in self.inputs.iter().enumerate() {
             assert_eq!(input.values.len(), self.gradients[which].len());
             // Some places of each input.
             for place in (0..input.values.len()).step_by((input.values.len() / 23).max(1)) {
-                let (expected, found) = (self.slope(which, place), f64::from(self.gradients[which][place]));
-                let close = (expected - found).abs() < tolerance * (1.0 + expected.abs());
-                assert!(close, "input {which}, place {place}: {expected} by differences, {found} by the operator");
+                let (expected, computed) = (self.slope(which, place), f64::from(self.gradients[which][place]));
+                let close = (expected - computed).abs() < tolerance * (1.0 + expected.abs());
+                assert!(close, "input {which}, place {place}: {expected} by differences, {computed} by the operator");
             }
         }
     }
@@ -125,8 +128,8 @@ fn convolution_of_many_tiles() {
     let expected = plain(&case.inputs);
     assert!(expected.iter().zip(&case.output).all(|(e, f)| (e - f64::from(*f)).abs() < 1e-3));
     for (which, place) in [(0, 0), (0, 40_000), (1, 700), (2, 1)] {
-        let (expected, found) = (case.slope(which, place), f64::from(case.gradients[which][place]));
-        assert!((expected - found).abs() < 1e-3 * (1.0 + expected.abs()), "{expected} {found}");
+        let (expected, computed) = (case.slope(which, place), f64::from(case.gradients[which][place]));
+        assert!((expected - computed).abs() < 1e-3 * (1.0 + expected.abs()), "{expected} {computed}");
     }
 }
 
@@ -208,8 +211,8 @@ fn attention_and_its_gradients() {
     let plain = |inputs: &[Array]| {
         let (queries, both, per_head) = (&inputs[0].values, &inputs[1].values, dim / heads);
         let mut read = vec![0.0; queries.len()];
-        for at in 0..batch * tokens * heads {
-            let (item, token, head) = (at / heads / tokens, at / heads % tokens, at % heads);
+        for index in 0..batch * tokens * heads {
+            let (item, token, head) = (index / heads / tokens, index / heads % tokens, index % heads);
             let query = (item * tokens + token) * dim + head * per_head;
             let source = |s: usize, which: usize| (item * sources + s) * 2 * dim + which * dim + head * per_head;
             let likeness = |s: usize| {
@@ -272,8 +275,8 @@ fn read(image: &[f64], side: usize, y: f64, x: f64) -> f64 {
     let last = (side - 1) as f64;
     let (y, x) = (y.clamp(0.0, last), x.clamp(0.0, last));
     let (top, left) = (y.floor().min(last - 1.0), x.floor().min(last - 1.0));
-    let at = |row: f64, column: f64| image[row as usize * side + column as usize];
-    let row = |row: f64| at(row, left) + (at(row, left + 1.0) - at(row, left)) * (x - left);
+    let pixel = |row: f64, column: f64| image[row as usize * side + column as usize];
+    let row = |row: f64| pixel(row, left) + (pixel(row, left + 1.0) - pixel(row, left)) * (x - left);
     row(top) + (row(top + 1.0) - row(top)) * (y - top)
 }
 
@@ -283,12 +286,12 @@ fn placement_and_its_gradients() {
     let plain = |inputs: &[Array]| {
         let [drawn, line, shifts, fields] = inputs else { unreachable!() };
         let pixel = |i: usize| {
-            let (item, at) = (i / (side * side), i % (side * side));
+            let (item, index) = (i / (side * side), i % (side * side));
             let image = &drawn.values[item * side * side..][..side * side];
-            pads[item].map_or(image[at], |pad| {
+            pads[item].map_or(image[index], |pad| {
                 let [dy, dx] = [shifts.values[2 * pad], shifts.values[2 * pad + 1]];
-                let (y, x) = ((at / side) as f64 - dy, (at % side) as f64 - dx);
-                read(image, side, y, x) * line.values[0] + line.values[1] + fields.values[pad * side * side + at]
+                let (y, x) = ((index / side) as f64 - dy, (index % side) as f64 - dx);
+                read(image, side, y, x) * line.values[0] + line.values[1] + fields.values[pad * side * side + index]
             })
         };
         (0..pads.len() * side * side).map(pixel).collect()
@@ -349,8 +352,8 @@ fn what_a_unet_needs_and_its_gradients() {
     let one = || vec![Array::random(&[1, 2, 4, 6], 5)];
     run(one(), &|x| x[0].values.iter().map(|v| v.max(0.0)).collect(), |x| relu(&x[0])).check(1e-6);
     let largest = |x: &[Array]| {
-        let at = |i: usize, k: usize| x[0].values[(i / 3 * 2 + k / 2) * 6 + i % 3 * 2 + k % 2];
-        (0..12).map(|i| (0..4).map(|k| at(i, k)).fold(f64::MIN, f64::max)).collect()
+        let value = |i: usize, k: usize| x[0].values[(i / 3 * 2 + k / 2) * 6 + i % 3 * 2 + k % 2];
+        (0..12).map(|i| (0..4).map(|k| value(i, k)).fold(f64::MIN, f64::max)).collect()
     };
     run(one(), &largest, |x| halved(&x[0])).check(1e-6);
     let margins = Margins::to_multiples(3, 5, 4);
@@ -380,10 +383,10 @@ fn the_loss_of_contact_and_its_gradients() {
     let plain = |inputs: &[Array]| {
         let mut loss = 0.0;
         for (item, weight) in weights.iter().enumerate() {
-            let at = |class: usize, i: usize| inputs[0].values[(2 * item + class) * pixels + i];
+            let logit = |class: usize, i: usize| inputs[0].values[(2 * item + class) * pixels + i];
             let counts: Vec<usize> = (0..pixels).filter(|i| counted[item * pixels + i] == 1.0).collect();
             let truth = |i: usize| f64::from(masks[item * pixels + i]);
-            let p = |i: usize| at(1, i).exp() / (at(0, i).exp() + at(1, i).exp());
+            let p = |i: usize| logit(1, i).exp() / (logit(0, i).exp() + logit(1, i).exp());
             if counts.is_empty() {
                 continue;
             }

@@ -1,4 +1,4 @@
-//! What a UNet needs beside convolutions: [`relu`], [`halved`], [`padded`], [`cropped`].
+//! Operators that a UNet needs beside convolutions: [`relu`], [`halved`], [`padded`], [`cropped`].
 
 use crate::tape::Tensor;
 
@@ -20,14 +20,14 @@ pub fn halved(x: &Tensor) -> Tensor {
             let (column, row, plane) = (i % shape[3], i / shape[3] % shape[2], i / shape[3] / shape[2]);
             let first = (plane * h + 2 * row) * w + 2 * column;
             let four = [first, first + 1, first + w, first + w + 1];
-            four.into_iter().fold(first, |best, at| if x.values()[at] > x.values()[best] { at } else { best })
+            four.into_iter().fold(first, |best, index| if x.values()[index] > x.values()[best] { index } else { best })
         })
         .collect();
-    let values = largest.iter().map(|&at| x.values()[at]).collect();
+    let values = largest.iter().map(|&index| x.values()[index]).collect();
     Tensor::made([x], &shape, values, move |slope, [to_x], slopes| {
         slopes.add(to_x, || {
             let mut whole = vec![0.0; n * c * h * w];
-            largest.iter().zip(slope).for_each(|(&at, slope)| whole[at] += slope);
+            largest.iter().zip(slope).for_each(|(&index, slope)| whole[index] += slope);
             whole
         });
     })
@@ -43,7 +43,7 @@ pub struct Margins {
 }
 
 impl Margins {
-    /// What makes both sides multiples of a number, half on either side, the odd one behind.
+    /// Margins that make both sides multiples of a number, half on either side, the odd one behind.
     pub(crate) fn to_multiples(rows: usize, columns: usize, of: usize) -> Self {
         let split = |size: usize| {
             let more = size.next_multiple_of(of) - size;

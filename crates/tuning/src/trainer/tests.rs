@@ -53,8 +53,8 @@ fn any_objective_is_descended() {
     let mut trainer = trainer(2, 300);
     let mut losses: Vec<f32> = (0..300).map(|_| trainer.step().unwrap().loss).collect();
     assert!(losses.split_off(290).iter().sum::<f32>() < 1e-2 * losses[..10].iter().sum::<f32>());
-    let found = &trainer.average().get("vector").unwrap().values;
-    assert!(found.iter().zip(TRUTH).all(|(f, t)| (f - t).abs() < 0.02), "{found:?}");
+    let average = &trainer.average().get("vector").unwrap().values;
+    assert!(average.iter().zip(TRUTH).all(|(f, t)| (f - t).abs() < 0.02), "{average:?}");
     assert_eq!(trainer.average().get("fixed").unwrap().values.as_slice(), [7.0; 2]);
     assert_eq!(trainer.step(), Err(Error::Done(300)));
 }

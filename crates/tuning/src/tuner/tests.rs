@@ -223,9 +223,9 @@ fn smooth() -> Start {
 #[test]
 fn a_known_shift_and_field_are_recovered() {
     let start = smooth();
-    let bump = |at: [f32; 2], height: f32| -> Vec<f32> {
+    let bump = |center: [f32; 2], height: f32| -> Vec<f32> {
         let bell = |i: usize| {
-            let (y, x) = ((i / 32) as f32 - at[0], (i % 32) as f32 - at[1]);
+            let (y, x) = ((i / 32) as f32 - center[0], (i % 32) as f32 - center[1]);
             height * (-(y * y + x * x) / 40.0).exp()
         };
         (0..32 * 32).map(bell).collect()
@@ -245,19 +245,19 @@ fn a_known_shift_and_field_are_recovered() {
     let (tuner, losses) = run(Tuner::new(&start, pairs.clone(), config).unwrap());
     let mean = |losses: &[f32]| losses.iter().sum::<f32>() / losses.len() as f32;
     assert!(mean(&losses[240..]) < 0.4 * mean(&losses[..10]), "{losses:?}");
-    let found = tuner.tuned().placement;
-    for (found, truth) in found.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
-        assert!((found - truth).abs() < 0.2, "{:?}", tuner.tuned().placement.shift);
+    let placement = tuner.tuned().placement;
+    for (shift, truth) in placement.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
+        assert!((shift - truth).abs() < 0.2, "{:?}", tuner.tuned().placement.shift);
     }
     let error = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f32>().sqrt();
-    for (found, truth) in found.field.iter().zip(&truth.field) {
-        assert!(error(found, truth) < 0.5 * error(&vec![0.0; 32 * 32], truth));
+    for (field, truth) in placement.field.iter().zip(&truth.field) {
+        assert!(error(field, truth) < 0.5 * error(&vec![0.0; 32 * 32], truth));
     }
 
     // The closed form finds them at once.
     let closed = Placement::closed_form(&start, &pairs).unwrap();
-    for (found, truth) in closed.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
-        assert!((found - truth).abs() <= 0.25, "{:?}", closed.shift);
+    for (shift, truth) in closed.shift.iter().flatten().zip(truth.shift.iter().flatten()) {
+        assert!((shift - truth).abs() <= 0.25, "{:?}", closed.shift);
     }
 }
 

@@ -1,4 +1,4 @@
-//! What a fit answers: scores, what was found, and touches to look at.
+//! Answer of a fit: scores, the corrections of the pads, and touches to look at.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -33,7 +33,7 @@ pub struct Adapted {
     pub after: Option<Scored>,
     /// Steps of tuning.
     pub steps: u32,
-    /// How the tuning went: the loss, and PSNR (as [`Scored::psnr_raw_db`]) on touches that were left out.
+    /// Curves of the tuning: the loss, and PSNR (as [`Scored::psnr_raw_db`]) on touches that were left out.
     pub curves: Vec<Curve>,
     /// Time of everything, seconds.
     pub seconds: f64,
@@ -41,13 +41,13 @@ pub struct Adapted {
     pub fit_seconds: f64,
     /// The most memory that the program had so far, MiB, where the system tells.
     pub peak_mib: Option<u64>,
-    /// What was found for each pad.
+    /// Correction of each pad.
     pub pads: Vec<PadSummary>,
-    /// What to be careful about.
+    /// Warnings, in words.
     pub warnings: Vec<String>,
-    /// What is odd about the data set and the files that were read.
+    /// Oddities of the data set and of the files that were read.
     pub notes: Vec<Finding>,
-    /// What speaks against the fit: with any of it the bundle is only written where that is asked for.
+    /// Objections to the fit: with any of them the bundle is only written where that is asked for.
     pub objections: Vec<String>,
     /// The fit to other data that the folder of the new bundle holds, which is only replaced where that is asked for.
     pub in_place_of: Option<String>,
@@ -74,22 +74,22 @@ impl Adapted {
 pub struct HeldBack {
     /// The pair.
     pub pair: PairId,
-    /// Its name.
+    /// Name of the pair.
     pub name: String,
     /// The pad.
     pub pad: PadId,
-    /// What was felt.
+    /// Measured imprint.
     pub measured: DepthMap,
-    /// What the unfitted model predicts.
+    /// Prediction of the unfitted model.
     pub before: DepthMap,
-    /// What the model predicts that was fitted (and tuned, where that was asked for) to the others.
+    /// Prediction of the model that was fitted (and tuned, where that was asked for) to the others.
     pub after: DepthMap,
 }
 
 /// More touches than these are not kept to be looked at.
 pub(crate) const MOST_SHOWN: usize = 200;
 
-/// What was found for a pad.
+/// Correction of a pad, in figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct PadSummary {
     /// The pad's name.
@@ -100,6 +100,6 @@ pub struct PadSummary {
     pub offset_px: [f64; 2],
     /// Gain of the straight line.
     pub gain: f64,
-    /// Its offset, meters.
+    /// Offset of the straight line, meters.
     pub offset_m: f64,
 }

@@ -31,21 +31,21 @@ pub(super) struct FitTouch {
     pub(super) scale: Scale,
     /// Meters, at the decoder's size and in its orientation.
     pub(super) prediction: DepthMap,
-    /// The same where the rig has the pad's window, as a prediction is shown without a fit.
+    /// Prediction moved to the pad's window, where the rig has one, as it is shown without a fit.
     pub(super) unfitted: DepthMap,
     /// That window, see [`window`].
     pub(super) window: Option<[f64; 2]>,
-    /// Where a prediction has to be moved to lie in it, `[right, down]` in pixels; `None` where either side does not say.
+    /// Shift that moves a prediction into the window, `[right, down]` in pixels; `None` where either side does not say.
     pub(super) to_window_px: Option<[f64; 2]>,
-    /// What was measured, likewise.
+    /// Measured imprint, likewise.
     pub(super) target: DepthMap,
-    /// What was measured as it is: raw orientation.
+    /// Measured imprint as it is: raw orientation.
     pub(super) measured: DepthMap,
     /// The picture as the file has it, meters, where there is one.
     pub(super) tile: Option<DepthMap>,
-    /// Whether the decoder's picture lies turned by 180 degrees in the raw orientation.
+    /// True where the decoder's picture lies turned by 180 degrees in the raw orientation.
     pub(super) turned: bool,
-    /// What the generator starts from.
+    /// Picture that the generator starts from.
     pub(super) picture: RgbGrid,
     /// The lattice of its GelSlim, where the pad is not known.
     pub(super) signature: Option<Grid<f32>>,
@@ -67,9 +67,9 @@ impl FitTouch {
 pub(super) struct Gathered {
     pub(super) touches: Vec<FitTouch>,
     pub(super) left_out: Vec<Remark>,
-    /// Whether pads were told apart by their lattices.
+    /// True where pads were told apart by their lattices.
     pub(super) grouped: bool,
-    /// What was odd about the data set and the files of the pairs.
+    /// Oddities of the data set and of the files of the pairs.
     pub(super) notes: Findings,
 }
 

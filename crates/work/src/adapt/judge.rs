@@ -1,4 +1,4 @@
-//! Whether a fit may become a bundle: [`objections`].
+//! Judgment of a fit before it may become a bundle: [`objections`].
 
 use super::adapted::Adapted;
 use super::gather::FitTouch;
@@ -8,18 +8,18 @@ use touch2touch_core::fit::{FitPair, Fitted};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, Rig};
 
-/// What a fit is judged by.
+/// Figures and data that a fit is judged by.
 pub(super) struct Evidence<'a> {
     pub(super) rig: &'a Rig,
     pub(super) touches: &'a [FitTouch],
     pub(super) fitted: &'a Fitted,
-    /// What fits to the others make of each touch.
+    /// Prediction of each touch by a fit to the others.
     pub(super) unseen: &'a [Option<DepthMap>],
-    /// What an examination of the data found wrong with them.
+    /// Faults of the data that their examination found.
     pub(super) doubts: &'a [Problem],
 }
 
-/// What speaks against a fit, in words: its own figures, its scores, and what is known to be wrong with the data.
+/// Objections to a fit, in words: from its own figures, its scores, and the known faults of the data.
 pub(super) fn objections(evidence: &Evidence<'_>, scores: &Adapted) -> Vec<String> {
     let Evidence { rig, touches, fitted, unseen, doubts } = *evidence;
     let cases: Vec<FitPair<'_>> = touches.iter().map(FitTouch::case).collect();

@@ -1,4 +1,4 @@
-//! What pictures are worth beside their measurements, all three ways.
+//! Scores of pictures beside their measurements, all three ways.
 
 use std::sync::Arc;
 

@@ -28,7 +28,7 @@ const BATCH: usize = 16;
 const STEPPING: f64 = 0.85;
 /// Looks at touches that were left out, during a run.
 const LOOKS: usize = 5;
-/// What a look finds.
+/// Unit of the value that a look gives.
 const UNIT: &str = "dB";
 /// Touches at a look.
 const LOOKED_AT: usize = 8;
@@ -120,13 +120,13 @@ fn digest(setup: &AdaptSetup, generating: Generating<'_>, touches: &[FitTouch]) 
 
 /// One run of tuning.
 struct Run<'a> {
-    /// What its files are called.
+    /// Start of the names of its files.
     file: String,
-    /// What people call it.
+    /// Name for people.
     name: String,
     start: Start,
     pairs: Vec<Pair>,
-    /// What is left out.
+    /// Pairs that are left out.
     held: Vec<&'a Pair>,
 }
 
@@ -136,7 +136,7 @@ impl Run<'_> {
     }
 }
 
-/// What the tuned networks make of the touches that were left out, in the tuner's units.
+/// Predictions of the left-out touches by the tuned networks, in the tuner's units.
 fn predictions(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Vec<Vec<f32>>, TaskError> {
     let file = format!("{}.left-out", run.file);
     let pixels = run.pairs.first().map_or(0, |pair| pair.imprint.len());

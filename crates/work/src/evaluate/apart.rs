@@ -1,5 +1,5 @@
-//! How far kept predictions of a grasp with different seeds are apart. They come and go without the grasp's other figures
-//! changing, so this is looked up whenever these are.
+//! Spread between the kept predictions of a grasp with different seeds. They come and go without the grasp's other
+//! figures changing, so this is looked up whenever these are.
 
 use std::collections::BTreeMap;
 
@@ -44,7 +44,7 @@ pub(super) fn put(
             continue;
         }
         let names: Vec<&str> = entry.inputs.iter().flat_map(|input| kept.of(input)).collect();
-        let key = crate::io::digest::sha256(format!("{names:?} {:?} {bundles:?}", setup.shift).as_bytes());
+        let key = crate::io::digest::sha256(format!("{names:?} {:?} {bundles:?}", setup.recipe.shift).as_bytes());
         let found = all.sheets().get(SHEET, [key.as_str()]).pop().flatten();
         let found = found.unwrap_or_else(|| {
             let spread = dataset.load(*id).ok().and_then(|sample| spread_of(&sample, &bundles, setup, all));
@@ -61,8 +61,8 @@ fn spread_of(sample: &Sample, bundles: &[BundleInfo], setup: &Setup, all: &model
     let of = |pad: PadId| {
         let difference = &sample.pad(pad)?.color()?.difference;
         let mut alike: BTreeMap<String, BTreeMap<u64, DepthMap>> = BTreeMap::new();
-        for kept in all.kept(bundles, setup.runtime, difference) {
-            let Ok(imprint) = imprint_of(&kept.prediction, setup.shift, sample, pad) else { continue };
+        for kept in all.kept(bundles, setup.recipe.engine, difference) {
+            let Ok(imprint) = imprint_of(&kept.prediction, setup.recipe.shift, sample, pad) else { continue };
             // All but the seed must be the same.
             let recipe = format!("{} {:?}", kept.prediction.bundle, GenerateConfig { seed: 0, ..kept.config });
             alike.entry(recipe).or_default().insert(kept.config.seed, imprint);

@@ -1,4 +1,4 @@
-//! How sure the mask model is of the imprints of a grasp.
+//! Doubt of the mask model about the imprints of a grasp.
 
 use crate::error::TaskError;
 use crate::feel::Felt;

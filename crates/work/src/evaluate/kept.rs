@@ -13,12 +13,14 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::load::Labeled;
-use super::methods::Models;
+use super::methods::{Method, Models};
 use super::{Setup, ToolWork};
+use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::sheets::Sheets;
 use crate::io::dataset::{Dataset, SourceKind, UNIT_FILE};
 use crate::io::digest::sha256;
 use crate::io::files;
+use crate::recipe::{Recipe, RecipeId, Stage};
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem};
 use touch2touch_core::evaluation::{GraspScore, Group};
@@ -27,7 +29,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.
@@ -38,18 +40,18 @@ const MAX_FILE: u64 = 1 << 30;
 pub(super) struct Entry {
     /// As in the table; what a table's row adds is put in when it is read.
     pub(super) score: GraspScore,
-    /// Whether no pose was found: NaN has no place in the file.
+    /// True where no pose was found: NaN has no place in the file.
     no_pose: bool,
     scale: Scale,
-    /// What the classifier sees, bit for bit, by image.
+    /// Features by the classifier, bit for bit, by image.
     features: Vec<String>,
     /// Least and largest value of each prediction.
     pub(super) spans: Vec<Option<[f32; 2]>>,
     /// The range that the lab's SSIM was computed with.
     pub(super) range: f64,
-    /// Whether the GelSlim picture is clipped, of pictures.
+    /// True where the GelSlim picture is clipped; `None` where there is no picture.
     clipped: Option<bool>,
-    /// What is odd about the files.
+    /// Oddities of the files.
     pub(super) notes: Vec<Problem>,
     /// Why masks are not of the source that was asked, with how many.
     pub(super) otherwise: Vec<(String, usize)>,
@@ -79,7 +81,7 @@ impl Entry {
         }
     }
 
-    /// Whether its SSIM is with this range, or has none of the tool.
+    /// True where its SSIM is with this range, or has none of the tool.
     pub(super) fn is_of_range(&self, range: f64) -> bool {
         self.scale == Scale::Assumed || self.range.to_bits() == range.to_bits()
     }
@@ -118,14 +120,14 @@ impl Entry {
     }
 }
 
-/// What is known of the grasps of an evaluation.
+/// Known figures of the grasps of an evaluation.
 pub(super) struct KeptScores {
     sheets: Arc<Sheets>,
     /// The sheet of each method.
     names: Vec<String>,
     /// The key of each grasp; one without cannot be kept.
     keys: BTreeMap<PairId, String>,
-    /// What was found, by method.
+    /// Figures that were found, by method.
     known: Vec<BTreeMap<PairId, Entry>>,
 }
 
@@ -139,8 +141,7 @@ impl KeptScores {
         work: &[ToolWork],
         only_known: bool,
     ) -> Self {
-        let names: Vec<String> =
-            models.methods.iter().map(|method| sheet(dataset, setup, models, &method.recipe(setup))).collect();
+        let names: Vec<String> = models.methods.iter().map(|method| sheet(dataset, setup, models, method)).collect();
         let work = if only_known && names.iter().all(|name| sheets.is_empty(name)) { &[] } else { work };
         let labels = Labeled::of(dataset, setup);
         let files = Files::new(sheets.clone());
@@ -163,17 +164,17 @@ impl KeptScores {
         Self { sheets: sheets.clone(), names, keys, known }
     }
 
-    /// Whether a method's figures of a grasp are known.
+    /// True where a method's figures of a grasp are known.
     pub(super) fn has(&self, method: usize, id: PairId) -> bool {
         self.known[method].contains_key(&id)
     }
 
-    /// Whether every method's are.
+    /// True where every method's figures of a grasp are known.
     pub(super) fn is_whole(&self, id: PairId) -> bool {
         self.known.iter().all(|known| known.contains_key(&id))
     }
 
-    /// What is known of some grasps by a method, in their order.
+    /// Known figures of some grasps by a method, in their order.
     pub(super) fn of(&self, method: usize, ids: &[PairId]) -> Vec<(PairId, Entry)> {
         ids.iter().filter_map(|id| Some((*id, self.known[method].get(id)?.clone()))).collect()
     }
@@ -186,29 +187,29 @@ impl KeptScores {
 }
 
 /// The name of the sheet of a method (by its recipe) and a way to score.
-fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &str) -> String {
+fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &Method) -> String {
     #[derive(Serialize)]
     struct Way<'a> {
         version: u32,
         program: &'a str,
-        method: &'a str,
-        mask: Option<String>,
+        stored: bool,
+        recipe: RecipeId,
         classifier: Option<&'a str>,
         engine: &'a str,
-        registration: String,
         finger: Option<PadId>,
         kind: String,
         rig: String,
     }
-    let recipe = setup.mask.recipe(models.mask_bundle.as_ref().map(|bundle| &bundle.id));
+    let recipe = method.posed(models.common());
+    // Any choice of an engine is what it stands for.
+    let engine = resolve(recipe.engine).map_or(recipe.engine, EngineChoice::from);
     let way = Way {
         version: VERSION,
         program: program(),
-        method,
-        mask: recipe.map(|recipe| format!("{recipe:?}")),
+        stored: matches!(method, Method::Stored),
+        recipe: Recipe { engine, ..recipe }.id(Stage::Pose),
         classifier: models.classifier_hash(),
         engine: models.engine(),
-        registration: setup.engine.to_string(),
         finger: setup.finger,
         kind: format!("{:?}", dataset.kind),
         rig: format!("{:?}", dataset.rig),
@@ -226,7 +227,7 @@ fn program() -> &'static str {
     })
 }
 
-/// What the grasps of a tool have in common; `None` where its CAD model cannot be read.
+/// Part of a key that the grasps of a tool have in common; `None` where its CAD model cannot be read.
 fn tool_part(dataset: &Dataset, tool: Option<&str>, files: &Files) -> Option<String> {
     let Some(file) = tool.and_then(|name| dataset.tool_mesh_file(name)) else {
         let name = tool.map(pattern_of);

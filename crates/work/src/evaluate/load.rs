@@ -20,10 +20,10 @@ pub(super) struct LoadedPair {
     pub(super) id: PairId,
     pub(super) name: String,
     pub(super) group: Group,
-    /// Whether its GelSlim picture is clipped, of pictures.
+    /// True where its GelSlim picture is clipped; `None` where there is no picture.
     pub(super) clipped: Option<bool>,
     pub(super) sample: Sample,
-    /// What people drew, where that is to be taken.
+    /// Labels that people gave the pair, where they are to be taken.
     pub(super) labels: Option<PairLabels>,
     /// The bubble picture as it is in its file, and the lab's prediction of it, where the source has pictures.
     pub(super) tile: Option<Grid<f32>>,
@@ -42,12 +42,12 @@ pub(super) struct Batch<'a> {
     pub(super) cases: Box<dyn Iterator<Item = Result<LoadedPairs, Vec<Skipped>>> + 'a>,
 }
 
-/// What people drew, where that is to be taken.
+/// Labels that people gave the pairs, where they are to be taken.
 pub(super) struct Labeled(Option<Labels>);
 
 impl Labeled {
     pub(super) fn of(dataset: &Dataset, setup: &Setup) -> Self {
-        Self(setup.hand.then(|| Labels::of(dataset)))
+        Self(setup.recipe.hand.then(|| Labels::of(dataset)))
     }
 
     /// Nobody's.
@@ -60,7 +60,7 @@ impl Labeled {
     }
 }
 
-/// What is to be scored, tool by tool.
+/// Grasps to be scored, tool by tool.
 pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
     by_tool(dataset)
         .into_iter()

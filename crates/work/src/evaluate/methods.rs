@@ -13,10 +13,10 @@ use crate::infer::engine::{EngineChoice, resolve};
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::job::JobCx;
 use crate::labels::ImprintSource;
-use crate::mask::{MaskRecipe, MaskSource};
+use crate::mask::MaskRecipe;
 use crate::models;
 use crate::predict::Generating;
-use crate::recipe::{Model, Recipe};
+use crate::recipe::{Recipe, Stage};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Scores;
@@ -30,7 +30,7 @@ use touch2touch_core::turn::Turn;
 /// Pictures that are looked at for stored predictions: a folder has them from the start, or not at all.
 const LOOKED_AT: u32 = 16;
 
-/// What stands for one row of the table.
+/// Method of one row of the table.
 pub(super) enum Method {
     /// The measured imprints themselves: the upper bound of everything behind them.
     Measured,
@@ -49,7 +49,7 @@ pub(super) struct GeneratorMethod {
     config: GenerateConfig,
 }
 
-/// What a method makes of one touch.
+/// Pictures that a method makes of one touch.
 pub(super) struct Made {
     /// Imprints in meters, raw orientation, by finger.
     pub(super) imprints: PerPad<DepthMap>,
@@ -66,15 +66,15 @@ pub(super) struct Made {
 /// Everything that runs.
 pub(super) struct Models {
     pub(super) methods: Vec<Method>,
-    /// Where the mask model is run.
+    /// Models among which the mask model is run.
     pub(super) masks: models::Models,
-    pub(super) mask_bundle: Option<BundleInfo>,
+    /// What every method has in common; there is no mask model where there are no masks.
+    common: Recipe,
     /// The classifier's bundle; the model once it was needed.
     classifier_bundle: Option<Bundle>,
     pub(super) classifier: Option<ToolClassifier>,
-    runtime: EngineChoice,
     engine: String,
-    /// How many masks were not made of the source that was asked, by row and reason.
+    /// Number of masks that were not made of the source that was asked, by row and reason.
     pub(super) made_otherwise: BTreeMap<(String, String), usize>,
 }
 
@@ -96,7 +96,7 @@ impl Models {
             methods.push(Method::Measured);
         }
         let fail = |err: &dyn std::error::Error| TaskError::from_error(WHAT, err);
-        let engine = resolve(setup.runtime).map_err(|err| fail(&err))?.label().to_owned();
+        let engine = resolve(setup.recipe.engine).map_err(|err| fail(&err))?.label().to_owned();
         let mut names: Vec<String> = Vec::new();
         for origin in &setup.bundles {
             let bundle = found(origin, BundleKind::Generator)?;
@@ -113,42 +113,41 @@ impl Models {
             // Two runs of one trainer have the same name: their folders tell them apart.
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());
-            let (models, engine) = (models.beside(), setup.runtime);
+            let (models, engine) = (models.beside(), setup.recipe.engine);
             methods.push(Method::Generator(Box::new(GeneratorMethod { name, bundle, models, engine, config })));
         }
         let stored = |id: u32| matches!(dataset.vqvae_tile(PairId(id), Turn::default()), Ok(Some(_)));
         if pictures && (0..LOOKED_AT).any(stored) {
             methods.push(Method::Stored);
         }
-        let mask_bundle = match &setup.mask_bundle {
-            Some(origin) if !pictures => Some(found(origin, BundleKind::Mask)?),
-            _ => None,
-        };
+        let mask_model = setup.recipe.mask_model.clone().filter(|_| !pictures);
+        if let Some(model) = &mask_model {
+            (**model).clone().of_kind(BundleKind::Mask, WHAT)?;
+        }
         let classifier_bundle = setup.classifier.as_ref().filter(|_| !pictures).map(open).transpose()?;
         Ok(Self {
             methods,
             masks: models.beside(),
-            mask_bundle,
+            common: Recipe { mask_model, ..setup.recipe.clone() },
             classifier_bundle,
             classifier: None,
-            runtime: setup.runtime,
             engine,
             made_otherwise: BTreeMap::new(),
         })
     }
 
     /// Loads all models, so that one that cannot be used is known before the first touch.
-    pub(super) fn load(&mut self, setup: &Setup) -> Result<(), TaskError> {
+    pub(super) fn load(&mut self) -> Result<(), TaskError> {
         for method in &self.methods {
             if let Method::Generator(method) = method {
                 method.models.load(&method.bundle, method.engine)?;
             }
         }
-        if let (Some(bundle), MaskSource::Auto | MaskSource::Unet) = (&self.mask_bundle, setup.mask.source) {
-            self.masks.load(bundle, setup.runtime)?;
+        if let Some(model) = &self.common.until(Stage::Mask).mask_model {
+            self.masks.load(model, self.common.engine)?;
         }
         if let Some(bundle) = &self.classifier_bundle {
-            let opened = ToolClassifier::open(bundle, self.runtime);
+            let opened = ToolClassifier::open(bundle, self.common.engine);
             self.classifier = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
         }
         Ok(())
@@ -179,6 +178,11 @@ impl Models {
         self.classifier_bundle.as_ref().map(Bundle::hash)
     }
 
+    /// What every method has in common.
+    pub(super) fn common(&self) -> &Recipe {
+        &self.common
+    }
+
     /// The engine's name.
     pub(super) fn engine(&self) -> &str {
         &self.engine
@@ -190,7 +194,7 @@ impl Models {
         self.made_otherwise.iter().map(line).collect()
     }
 
-    /// What is missing from the table, and why.
+    /// Notes on what is missing from the table, and why.
     pub(super) fn missing(&self, setup: &Setup, rig: &Rig, scale: Scale) -> Vec<String> {
         let images = match setup.finger {
             None => "images of both fingers".to_owned(),
@@ -212,8 +216,7 @@ impl Models {
             notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
             return notes;
         }
-        let recipe = setup.mask.recipe(self.mask_bundle.as_ref().map(|bundle| &bundle.id));
-        notes.push(match recipe {
+        notes.push(match self.common.mask_recipe().ok() {
             None => "no mask model: no angle".into(),
             Some(MaskRecipe::Unet(_, least)) => {
                 let from = least.map_or(String::new(), |p| format!(" from probability {} on", p.get()));
@@ -248,7 +251,7 @@ impl Method {
     }
 
     /// The recipe of its poses. Nobody can have drawn on a stored prediction.
-    pub(super) fn posed(&self, setup: &Setup, mask_model: Option<&BundleInfo>) -> Recipe {
+    pub(super) fn posed(&self, common: &Recipe) -> Recipe {
         let generator = match self {
             Self::Generator(method) => Some((method.bundle.clone().into(), method.config)),
             Self::Measured | Self::Stored => None,
@@ -256,41 +259,22 @@ impl Method {
         Recipe {
             imprint: if generator.is_some() { ImprintSource::Predicted } else { ImprintSource::Measured },
             generator,
-            shift: setup.shift,
-            mask: setup.mask,
-            mask_model: mask_model.cloned().map(Model::from),
-            hand: setup.hand && !matches!(self, Self::Stored),
-            registration: setup.engine,
-            engine: setup.runtime,
+            hand: common.hand && !matches!(self, Self::Stored),
+            ..common.clone()
         }
     }
 
-    /// Everything that decides what it makes of a touch, as text.
-    pub(super) fn recipe(&self, setup: &Setup) -> String {
-        match self {
-            Self::Measured => "measured".into(),
-            Self::Stored => "stored".into(),
-            Self::Generator(method) => {
-                // The input is the touch's: the key of the line has it.
-                let kind = resolve(method.engine).map_or_else(|err| err.to_string(), |kind| format!("{kind:?}"));
-                let (bundle, config, fit) = (&method.bundle.id, method.config, &method.bundle.generator);
-                let fit = fit.as_ref().and_then(|info| info.fit.as_ref());
-                format!("{bundle} {kind} {config:?} {:?} {fit:?}", setup.shift)
-            }
-        }
-    }
-
-    /// What it makes of each touch, or why not; `None` once it was told to stop.
+    /// Pictures of each touch, or why there are none; `None` once it was told to stop.
     pub(super) fn make(
         &mut self,
         cases: &[&LoadedPair],
-        setup: &Setup,
+        shift: ShiftMode,
         cx: &JobCx,
     ) -> Option<Vec<Result<Made, String>>> {
         Some(match self {
             Self::Measured => cases.iter().map(|case| Ok(measured(case))).collect(),
             Self::Stored => cases.iter().map(|case| stored(case)).collect(),
-            Self::Generator(method) => return method.make(cases, setup.shift, cx),
+            Self::Generator(method) => return method.make(cases, shift, cx),
         })
     }
 }

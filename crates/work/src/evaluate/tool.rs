@@ -48,7 +48,7 @@ struct Pending {
     id: PairId,
     entry: Entry,
     images: Vec<Image>,
-    /// Whether something about it failed, so that it is tried again the next time.
+    /// True where something about it failed, so that it is tried again the next time.
     failed: bool,
 }
 
@@ -89,18 +89,18 @@ struct Masked<'a> {
     felt: Option<Felt>,
     /// Why some masks are not of the source that was asked.
     otherwise: Vec<(String, usize)>,
-    /// How sure the mask model is of the imprints.
+    /// Doubt of the mask model about the imprints.
     doubt: Doubt,
 }
 
 /// The grasps of one tool, by method.
 pub(super) struct Tool<'a> {
     dataset: &'a Dataset,
-    /// What is known of them.
+    /// Known figures of the grasps.
     book: &'a KeptScores,
-    /// Its pattern's name.
+    /// Name of the tool's pattern.
     pattern: Option<String>,
-    /// Whether its CAD model could not be used: what is scored without it is not kept.
+    /// True where its CAD model could not be used: figures that are had without it are not kept.
     broken: bool,
     model: Option<ToolModel>,
     class: Option<usize>,
@@ -133,15 +133,16 @@ impl<'a> Tool<'a> {
         cx: &JobCx,
         say: &mut dyn FnMut(&str),
     ) {
-        let Models { methods, masks: by_models, mask_bundle, classifier, .. } = models;
+        let common = models.common().clone();
+        let Models { methods, masks: by_models, classifier, .. } = models;
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
-            let recipe = method.posed(setup, mask_bundle.as_ref());
+            let recipe = method.posed(&common);
             let with_masks = recipe.mask_recipe().is_ok();
             let cases: Vec<&LoadedPair> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
-            let Some(made) = method.make(&cases, setup, cx) else { return };
+            let Some(made) = method.make(&cases, common.shift, cx) else { return };
             let mut failed: BTreeSet<PairId> = BTreeSet::new();
             let mut skip = |case: &LoadedPair, why: String| {
                 failed.insert(case.id);
@@ -300,7 +301,7 @@ pub(super) struct Again {
 /// The images of some grasps by a method; those that fail now are left out.
 fn images_again(cases: &[&LoadedPair], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
     let upper = matches!(method, Method::Measured);
-    let made = method.make(cases, setup, cx).unwrap_or_default();
+    let made = method.make(cases, setup.recipe.shift, cx).unwrap_or_default();
     let one = |(case, made): (&&LoadedPair, Result<Made, String>)| {
         let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
         Some(Again { id: case.id, images })
@@ -425,7 +426,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     })
 }
 
-/// What a method made of a picture, in the assumed meters: stored predictions are gray levels.
+/// Prediction of a method in the assumed meters: stored predictions are gray levels.
 fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
     if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
 }

@@ -120,6 +120,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::io::digest::sha256;
 use crate::io::files;
+use crate::io::model_id::identity;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::units::counted;
@@ -145,7 +146,7 @@ pub const MANIFEST: &str = "manifest.json";
 /// Longest manifest that is read, bytes.
 const MAX_MANIFEST: u64 = 4 << 20;
 
-/// What a graph does.
+/// Task of a graph.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
@@ -187,7 +188,7 @@ pub struct FileEntry {
 /// A bundle with everything wrong about it.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub struct BundleError {
-    /// Where it lies.
+    /// Origin of the bundle: a folder, or the program.
     pub origin: Origin,
     /// All that was found, at least one.
     pub problems: Vec<Problem>,
@@ -282,13 +283,13 @@ impl Bundle {
         match (manifest.spec, problems.list.is_empty()) {
             (Some(spec), true) => {
                 let (name, provenance) = (manifest.name, manifest.provenance);
-                Ok(Self { hash: sha256(&text), origin, name, files, bytes: size, spec, fit, provenance })
+                Ok(Self { hash: identity(&text), origin, name, files, bytes: size, spec, fit, provenance })
             }
             _ => Err(refuse(problems.list)),
         }
     }
 
-    /// Where it lies.
+    /// Origin of the bundle: a folder, or the program.
     pub fn origin(&self) -> &Origin {
         &self.origin
     }
@@ -298,12 +299,13 @@ impl Bundle {
         &self.name
     }
 
-    /// SHA-256 of the manifest, lower-case hex. The manifest holds the files' checksums, so this identifies everything.
+    /// Digest of what decides the bundle's results, lower-case hex: the manifest without name, note and places, with the
+    /// files' checksums ([`crate::io::model_id`]).
     pub fn hash(&self) -> &str {
         &self.hash
     }
 
-    /// What the bundle is and how it is used.
+    /// Specification by kind: the use of the bundle, its inputs and outputs.
     pub fn spec(&self) -> &BundleSpec {
         &self.spec
     }
@@ -417,7 +419,7 @@ impl Problems {
     }
 }
 
-/// Whether `name` is that of a file inside the bundle: neither absolute nor empty, and climbing nowhere.
+/// True where `name` is that of a file inside the bundle: neither absolute nor empty, and climbing nowhere.
 fn stays_inside(name: &str) -> bool {
     let plain = Path::new(name).components().all(|c| matches!(c, std::path::Component::Normal(_)));
     plain && !name.is_empty()

@@ -29,14 +29,14 @@ pub enum ClassifyError {
     },
 }
 
-/// What a classifier says of one imprint.
+/// Verdict of a classifier on one imprint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// The likeliest class: its place in the bundle's list.
     pub class: usize,
     /// One number per class; only their differences mean something.
     pub logits: Vec<f32>,
-    /// What the last layer sees; empty if the bundle hands none out.
+    /// Input of the last layer; empty if the bundle hands none out.
     pub features: Vec<f32>,
 }
 

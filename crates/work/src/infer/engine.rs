@@ -31,7 +31,7 @@ pub enum EngineKind {
 }
 
 impl EngineKind {
-    /// What the user reads.
+    /// Name for people.
     pub fn label(self) -> &'static str {
         match self {
             EngineKind::Rten => "rten (built in)",
@@ -53,6 +53,15 @@ pub enum EngineChoice {
     Rten,
     /// ONNX Runtime, or an error.
     Ort,
+}
+
+impl From<EngineKind> for EngineChoice {
+    fn from(kind: EngineKind) -> Self {
+        match kind {
+            EngineKind::Rten => Self::Rten,
+            EngineKind::Ort => Self::Ort,
+        }
+    }
 }
 
 impl EngineChoice {
@@ -83,7 +92,7 @@ pub enum EngineError {
     /// A file of the bundle cannot be read.
     #[error("the graph cannot be read: {source}: {}", path.display())]
     Read {
-        /// Which.
+        /// The file.
         path: PathBuf,
         /// Why.
         source: std::io::Error,
@@ -91,9 +100,9 @@ pub enum EngineError {
     /// The engine does not take the graph.
     #[error("{} cannot load the graph `{}`: {reason}", engine.label(), role.key())]
     Load {
-        /// Which engine.
+        /// The engine.
         engine: EngineKind,
-        /// Which graph.
+        /// The graph's task.
         role: Role,
         /// The engine's words.
         reason: String,
@@ -107,13 +116,13 @@ pub enum EngineError {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{} does not take the model bundle \"{bundle}\": {reason} ({})", engine.label(), folder.display())]
 pub struct Refusal {
-    /// Its name.
+    /// Name of the bundle.
     pub bundle: String,
-    /// Its folder.
+    /// Folder of the bundle.
     pub folder: PathBuf,
     /// The engine.
     pub engine: EngineKind,
-    /// What happened.
+    /// Reason, as the message goes on.
     pub reason: String,
 }
 
@@ -158,7 +167,7 @@ impl Graph {
             .map_err(|err| err.unwrap_or_else(|reason| EngineError::Load { engine, role, reason }))
     }
 
-    /// How often it was run.
+    /// Number of runs so far.
     pub fn runs(&self) -> u64 {
         self.runs
     }
@@ -244,7 +253,7 @@ pub(super) fn library() -> Result<Library, Vec<super::library::Searched>> {
     ort_engine::library()
 }
 
-/// What exactly an engine is that [`resolve`] gave: its name, and its library's own words where it has one.
+/// Exact build of an engine that [`resolve`] gave: its name, and its library's own words where it has one.
 pub(super) fn build(engine: EngineKind) -> String {
     match engine {
         #[cfg(feature = "onnx")]

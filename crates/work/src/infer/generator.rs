@@ -42,17 +42,17 @@ pub enum GenerateError {
         "the bundle \"{bundle}\" was not trained for guidance (its manifest has no key \"guidance\"), so a scale of {scale} means nothing; leave guidance out, or use another bundle"
     )]
     NoGuidance {
-        /// Its name.
+        /// Name of the bundle.
         bundle: String,
-        /// What was asked for.
+        /// Scale that was asked for.
         scale: f64,
     },
     /// An item names an image that was not given.
     #[error("item of image {image}, but there are {images}")]
     NoImage {
-        /// Which.
+        /// Index of the image.
         image: usize,
-        /// How many there are.
+        /// Number of images.
         images: usize,
     },
     /// The image has no pixels, or some are not numbers.
@@ -87,7 +87,7 @@ pub struct Generator {
 /// One picture to be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Item {
-    /// Which of the images.
+    /// Index of the image.
     pub image: usize,
     /// Seed of its noise.
     pub seed: u64,
@@ -136,7 +136,7 @@ impl Generator {
     /// The key of what [`Generator::generate`] returns for the image with the digest `input` (see
     /// [`super::kept_key::input_digest`]).
     pub fn recipe(&self, input: String, config: &GenerateConfig) -> KeptKey {
-        KeptKey::new(input, self.hash.clone(), self.engine, config)
+        KeptKey { input, bundle: self.hash.clone(), engine: self.engine, config: *config }
     }
 
     /// Predicts what the Soft Bubble feels where the GelSlim felt `difference` (signed, 0..255 scale, any size).
@@ -194,8 +194,8 @@ impl Generator {
         self.spec.depth_chain(mode)?.run(raw)
     }
 
-    /// What the user sees of a prediction: depth in meters, or a color sensor's difference, in the sensor's own raw
-    /// orientation.
+    /// Picture that the user sees of a prediction: depth in meters, or a color sensor's difference, in the sensor's own
+    /// raw orientation.
     ///
     /// # Errors
     /// As [`Generator::depth`].
@@ -285,7 +285,7 @@ impl Generator {
         Ok(condition)
     }
 
-    /// Whether the bundle can be guided as asked.
+    /// Checks that the bundle can be guided as asked.
     ///
     /// # Errors
     /// [`GenerateError::NoGuidance`] for a scale other than 1 and a bundle that was not trained for it.

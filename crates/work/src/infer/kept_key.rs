@@ -4,12 +4,15 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::engine::EngineKind;
-use crate::io::digest::{hex, sha256};
+use super::recipe_id::{Named, RecipeId};
+use crate::io::digest::hex;
+use crate::io::model_id::current;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::grid::RgbGrid;
 
-/// Same recipe, same result. The shift is not part of it: it is applied to the result.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+/// All that decides a prediction: the picture and, in [`RecipeId`], the recipe. The shift is none of it: it is applied to
+/// the result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KeptKey {
     /// [`input_digest`] of the GelSlim difference: the content, so that neither a name nor a place can be mistaken for
@@ -19,44 +22,38 @@ pub struct KeptKey {
     pub bundle: String,
     /// The engine; results differ in the last bits.
     pub engine: EngineKind,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// Sampling steps.
-    pub steps: u32,
-    /// The bits of eta, so that recipes can be compared and hashed; see [`KeptKey::config`].
-    eta_bits: u64,
-    /// The update rule.
-    pub sampler: Sampler,
-    /// The training steps visited.
-    pub spacing: Spacing,
-    /// The bits of the guidance scale.
-    guidance_bits: u64,
+    /// The choices.
+    pub config: GenerateConfig,
 }
 
 impl KeptKey {
-    /// The recipe of one generation.
-    pub fn new(input: String, bundle: String, engine: EngineKind, config: &GenerateConfig) -> Self {
-        let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = *config;
-        // + 0.0 turns -0 into 0, which means the same.
-        let (eta_bits, guidance_bits) = ((eta + 0.0).to_bits(), (guidance + 0.0).to_bits());
-        Self { input, bundle, engine, seed, steps, eta_bits, sampler, spacing, guidance_bits }
+    /// The identity of the recipe.
+    pub fn id(&self) -> RecipeId {
+        Named::prediction(&self.bundle, &self.config, self.engine.into()).id()
     }
+}
 
-    /// The choices of the recipe.
-    pub fn config(&self) -> GenerateConfig {
-        GenerateConfig {
-            steps: self.steps,
-            eta: f64::from_bits(self.eta_bits),
-            seed: self.seed,
-            sampler: self.sampler,
-            spacing: self.spacing,
-            guidance: f64::from_bits(self.guidance_bits),
-        }
-    }
+/// A key as builds before [`RecipeId`] wrote it.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct KeptKeyV1 {
+    input: String,
+    bundle: String,
+    engine: EngineKind,
+    seed: u64,
+    steps: u32,
+    eta_bits: u64,
+    sampler: Sampler,
+    spacing: Spacing,
+    guidance_bits: u64,
+}
 
-    /// A name for it: hex digits that no other recipe has.
-    pub fn digest(&self) -> String {
-        sha256(&serde_json::to_vec(self).unwrap_or_default())
+impl From<KeptKeyV1> for KeptKey {
+    fn from(key: KeptKeyV1) -> Self {
+        let KeptKeyV1 { input, bundle, engine, seed, steps, eta_bits, sampler, spacing, guidance_bits } = key;
+        let (eta, guidance) = (f64::from_bits(eta_bits), f64::from_bits(guidance_bits));
+        let config = GenerateConfig { steps, eta, seed, sampler, spacing, guidance };
+        Self { input, bundle: current(&bundle), engine, config }
     }
 }
 
@@ -81,12 +78,16 @@ mod tests {
     use touch2touch_core::grid::Grid;
 
     #[test]
-    fn a_recipe_is_a_key_and_survives_a_file() {
+    fn a_key_survives_a_file_and_every_choice_counts() {
         let config = GenerateConfig { eta: 0.25, ..Default::default() };
-        let recipe = |config: &GenerateConfig| KeptKey::new("a1".into(), "00ff".into(), EngineKind::Rten, config);
-        let text = serde_json::to_string(&recipe(&config)).unwrap();
-        let back: KeptKey = serde_json::from_str(&text).unwrap();
-        assert_eq!((back.config(), &back), (config, &recipe(&config)));
+        let key = |config: &GenerateConfig| KeptKey {
+            input: "a1".into(),
+            bundle: "00ff".into(),
+            engine: EngineKind::Rten,
+            config: *config,
+        };
+        let back: KeptKey = serde_json::from_str(&serde_json::to_string(&key(&config)).unwrap()).unwrap();
+        assert_eq!(back, key(&config));
         let others = [
             GenerateConfig { eta: 0.250_000_1, ..config },
             GenerateConfig { seed: 43, ..config },
@@ -96,11 +97,12 @@ mod tests {
             GenerateConfig { guidance: 2.0, ..config },
         ];
         for other in &others {
-            assert_ne!(recipe(&config), recipe(other));
-            assert_ne!(recipe(&config).digest(), recipe(other).digest());
+            assert_ne!((key(&config), key(&config).id()), (key(other), key(other).id()));
+            assert_ne!(key(&config).id(), key(other).id());
         }
         let zero = GenerateConfig { eta: 0.0, ..config };
-        assert_eq!(recipe(&zero), recipe(&GenerateConfig { eta: -0.0, ..config }));
+        assert_eq!(key(&zero).id(), key(&GenerateConfig { eta: -0.0, ..config }).id());
+        assert_ne!(key(&zero).id(), KeptKey { engine: EngineKind::Ort, ..key(&zero) }.id());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Where the library of ONNX Runtime is looked for.
+//! Search for the library of ONNX Runtime.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -10,13 +10,13 @@ use crate::io::folders;
 /// A place that was searched without success.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Searched {
-    /// Where.
+    /// Place that was searched.
     pub place: String,
-    /// What was wrong there.
+    /// Fault that was met there.
     pub outcome: String,
 }
 
-/// Where fetched libraries lie by default.
+/// Folder of fetched libraries, unless another is named.
 pub(super) fn runtime_dir() -> Option<PathBuf> {
     folders::program_data().map(|dir| dir.join("runtime"))
 }

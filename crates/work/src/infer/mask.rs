@@ -78,7 +78,7 @@ impl MaskModel {
         Ok(contact_of(&self.probability(imprint)?, imprint, least))
     }
 
-    /// What the model itself says, at the imprint's size.
+    /// Contact by the model alone, at the imprint's size.
     ///
     /// Pixels without measurement (NaN) are given to the graph as 0 m.
     ///

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 pub(crate) struct Header {
     pub(crate) inputs: Vec<Port>,
     pub(crate) outputs: Vec<Port>,
-    /// Whether weights lie in another file.
+    /// True where weights lie in another file.
     pub(crate) external_data: bool,
 }
 
@@ -29,7 +29,7 @@ pub(crate) const FLOAT32: u64 = 1;
 /// ONNX's number for int64.
 pub(crate) const INT64: u64 = 7;
 
-/// Where and why decoding stopped.
+/// Reason why decoding stopped.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("not an ONNX file: {0}")]
 pub(crate) struct HeaderError(&'static str);

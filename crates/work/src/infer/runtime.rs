@@ -13,16 +13,16 @@ pub(crate) use super::library::Searched;
 pub(crate) use fetch::VERSION;
 pub use fetch::fetch_runtime;
 
-/// Which engine runs the models, and why.
+/// Engine that runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct RuntimeReport {
-    /// What [`EngineChoice::Auto`] means here; `None` if this build cannot run models.
+    /// Engine that [`EngineChoice::Auto`] means here; `None` if this build cannot run models.
     pub engine: Option<EngineKind>,
     /// Why, in a sentence.
     pub reason: String,
     /// The ONNX Runtime library in use.
     pub library: Option<PathBuf>,
-    /// What that library says of itself.
+    /// Build of that library, in its own words.
     pub build: Option<String>,
     /// The places searched in vain, in order.
     pub searched: Vec<Searched>,

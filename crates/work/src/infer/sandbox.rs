@@ -1,4 +1,4 @@
-//! Whether an engine takes a bundle, found out in a process of its own.
+//! Trial of a bundle by an engine, in a process of its own.
 //!
 //! A graph of a few hundred bytes can ask for any amount of memory or never end, and a failed allocation ends a process
 //! without a word. So a bundle is loaded and run once, on zeros of the shapes its manifest declares, by the same
@@ -8,9 +8,9 @@
 //! is kept in the cache folder, by the bundle's hash, the engine's build and the program's version), and those that ship
 //! with the program are not tried at all.
 //!
-//! What is bounded: loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
+//! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
 //! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
-//! the memory, but it is the second process that ends). What is not: what a graph asks for on other values than
+//! the memory, but it is the second process that ends). Not bounded is what a graph asks for on other values than
 //! zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
 //! second process and tries nothing.
 
@@ -33,11 +33,12 @@ use watch::{End, Limits, ProcessEnd};
 pub const TIME: Duration = Duration::from_secs(60);
 /// Memory every trial may use: the program, the engine's library and its threads, and what graphs pass on to each other.
 const MEMORY: u64 = 4 << 30;
-/// What it may use besides, for each byte of the graphs: weights are unpacked, laid out anew, and held more than once.
+/// Bytes that it may use besides, for each byte of the graphs: weights are unpacked, laid out anew, and held more than
+/// once.
 const MEMORY_PER_BYTE: u64 = 8;
 /// The name of the second process's verb, after the program's: `bundle try DIR --engine rten`.
 pub const VERB: [&str; 2] = ["bundle", "try"];
-/// What the second process says line by line: what it is about to do, what went wrong, that all is well.
+/// Starts of the second process's lines: what it is about to do, what went wrong, that all is well.
 const AT: &str = "at ";
 const REFUSED: &str = "refused ";
 const TAKEN: &str = "taken";
@@ -61,9 +62,9 @@ pub(crate) fn memory_limit(bundle: &Bundle) -> u64 {
 /// The engine of the user's choice, once it is known to take the bundle.
 ///
 /// # Errors
-/// Those of [`resolve`], and [`EngineError::Refused`].
+/// The errors of [`resolve`], and [`EngineError::Refused`].
 pub(super) fn admit(bundle: &Bundle, choice: EngineChoice) -> Result<EngineKind, EngineError> {
-    /// What was found out since the program started; only what passed is kept longer.
+    /// Verdicts since the program started; only that of a bundle that passed is kept longer.
     static KNOWN: Mutex<BTreeMap<String, Result<(), Refusal>>> = Mutex::new(BTreeMap::new());
     let engine = resolve(choice)?;
     let Some(program) = PROGRAM.get() else { return Ok(engine) };
@@ -107,7 +108,7 @@ pub fn check(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// What the second process does: loads every graph and runs it once on zeros. `line` is told what happens.
+/// Loads every graph and runs it once on zeros, in the second process. `line` is told what happens.
 ///
 /// # Errors
 /// [`EngineError::NoOnnxRuntime`] and the like; that an engine refuses is said in a line and answered `false`.
@@ -171,7 +172,7 @@ fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Re
     Refusal { bundle: bundle.name().to_owned(), folder: bundle.origin().path(), engine, reason: reason.into() }
 }
 
-/// What the second process said and how it ended, in words.
+/// Verdict on a trial, from the second process's words and its end.
 fn judge(bundle: &Bundle, engine: EngineKind, seen: &ProcessEnd) -> Result<(), Refusal> {
     let lines = || seen.output.lines();
     let at = lines().filter_map(|l| l.strip_prefix(AT)).next_back().unwrap_or("starting");
@@ -198,7 +199,7 @@ fn judge(bundle: &Bundle, engine: EngineKind, seen: &ProcessEnd) -> Result<(), R
     Err(refusal(bundle, engine, reason))
 }
 
-/// What a verdict depends on.
+/// Key of a verdict: a digest of all that it depends on.
 fn key(bundle: &Bundle, engine: EngineKind) -> String {
     let parts = [env!("CARGO_PKG_VERSION"), &build(engine), bundle.hash(), &memory_limit(bundle).to_string()];
     sha256(parts.join("\n").as_bytes())

@@ -14,7 +14,7 @@ use std::time::SystemTime;
 use crate::io::digest::sha256;
 use crate::io::{atomic, files};
 
-/// How the files are recognized, beside those of [`super::store`].
+/// End of the files' names, which tells them from those of [`super::store`].
 pub(crate) const SUFFIX: &str = ".scores";
 /// No larger file is one of ours.
 const MAX_BYTES: u64 = 512 << 20;
@@ -38,17 +38,17 @@ struct Sheet {
     lines: BTreeMap<String, String>,
     /// Size and last change of the file when it was last read or written here.
     stamp: Option<(u64, SystemTime)>,
-    /// Whether the file holds anything but whole lines.
+    /// True where the file holds anything but whole lines.
     damaged: bool,
 }
 
 impl Sheets {
-    /// Those of a folder (made when something is first written); `None` keeps nothing on the disk.
+    /// Sheets of a folder (made when something is first written); `None` keeps nothing on the disk.
     pub(crate) fn new(folder: Option<PathBuf>) -> Self {
         Self { open: Mutex::new(Open { folder, sheets: BTreeMap::new() }) }
     }
 
-    /// Where they are from now on; `None` for nowhere.
+    /// Moves to another folder from now on; `None` keeps nothing on the disk.
     pub(crate) fn set_folder(&self, folder: Option<PathBuf>) {
         self.lock().folder = folder;
     }
@@ -60,7 +60,7 @@ impl Sheets {
         keys.into_iter().map(|key| lines.get(key).cloned()).collect()
     }
 
-    /// Whether nothing is in a sheet.
+    /// True where nothing is in a sheet.
     pub(crate) fn is_empty(&self, sheet: &str) -> bool {
         self.lock().read(sheet).lines.is_empty()
     }

@@ -1,6 +1,6 @@
 //! [`Store`]: predictions on the disk, found again by their recipe, within a budget of bytes.
 //!
-//! One file per prediction, named after the digests of its input and its recipe, so that everything made of one touch
+//! One file per prediction, named after the digest of its input and the id of its recipe, so that everything made of one touch
 //! is found by name. A file is a line of JSON (recipe, sizes, checksum) and the decoder's values behind it. Whatever is
 //! not exactly that is removed and treated as not there: a cache is never a reason for an error. The time of a file's
 //! last change is the time it was last used; the least recently used go first.
@@ -13,7 +13,7 @@ use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
-use super::kept_key::KeptKey;
+use super::kept_key::{KeptKey, KeptKeyV1};
 use super::sheets;
 use crate::io::digest::sha256;
 use crate::io::{files, folders};
@@ -21,7 +21,9 @@ use touch2touch_core::grid::Grid;
 use touch2touch_core::postprocess::RawPrediction;
 
 /// The format and its version, in every file.
-const FORMAT: &str = "touch2touch-prediction-1";
+const FORMAT: &str = "touch2touch-prediction-2";
+/// The format of builds that had keys of another form.
+const FORMAT_V1: &str = "touch2touch-prediction-1";
 /// How the files are recognized: nothing else in the folder is ever touched.
 const SUFFIX: &str = ".prediction";
 /// No file with a longer first line, or more values, is one of ours.
@@ -44,18 +46,18 @@ pub struct Store {
     bytes: Mutex<Option<u64>>,
 }
 
-/// What was found.
+/// Prediction as it was stored.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stored {
-    /// What it was made from.
+    /// Recipe that it was made from.
     pub recipe: KeptKey,
     /// The decoder's picture.
     pub raw: RawPrediction,
-    /// What it took to make, seconds.
+    /// Time that it took to make, seconds.
     pub seconds: f64,
 }
 
-/// What a store holds.
+/// Size of a store.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Usage {
     /// Predictions.
@@ -68,9 +70,9 @@ pub struct Usage {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Header {
+struct Header<K> {
     format: String,
-    recipe: KeptKey,
+    recipe: K,
     width: usize,
     height: usize,
     channels: usize,
@@ -89,7 +91,7 @@ pub fn user_folder() -> Option<PathBuf> {
 pub struct Inputs(Vec<String>);
 
 impl Inputs {
-    /// Those of the image with the digest `input`.
+    /// Names of the predictions of the image with the digest `input`.
     pub fn of(&self, input: &str) -> impl Iterator<Item = &str> {
         let prefix = format!("{}-", short(input));
         let first = self.0.partition_point(|name| *name < prefix);
@@ -103,7 +105,7 @@ impl Store {
         Self { folder, budget, bytes: Mutex::new(None) }
     }
 
-    /// Where it is.
+    /// Folder of the store.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -120,11 +122,20 @@ impl Store {
 
     /// The prediction of a recipe, now the most recently used.
     pub fn get(&self, recipe: &KeptKey) -> Option<Stored> {
-        let stored = self.read(&self.file(recipe))?;
-        (stored.recipe == *recipe).then_some(stored)
+        let is_it = |stored: &Stored| stored.recipe.input == recipe.input && stored.recipe.id() == recipe.id();
+        let by_name = self.read(&self.file(recipe)).filter(is_it);
+        by_name.or_else(|| self.named_by_v1(&recipe.input).iter().filter_map(|file| self.read(file)).find(is_it))
     }
 
-    /// Which predictions there are, in one look.
+    /// The files of an input whose names hold the hex digits of an earlier build's key in place of a recipe's id.
+    fn named_by_v1(&self, input: &str) -> Vec<PathBuf> {
+        let all = self.inputs();
+        let prefix = short(input).len() + 1;
+        let v1 = all.of(input).filter(|name| name[prefix..].starts_with(|c: char| c.is_ascii_hexdigit()));
+        v1.map(|name| self.folder.join(name)).collect()
+    }
+
+    /// Names of all predictions that there are, in one look.
     pub fn inputs(&self) -> Inputs {
         let mut names: Vec<String> =
             self.files().into_iter().map(|found| found.name).filter(|name| name.ends_with(SUFFIX)).collect();
@@ -182,7 +193,7 @@ impl Store {
         Ok(())
     }
 
-    /// How much there is.
+    /// Number of files and bytes in the store.
     pub fn usage(&self) -> Usage {
         let files = self.files();
         let sheets = files.iter().filter(|f| f.name.ends_with(sheets::SUFFIX)).count();
@@ -206,7 +217,7 @@ impl Store {
     }
 
     fn file(&self, recipe: &KeptKey) -> PathBuf {
-        self.folder.join(format!("{}-{}{SUFFIX}", short(&recipe.input), short(&recipe.digest())))
+        self.folder.join(format!("{}-{}{SUFFIX}", short(&recipe.input), recipe.id()))
     }
 
     /// Reads a file and marks it as used; one that is not whole is removed.
@@ -280,11 +291,17 @@ fn short(digest: &str) -> &str {
 /// A whole file, or `None`.
 fn parse(content: &[u8]) -> Option<Stored> {
     let end = content.iter().take(MAX_HEADER).position(|&b| b == b'\n')?;
-    let header: Header = serde_json::from_slice(&content[..end]).ok()?;
+    let line = &content[..end];
+    let header = serde_json::from_slice::<Header<KeptKey>>(line).ok().filter(|header| header.format == FORMAT);
+    let header = header.or_else(|| {
+        let Header { format, recipe, width, height, channels, sha256, seconds } =
+            serde_json::from_slice::<Header<KeptKeyV1>>(line).ok().filter(|header| header.format == FORMAT_V1)?;
+        Some(Header { format, recipe: recipe.into(), width, height, channels, sha256, seconds })
+    })?;
     let values = &content[end + 1..];
     let plane = header.width.checked_mul(header.height).filter(|&n| n > 0)?;
     let count = plane.checked_mul(header.channels).filter(|n| (1..=MAX_VALUES).contains(n))?;
-    if header.format != FORMAT || values.len() != 4 * count || sha256(values) != header.sha256 {
+    if values.len() != 4 * count || sha256(values) != header.sha256 {
         return None;
     }
     let values: Vec<f32> = values.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
@@ -301,7 +318,7 @@ mod tests {
 
     fn recipe(input: &str, seed: u64) -> KeptKey {
         let config = GenerateConfig { seed, ..Default::default() };
-        KeptKey::new(input.into(), "bundle".into(), EngineKind::Rten, &config)
+        KeptKey { input: input.into(), bundle: "bundle".into(), engine: EngineKind::Rten, config }
     }
 
     fn raw(value: f32) -> RawPrediction {
@@ -345,7 +362,8 @@ mod tests {
             age(&store, &recipe("a", seed), 100 - seed);
         }
         store.put(&recipe("b", 9), &raw(9.0), 0.0).unwrap();
-        let seeds = |store: &Store| -> Vec<u64> { store.of_input("a", 3).iter().map(|s| s.recipe.seed).collect() };
+        let seeds =
+            |store: &Store| -> Vec<u64> { store.of_input("a", 3).iter().map(|s| s.recipe.config.seed).collect() };
         assert_eq!(seeds(&store), [3, 2, 1]);
         assert!(store.of_input("c", 9).is_empty());
     }

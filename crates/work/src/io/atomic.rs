@@ -9,9 +9,9 @@ use std::time::Duration;
 
 use tempfile::NamedTempFile;
 
-/// How the names of temporary files begin.
+/// Start of the name of a temporary file.
 const PREFIX: &str = ".tmp-";
-/// How they end.
+/// End of the name of a temporary file.
 const SUFFIX: &str = ".part";
 /// Younger than this, what is not locked may be what another run is just about to lock.
 const NEWBORN: Duration = Duration::from_secs(10);
@@ -73,7 +73,7 @@ fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     Ok(temporary)
 }
 
-/// Whether `file` is held by no running program: one that was killed left it.
+/// True where no running program holds `file`: one that was killed left it.
 pub(super) fn is_abandoned(file: &Path) -> bool {
     let Ok(open) = File::open(file) else { return false };
     match open.try_lock_shared() {
@@ -82,7 +82,7 @@ pub(super) fn is_abandoned(file: &Path) -> bool {
     }
 }
 
-/// Whether `path` is so new that a run may be about to lock it.
+/// True where `path` is so new that a run may be about to lock it.
 pub(super) fn is_newborn(path: &Path) -> bool {
     let changed = std::fs::symlink_metadata(path).and_then(|meta| meta.modified());
     changed.is_ok_and(|time| time.elapsed().is_ok_and(|age| age < NEWBORN))

@@ -34,19 +34,19 @@ pub enum CaseFileError {
     Damaged {
         /// The file.
         file: PathBuf,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
 }
 
-/// What lies in a case.
+/// Content of a case.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CaseContent {
     /// The manifest, JSON.
     pub manifest: Vec<u8>,
     /// The files, by their path below the data folder, with `/`.
     pub files: BTreeMap<String, Vec<u8>>,
-    /// What it brings besides the data, by its path in the case: results and models ([`BESIDE`]).
+    /// Files besides the data, by their path in the case: results and models ([`BESIDE`]).
     pub beside: BTreeMap<String, Vec<u8>>,
 }
 
@@ -64,12 +64,12 @@ impl CaseContent {
     }
 }
 
-/// Whether a path in a case is that of a result or a model.
+/// True for the path of a result or a model in a case.
 fn is_beside(name: &str) -> bool {
     BESIDE.iter().any(|folder| name.strip_prefix(folder).is_some_and(is_plain))
 }
 
-/// Whether a path below the data folder is one on every system: relative, without dots and drives.
+/// True for a path below the data folder that is one on every system: relative, without dots and drives.
 fn is_plain(name: &str) -> bool {
     let path = Path::new(name);
     !name.is_empty()
@@ -79,7 +79,7 @@ fn is_plain(name: &str) -> bool {
         && !name.ends_with('/')
 }
 
-/// Whether a file is called like a case.
+/// True where the name of a file ends as that of a case.
 pub fn is_case(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(ENDING))
 }

@@ -31,7 +31,7 @@ use touch2touch_core::sensor::Intrinsics;
 
 pub use simulated::{simulated, simulated_meshes, simulated_tools, stratum};
 
-/// How much a case asks for.
+/// Difficulty of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::EnumIter, strum::Display)]
 #[strum(serialize_all = "lowercase")]
 pub enum Stratum {
@@ -92,7 +92,7 @@ pub enum CaseError {
         file: PathBuf,
         /// The array.
         name: &'static str,
-        /// What is wrong.
+        /// Fault of the array, as the message goes on.
         reason: String,
     },
 }

@@ -41,7 +41,7 @@ pub(crate) use tool_scale::ToolFile;
 pub use tool_scale::{ToolScale, ToolUnit, UNIT_FILE, read_in_meters};
 pub(crate) use tool_scale::{read_tool, said_beside, tool_size, write_beside};
 
-/// Which kind of source a data set is.
+/// Kind of source that a data set comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SourceKind {
     /// The lab's folders of `.pt` files.
@@ -85,7 +85,7 @@ impl InvalidPixels {
         self.nan + self.infinite + self.dropped
     }
 
-    /// Whether they are worth a note of their own: more than a depth camera drops anyway.
+    /// True where there are so many that they are worth a note of their own: more than a depth camera drops anyway.
     pub(crate) fn are_many(self, pixels: usize) -> bool {
         self.infinite > 0 || self.total() as f64 > MANY_INVALID * pixels as f64
     }
@@ -94,9 +94,9 @@ impl InvalidPixels {
 /// An opened source of paired touches.
 #[derive(Clone, Debug)]
 pub struct Dataset {
-    /// What to call it.
+    /// Title for people.
     pub title: String,
-    /// Its root folder; `None` for what is built in. The same for every sub-folder it was opened from.
+    /// Root folder, the same for every sub-folder that the data set was opened from; `None` for one that is built in.
     pub root: Option<PathBuf>,
     /// That folder as it was opened.
     pub home: Option<Home>,
@@ -104,13 +104,13 @@ pub struct Dataset {
     pub kind: SourceKind,
     /// Names of all pairs in natural order.
     pub index: Index,
-    /// What is wrong with it, as far as names and folders tell.
+    /// Faults of the data set, as far as names and folders tell.
     pub problems: Vec<Problem>,
-    /// What the numbers of the CAD files mean; without it, what [`UNIT_FILE`] beside them says, else meters.
+    /// Unit of the CAD files' numbers; without it, the one that [`UNIT_FILE`] beside them names, else meters.
     pub tool_scale: Option<ToolScale>,
     /// The sensors that its touches were felt with.
     pub rig: Arc<Rig>,
-    /// How it is read otherwise than it is stored.
+    /// Ways in which it is read otherwise than it is stored.
     read_as: Vec<ReadAs>,
     source: Source,
     /// The depth cameras of the rig, for touches that come without a depth picture; read when first needed.
@@ -126,7 +126,7 @@ enum Source {
     BuiltIn(BuiltIn),
 }
 
-/// What a scan finds, before it becomes a [`Dataset`].
+/// Findings of a scan, before they become a [`Dataset`].
 struct Scan {
     root: PathBuf,
     pairs: Vec<PairEntry>,
@@ -139,7 +139,7 @@ struct Scan {
 impl Dataset {
     /// Opens the lab's folders or a folder of pictures, whichever `path` holds. Reads names only.
     ///
-    /// Where nothing has that path, the name of a built-in data set ([`BuiltIn`]) opens that one.
+    /// If nothing has that path, the name of a built-in data set ([`BuiltIn`]) opens that one.
     ///
     /// `path` may be the data set's root, the folder above its `data` folder, any folder inside it, or a file in it.
     ///
@@ -210,7 +210,7 @@ impl Dataset {
         }
     }
 
-    /// Which built-in data set it is, if it is one.
+    /// Built-in data set that this is, if it is one.
     pub(crate) fn built_in_set(&self) -> Option<BuiltIn> {
         match self.source {
             Source::BuiltIn(set) => Some(set),
@@ -221,7 +221,7 @@ impl Dataset {
     /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
     ///
     /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.
-    /// What is odd about the files or implausible in them is in the sample's notes.
+    /// Oddities of the files and implausible values in them are in the sample's notes.
     ///
     /// # Errors
     /// [`LoadError`] naming the file, and for tensors the key.
@@ -281,7 +281,7 @@ impl Dataset {
         self.tool_mesh_file(tool).map(|path| read_tool(path, self.scale_of(tool))).transpose()
     }
 
-    /// What was said of the unit of a tool's CAD file other than beside it: for this run, else on the command line.
+    /// Unit that was set for a tool's CAD file other than beside it: for this run, else on the command line.
     pub(crate) fn scale_of(&self, tool: &str) -> Option<ToolScale> {
         let held = self.held_units.lock().unwrap_or_else(PoisonError::into_inner);
         held.get(tool).map(|unit| unit.scale()).or(self.tool_scale)
@@ -346,7 +346,7 @@ impl Dataset {
         }
     }
 
-    /// Whether the GelSlim picture of a pair was cut off at black or white; `None` for other sources.
+    /// True where the GelSlim picture of a pair was cut off at black or white; `None` for other sources.
     ///
     /// # Errors
     /// As [`Dataset::load`].
@@ -384,7 +384,7 @@ fn most_invalid(file: &Path, bad: usize, all: usize, what: impl FnOnce() -> Stri
     Ok(())
 }
 
-/// How a problem begins that leaves a file out.
+/// Start of the text of a problem that leaves a file out.
 const SAME_NAME: &str = "same name";
 
 /// Of two files that would be one pair: `file` is left out.

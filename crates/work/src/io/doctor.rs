@@ -10,7 +10,7 @@ use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::turn::Turn;
 
-/// What the doctor found.
+/// Findings of the doctor.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DoctorReport {
     /// Pairs in the index.
@@ -37,9 +37,9 @@ const BATCH: usize = 16;
 /// Loads every pair, on all cores, and lists what is wrong. `progress` is told `(done, total)` on the calling
 /// thread and may end the examination.
 ///
-/// What is looked for: files that cannot be read, keys and shapes, NaN and infinities, imprints and CAD models that
-/// are not in meters, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels
-/// that do not survive the way from depth to cloud and back.
+/// It looks for files that cannot be read, wrong keys and shapes, NaN and infinities, imprints and CAD models that are
+/// not in meters, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels that do
+/// not survive the way from depth to cloud and back.
 pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> DoctorReport {
     let total = dataset.index.pairs.len();
     let mut findings = Findings::default();
@@ -134,14 +134,14 @@ impl Turned {
     }
 }
 
-/// What there is to say about one pair.
+/// Findings on one pair.
 #[derive(Default)]
 struct Look {
     problems: Vec<Problem>,
     /// Invalid pixels that are worth no problem of their own, of how many.
     few_invalid: usize,
     pixels: usize,
-    /// How its pictures lay.
+    /// Turn in which its pictures lay.
     laid: Turn,
 }
 

@@ -65,7 +65,7 @@ pub enum ExportError {
     Io {
         /// The file or folder.
         path: PathBuf,
-        /// What was tried.
+        /// Failed action, as in "cannot make the folder".
         what: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -114,7 +114,7 @@ pub enum ExportError {
         /// Test.
         test: f64,
     },
-    /// What was written is not what the loader accepts or not what was meant.
+    /// The written folder is not one that the loader accepts, or not the one that was meant.
     #[error("the written folder failed its check: {}", first(problems))]
     Check {
         /// All mismatches.
@@ -149,7 +149,7 @@ pub struct ExportEntry {
     pub tool: Option<String>,
     /// The finger.
     pub finger: PadId,
-    /// Whether its data set keeps it for tests of what was never trained on.
+    /// True where its data set keeps it for tests of a model that was never trained on it.
     pub held_out: bool,
 }
 
@@ -164,11 +164,11 @@ pub struct ExportConfig {
     pub val: f64,
     /// Share of pairs for test.
     pub test: f64,
-    /// Whether all pairs of a tool go to the same part, or each pair by itself.
+    /// True where all pairs of a tool go to the same part; else each pair goes by itself.
     pub by_tool: bool,
     /// Tools whose pairs all go to test (unseen tools).
     pub test_tools: Vec<String>,
-    /// Whether what is held out is divided like the rest; else it goes to test.
+    /// True where held-out pairs are divided like the rest; else they go to test.
     pub held_out_in_train: bool,
     /// The names of the pads.
     pub rig: Arc<Rig>,
@@ -189,7 +189,7 @@ impl Default for ExportConfig {
     }
 }
 
-/// What was exported.
+/// Counts of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ExportReport {
     /// Masks in train, val and test.
@@ -222,7 +222,7 @@ struct Manifest {
 const FORMAT: &str = "touch2touch-unet-export";
 
 impl Manifest {
-    /// That of a folder; `None` if it is no export.
+    /// Manifest of a folder; `None` if it is no export.
     fn read(folder: &Path) -> Option<Self> {
         let bytes = files::read(&folder.join(MANIFEST), files::SMALL).ok()?;
         serde_json::from_slice(&bytes).ok().filter(|manifest: &Self| manifest.format == FORMAT)
@@ -264,7 +264,7 @@ impl<E: std::fmt::Display> From<E> for LoadFailure {
     }
 }
 
-/// What is written of one entry; all are of one size.
+/// Pixels that are written of one entry; all pictures are of one size.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Content {
     /// Meters, raw orientation.
@@ -284,7 +284,7 @@ fn writer(format: Format) -> Box<dyn Writer> {
     }
 }
 
-/// How many of `entries` go to each of [`PARTS`].
+/// Number of `entries` that go to each of [`PARTS`].
 ///
 /// # Errors
 /// [`ExportError::Shares`].
@@ -404,7 +404,7 @@ fn meant(err: ExportError, root: &Path, folder: &Path) -> ExportError {
     ExportError::Check { problems }
 }
 
-/// What tells one mask with its ignored pixels from all others.
+/// SHA-256 of a mask's size and pixels with its ignored pixels, which tells it from all others.
 fn digest(mask: &Mask, ignored: Option<&Mask>) -> String {
     let [width, height] = mask.size();
     let bits = |mask: &Mask| mask.as_slice().iter().map(|&v| u8::from(v)).collect::<Vec<_>>();

@@ -61,7 +61,7 @@ pub fn append(path: &Path) -> io::Result<File> {
     if Identity::of(&file.metadata()?) == Identity::of(&found) { Ok(file) } else { Err(link()) }
 }
 
-/// What makes a file or folder the same one, whatever lies at its path later.
+/// Identity of a file or folder: it is the same one only where this is equal, whatever lies at its path later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Identity {
     /// Device and inode, where the system has them.
@@ -71,7 +71,7 @@ pub struct Identity {
 }
 
 impl Identity {
-    /// That of a file or folder.
+    /// Identity of the file or folder with this metadata.
     pub fn of(found: &Metadata) -> Self {
         #[cfg(unix)]
         let place = {

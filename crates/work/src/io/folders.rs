@@ -14,14 +14,14 @@ pub fn data() -> Option<PathBuf> {
     Some(dirs::data_dir()?.join(NAME))
 }
 
-/// What belongs to this machine, such as libraries and bundles; `TOUCH2TOUCH_DATA` overrides it. `None` without a home
-/// folder.
+/// Folder for data of this machine, such as libraries and bundles; `TOUCH2TOUCH_DATA` overrides it. `None` without a
+/// home folder.
 pub(crate) fn program_data() -> Option<PathBuf> {
     let named = std::env::var_os("TOUCH2TOUCH_DATA").filter(|v| !v.is_empty()).map(PathBuf::from);
     named.or_else(local_data)
 }
 
-/// What can be made again; `TOUCH2TOUCH_CACHE` overrides it.
+/// Folder for data that can be made again; `TOUCH2TOUCH_CACHE` overrides it.
 pub fn program_cache() -> Option<PathBuf> {
     let named = std::env::var_os("TOUCH2TOUCH_CACHE").map(PathBuf::from).filter(|p| p.is_absolute());
     named.or_else(cache)

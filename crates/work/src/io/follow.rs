@@ -19,14 +19,14 @@ use touch2touch_core::sample::DepthCamera;
 
 /// Time between two looks at the folder.
 pub const PERIOD: Duration = Duration::from_millis(10);
-/// How long a file that cannot be read may stay unchanged before it is reported.
+/// Time that a file that cannot be read may stay unchanged before it is reported.
 pub const PATIENCE: Duration = Duration::from_secs(2);
 /// Names are read again at least this often, whatever the folder says about its last change.
 const RESCAN: Duration = Duration::from_millis(500);
 /// Reading names may take at most this share of the time.
 const RESCAN_SHARE: u32 = 20;
 
-/// What tells one content of a file from another without reading it.
+/// Size and times of a file, which tell one content of it from another without reading it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stamp {
     /// Bytes.
@@ -68,19 +68,19 @@ fn changed(_meta: &std::fs::Metadata) -> Option<SystemTime> {
 pub struct Ready {
     /// The pair in [`Follower::dataset`].
     pub id: PairId,
-    /// Its name.
+    /// Name of the pair.
     pub name: String,
-    /// Its GelSlim file.
+    /// GelSlim file of the pair.
     pub file: PathBuf,
-    /// What the file was when it was looked at.
+    /// Stamp of the file when it was looked at.
     pub stamp: Stamp,
-    /// Whether it appeared while the folder was followed.
+    /// True for a touch that appeared while the folder was followed.
     pub fresh: bool,
-    /// Whether it was there before, and only its bubble came later: its prediction stays what it was.
+    /// True for a touch that was there before, of which only the bubble came later: its prediction stays as it was.
     pub completed: bool,
 }
 
-/// What became of a touch.
+/// Outcome of an attempt to load a touch.
 #[derive(Debug)]
 pub enum Arrival {
     /// It is whole.
@@ -93,7 +93,7 @@ pub enum Arrival {
     Broken(Problem),
 }
 
-/// Where a touch is on its way.
+/// Stage of a touch on its way through the queues.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Stage {
     /// In a queue.
@@ -117,12 +117,12 @@ struct FollowedPair {
     retry: Instant,
 }
 
-/// How a folder is followed.
+/// Settings for following a folder.
 #[derive(Clone, Debug)]
 pub struct FollowConfig {
-    /// Whether touches that lie there already are taken up as well.
+    /// True where touches that lie there already are taken up as well.
     pub existing: bool,
-    /// How long a file that cannot be read may stay unchanged before it is reported.
+    /// Time that a file that cannot be read may stay unchanged before it is reported.
     pub patience: Duration,
     /// Unit of the CAD models, as in [`Dataset::tool_scale`].
     pub tool_scale: Option<ToolScale>,
@@ -193,8 +193,8 @@ impl Follower {
         self.dataset.as_ref()
     }
 
-    /// What kept the last look at the folder from finding all touches: it cannot be read, it holds none any more, or
-    /// some are left out.
+    /// Problems that kept the last look at the folder from finding all touches: it cannot be read, it holds none any
+    /// more, or some are left out.
     pub fn troubles(&self) -> &[Problem] {
         &self.troubles
     }
@@ -349,7 +349,7 @@ fn modified(folder: &Path) -> Option<SystemTime> {
     std::fs::metadata(folder).ok()?.modified().ok()
 }
 
-/// Whether an error can be that of a file that is not written to its end yet.
+/// True for an error that can be that of a file that is not written to its end yet.
 fn may_heal(err: &LoadError) -> bool {
     !matches!(
         err,

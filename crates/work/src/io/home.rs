@@ -17,7 +17,7 @@ pub struct Home {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("the data set is not where it was opened: {} {how}", root.display())]
 pub struct Away {
-    /// Its folder.
+    /// Folder of the data set, as it was opened.
     pub root: PathBuf,
     how: String,
 }
@@ -29,17 +29,17 @@ impl Home {
         Some(Self { root: root.to_owned(), identity: Identity::of(&found) })
     }
 
-    /// Its path.
+    /// Path of the folder.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// What it is, in a few letters.
+    /// Identity of the folder, in a few letters.
     pub fn identity(&self) -> String {
         self.identity.text()
     }
 
-    /// Whether it is still there.
+    /// Checks that the folder is still there.
     ///
     /// # Errors
     /// [`Away`], also where the system does not say.

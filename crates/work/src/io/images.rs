@@ -40,9 +40,9 @@ pub enum PictureError {
     Kind {
         /// The file.
         file: PathBuf,
-        /// What it is.
+        /// Form of the picture.
         found: String,
-        /// What it should be.
+        /// Form that is needed.
         expected: &'static str,
     },
 }
@@ -58,7 +58,7 @@ impl PictureError {
         }
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",

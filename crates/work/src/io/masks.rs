@@ -19,12 +19,12 @@ use serde::{Deserialize, Serialize};
 
 use super::dataset::Dataset;
 use super::home::{Away, Home};
+use super::predicted_id::PredictedId;
 use super::{atomic, files, folders, names};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{Marks, PackedMask};
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_core::predicted_id::PredictedId;
 use touch2touch_core::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.
@@ -54,7 +54,7 @@ pub enum StoreError {
     Io {
         /// The file or folder.
         file: PathBuf,
-        /// What was tried.
+        /// Failed action, as in "cannot save the labels".
         what: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -64,7 +64,7 @@ pub enum StoreError {
     Damaged {
         /// The file.
         file: PathBuf,
-        /// What is wrong.
+        /// Fault of the file.
         reason: String,
     },
     /// The data set is not where it was opened.
@@ -79,7 +79,7 @@ pub enum StoreError {
 }
 
 impl StoreError {
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check the permissions and the free space of the disk",
@@ -103,7 +103,7 @@ impl StoreError {
 pub struct StoredMask {
     /// The contact, raw bubble orientation, as large as the imprint.
     pub mask: Mask,
-    /// Where each pixel comes from, and which are ignored.
+    /// Origin of each pixel, and the ignored pixels.
     pub marks: Marks,
     /// Who saved it.
     pub person: String,
@@ -115,10 +115,10 @@ pub struct StoredMask {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound(deserialize = "T: serde::de::DeserializeOwned"))]
 pub struct ByImprint<T> {
-    /// That of the measured imprint, and that of a prediction that earlier versions did not name.
+    /// Value of the measured imprint, and value of a prediction that earlier versions did not name.
     #[serde(default = "neither")]
     pub accepted: [Option<T>; 2],
-    /// Those of predictions, by which one it is.
+    /// Values of predictions, by the prediction.
     #[serde(default = "BTreeMap::new", skip_serializing_if = "BTreeMap::is_empty")]
     pub accepted_predicted: BTreeMap<PredictedId, T>,
 }
@@ -140,7 +140,7 @@ impl<T> ByImprint<T> {
     }
 }
 
-/// What else a person said about a pair.
+/// Review of a pair: its state, accepted poses and note.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StoredReview {
     /// The review state by its stored name (e.g. `done`).
@@ -148,7 +148,7 @@ pub struct StoredReview {
     /// Accepted `grasp_from_object`.
     #[serde(flatten)]
     pub accepted: ByImprint<AcceptedPose>,
-    /// What a person wrote about the pair; empty for nothing.
+    /// Note that a person wrote about the pair; empty for none.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub note: String,
 }
@@ -221,7 +221,7 @@ struct ReviewFile {
 /// The labels of one data set. Cheap to clone; may be used from any thread, one writer at a time.
 #[derive(Clone, Debug)]
 pub struct MaskStore {
-    /// Where files are written; also read first.
+    /// Folder that files are written to; it is also read first.
     folder: PathBuf,
     /// A folder that is only read: labels beside a data set that cannot be written.
     also_read: Option<PathBuf>,
@@ -284,7 +284,7 @@ impl MaskStore {
         Self { folder, also_read: None, rig: Rig::lab(), home: None }
     }
 
-    /// The same folder, for other sensors.
+    /// Store in the same folder, for other sensors.
     #[must_use]
     pub(crate) fn of_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig, ..self }
@@ -298,7 +298,7 @@ impl MaskStore {
         Self { folder: within(&self.folder), also_read, ..self.clone() }
     }
 
-    /// Where files are written.
+    /// Folder that files are written to.
     pub fn folder(&self) -> &Path {
         &self.folder
     }
@@ -489,7 +489,7 @@ impl MaskStore {
         masks
     }
 
-    /// Whether the data set is still there.
+    /// Checks that the data set is still there.
     fn at_home(&self) -> Result<(), StoreError> {
         Ok(self.home.as_ref().map_or(Ok(()), Home::check)?)
     }

@@ -1,4 +1,4 @@
-//! How much memory the program had.
+//! Memory of the program.
 
 use std::path::Path;
 

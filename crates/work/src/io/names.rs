@@ -7,10 +7,10 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What is in the name of every file that is written beside a touch; such files are never taken for touches.
+/// Part of the name of every file that is written beside a touch; such files are never taken for touches.
 pub const OUTPUT_MARK: &str = ".t2t.";
 
-/// Whether a file name is one that this program writes beside touches.
+/// True for a file name that this program gives to files beside touches.
 pub(crate) fn is_output(name: &str) -> bool {
     name.contains(OUTPUT_MARK)
 }
@@ -124,7 +124,7 @@ pub struct Clash {
 #[derive(Debug)]
 pub struct Outputs {
     folder: PathBuf,
-    /// Whether the folder takes capitals and small letters for the same.
+    /// True where the folder takes capitals and small letters for the same.
     folds_case: bool,
     /// The pair that has a name, by the name as the folder sees it.
     given: BTreeMap<String, String>,

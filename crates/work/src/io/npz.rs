@@ -26,7 +26,7 @@ pub enum NpzError {
     Archive {
         /// The file.
         file: PathBuf,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
     /// An array that cannot be read.
@@ -36,7 +36,7 @@ pub enum NpzError {
         file: PathBuf,
         /// The array's name.
         name: String,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
 }

@@ -9,7 +9,7 @@ use glam::DVec3;
 pub struct PlyPoint {
     /// Meters.
     pub at: DVec3,
-    /// Whether it is a contact point.
+    /// True for a contact point.
     pub contact: bool,
     /// The finger, in the order of the rig's pads.
     pub finger: u8,

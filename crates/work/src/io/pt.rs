@@ -137,7 +137,7 @@ impl PtDict {
         self.reader.get(key).map(pytorch_reader::Tensor::shape)
     }
 
-    /// Whether the dict has a tensor under `key`.
+    /// True where the dict has a tensor under `key`.
     pub fn has(&self, key: &str) -> bool {
         self.reader.get(key).is_some()
     }

@@ -19,7 +19,7 @@ const META: usize = 8;
 const HEADER: usize = 128;
 /// Contact that nobody knows.
 const UNKNOWN: u8 = 255;
-/// What is written when a shard is complete.
+/// File that is written when a shard is complete.
 const DONE: &str = "done.json";
 const FILES: [&str; 5] = ["gelslim.npy", "imprint.npy", "clean.npy", "contact.npy", "meta.npy"];
 
@@ -30,9 +30,9 @@ pub struct Record {
     pub gelslim: RgbGrid,
     /// The measured imprint, meters, raw orientation; not a number where nothing was measured.
     pub imprint: DepthMap,
-    /// What a network should draw: the same without noise where that is known, and without holes.
+    /// Imprint that a network should draw: the measured one without noise where that is known, and without holes.
     pub clean: DepthMap,
-    /// Where the membrane lies on the tool, where that is known.
+    /// Contact of the membrane with the tool, where that is known.
     pub contact: Option<Mask>,
     /// Number of the grasp.
     pub grasp: u32,
@@ -44,7 +44,7 @@ pub struct Record {
     pub tool: Option<usize>,
     /// Whose touch it is.
     pub origin: Origin,
-    /// Whether the tool is one that nothing is trained on.
+    /// True for a tool that nothing is trained on.
     pub unseen: bool,
 }
 
@@ -73,7 +73,7 @@ pub(crate) struct ShardWriter {
 }
 
 impl Drop for ShardWriter {
-    /// What was not finished is of no use to anybody.
+    /// Removes the files of a shard that was not finished: they are of no use to anybody.
     fn drop(&mut self) {
         if self.finished {
             return;
@@ -168,7 +168,7 @@ impl ShardWriter {
     }
 }
 
-/// What is said about a complete shard; `None` where there is none, or one that was not finished.
+/// Description of a complete shard; `None` where there is none, or one that was not finished.
 pub fn about(folder: &Path) -> Option<Value> {
     serde_json::from_slice(&files::read(&folder.join(DONE), files::SMALL).ok()?).ok()
 }

@@ -19,7 +19,7 @@ use touch2touch_core::sample::Sample;
 
 pub use manifest::{MANIFEST, Writing, unfinished};
 
-/// Which of the lab's two layouts.
+/// Layout of the lab's that a simulated data set is written in.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layout {
     /// `train/{bubbles,gelslims}/data/<tool folder>/data_N.pt`.
@@ -50,7 +50,7 @@ pub enum WriteError {
     /// The sample lacks something that the lab's files have, or has another size.
     #[error("the sample has no {missing}, which the lab's files need")]
     Incomplete {
-        /// What is missing.
+        /// Part that is missing.
         missing: &'static str,
     },
     /// The manifest cannot be written.
@@ -66,7 +66,7 @@ pub enum WriteError {
     NotOurs {
         /// The folder.
         folder: PathBuf,
-        /// What is there.
+        /// Content of the folder.
         found: String,
     },
     /// A tool whose name cannot be a file name.
@@ -157,8 +157,8 @@ fn make_parent(path: &Path) -> Result<(), WriteError> {
     std::fs::create_dir_all(folder).map_err(|source| WriteError::Folder { folder: folder.to_owned(), source })
 }
 
-/// Where the simulated gripper is held in the arm's base frame: any place does, as only relative poses count;
-/// this one has no zero in it that could hide a mistake.
+/// Frame of the simulated gripper in the arm's base frame: any place does, as only relative poses count; this one has
+/// no zero in it that could hide a mistake.
 fn base_from_grasp() -> DAffine3 {
     let rotation = DQuat::from_rotation_z(0.3) * DQuat::from_rotation_y(1.4) * DQuat::from_rotation_x(-0.2);
     DAffine3::from_rotation_translation(rotation, DVec3::new(0.55, -0.05, 0.42))

@@ -9,9 +9,9 @@ use tempfile::TempDir;
 
 use super::{atomic, files};
 
-/// How the folder's name begins.
+/// Start of the folder's name.
 const PREFIX: &str = ".touch2touch-new-";
-/// How that of programs before this one began.
+/// Start of the folder's name in earlier versions of the program.
 const OLD_PREFIX: &str = ".touch2touch-export-";
 /// The file in it that is locked while a program works there, and names the folder whose content is being made.
 const LOCK: &str = "lock";
@@ -39,12 +39,12 @@ impl Staging {
         Ok(Self { folder, _lock: lock })
     }
 
-    /// Where the new content is made.
+    /// Path at which the new content is made.
     pub(crate) fn new_content(&self) -> PathBuf {
         self.folder.path().join(NEW)
     }
 
-    /// Where the previous content is put out of the way.
+    /// Path at which the previous content is put out of the way.
     fn old_content(&self) -> PathBuf {
         self.folder.path().join(OLD)
     }
@@ -65,7 +65,7 @@ impl Staging {
     }
 }
 
-/// How the file begins that keeps a folder for one program.
+/// Start of the name of the file that keeps a folder for one program.
 const CLAIM: &str = ".touch2touch-claim-";
 
 /// A folder that is kept for this run until it is dropped, from before its content is computed.

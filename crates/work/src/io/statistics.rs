@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::model_id::current;
 use super::{atomic, files};
 use touch2touch_core::postprocess::{RefitShift, ShiftFit, ShiftStats};
 
@@ -15,7 +16,7 @@ const VERSION: u32 = 1;
 pub struct ShiftStatistics {
     format: String,
     version: u32,
-    /// How they were made.
+    /// Origin of the statistics: bundle, data set and settings.
     #[serde(flatten)]
     pub provenance: Provenance,
     /// Touches (one finger of a pair each) that the figures are of.
@@ -32,12 +33,12 @@ pub struct ShiftStatistics {
     pub stats: ShiftStats,
 }
 
-/// Where statistics come from.
+/// Origin of statistics.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Provenance {
     /// Name of the bundle that predicted.
     pub bundle: String,
-    /// Its hash: the identity that counts.
+    /// Hash of that bundle: the identity that counts.
     pub bundle_hash: String,
     /// The data set.
     pub dataset: String,
@@ -51,7 +52,7 @@ pub struct Provenance {
     pub eta: f64,
     /// The engine that ran the model.
     pub engine: String,
-    /// Whether the data set's lengths are measured or assumed.
+    /// Scale of the data set's lengths: measured or assumed.
     pub scale: String,
     /// When, UTC, as in `2026-11-21T09:30:00Z`.
     pub made: String,
@@ -76,7 +77,7 @@ pub enum StatisticsError {
         /// Why.
         why: String,
     },
-    /// Its figures cannot be used.
+    /// The figures of the file cannot be used.
     #[error("{}: the statistics are not finite, or a deviation is negative; make them again", path.display())]
     NotUsable {
         /// The file.
@@ -91,11 +92,11 @@ pub enum StatisticsError {
     OtherBundle {
         /// Name of the bundle of the statistics.
         of: String,
-        /// Its hash.
+        /// Hash of that bundle.
         of_hash: String,
         /// Name of the bundle in use.
         wanted: String,
-        /// Its hash.
+        /// Hash of that bundle.
         wanted_hash: String,
     },
 }
@@ -154,7 +155,7 @@ impl ShiftStatistics {
     /// # Errors
     /// [`StatisticsError::OtherBundle`], naming both.
     pub fn shift_for(&self, name: &str, hash: &str) -> Result<RefitShift, StatisticsError> {
-        if self.provenance.bundle_hash != hash {
+        if current(&self.provenance.bundle_hash) != hash {
             return Err(StatisticsError::OtherBundle {
                 of: self.provenance.bundle.clone(),
                 of_hash: self.provenance.bundle_hash.clone(),

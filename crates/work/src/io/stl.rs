@@ -23,7 +23,7 @@ pub enum MeshError {
     NotStl {
         /// The file.
         file: PathBuf,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
     /// A binary STL with fewer or more bytes than its triangle count needs.
@@ -75,7 +75,7 @@ pub enum MeshError {
     UnitFile {
         /// The file.
         file: PathBuf,
-        /// What was found and what may stand there.
+        /// Text that was found, and texts that may stand there.
         reason: String,
     },
     /// No triangle with an area.
@@ -103,7 +103,7 @@ impl MeshError {
         }
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check that the file exists and may be read",

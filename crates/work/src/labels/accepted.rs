@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::ImprintOf;
 use crate::io::masks::ByImprint;
-use touch2touch_core::predicted_id::PredictedId;
+use crate::io::predicted_id::PredictedId;
 
 /// Values by imprint, as files hold them.
 pub(crate) fn by_imprint<T: Clone>(values: &BTreeMap<ImprintOf, T>) -> ByImprint<T> {

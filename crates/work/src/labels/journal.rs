@@ -14,25 +14,25 @@ use touch2touch_core::label::PackedMask;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::Rig;
 
-/// What kind of act changed the labels.
+/// Kind of an act that changed the labels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Act {
     /// Something new.
     #[default]
     Do,
-    /// What was done is taken back.
+    /// An act is taken back.
     Undo,
-    /// What was taken back is done again.
+    /// An act that was taken back is done again.
     Redo,
 }
 
-/// What was done, for the journal.
+/// Act for the journal.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Operation {
-    /// Its kind.
+    /// Kind of the act.
     pub act: Act,
-    /// Its name, e.g. `lasso`.
+    /// Name of the act, e.g. `lasso`.
     pub name: Cow<'static, str>,
     /// The tool with its numbers, where there is one.
     pub how: Option<serde_json::Value>,
@@ -47,7 +47,7 @@ impl Operation {
     }
 }
 
-/// What differs between labels before and after something was done; each pair is `[before, after]`.
+/// Difference between labels before and after an act; each pair is `[before, after]`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Change {
     /// Masks.
@@ -60,7 +60,7 @@ pub struct Change {
     pub note: Option<[String; 2]>,
 }
 
-/// The same pixels from the same source; the revision is of one run of the program.
+/// True for the same pixels from the same source; the revision is of one run of the program.
 pub(super) fn same(a: Option<&DrawnMask>, b: Option<&DrawnMask>) -> bool {
     match (a, b) {
         (None, None) => true,
@@ -91,9 +91,25 @@ impl Change {
         change
     }
 
-    /// Whether nothing differs.
+    /// True where nothing differs.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()
+    }
+
+    /// Makes labels what they are after it.
+    pub fn apply_to(&self, labels: &mut PairLabels) {
+        for (place, [_, after]) in &self.masks {
+            labels.put(place, after.clone());
+        }
+        if let Some([_, after]) = self.review {
+            labels.review = after;
+        }
+        if let Some([_, after]) = &self.note {
+            labels.note.clone_from(after);
+        }
+        for (of, [_, after]) in &self.accepted {
+            labels.put_accepted(of, *after);
+        }
     }
 
     /// The way back.
@@ -106,7 +122,7 @@ impl Change {
         self
     }
 
-    /// Whether one made after the other would matter.
+    /// True where the order of the two changes matters.
     fn overlaps(&self, other: &Self) -> bool {
         self.masks.keys().any(|place| other.masks.contains_key(place))
             || self.review.is_some() && other.review.is_some()
@@ -114,7 +130,7 @@ impl Change {
             || self.accepted.keys().any(|of| other.accepted.contains_key(of))
     }
 
-    /// Whether it ended in these labels.
+    /// True where it ended in these labels.
     fn leads_to(&self, labels: &PairLabels) -> bool {
         self.masks.iter().all(|(place, [_, after])| same(after.as_ref(), labels.masks.get(place)))
             && self.review.is_none_or(|[_, after]| after == labels.review)
@@ -126,20 +142,20 @@ impl Change {
 /// Something that was done before the labels were read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Past {
-    /// Its name.
+    /// Name of the act.
     pub name: Cow<'static, str>,
-    /// What it changed.
+    /// Difference that it made.
     pub change: Change,
 }
 
-/// What the journal of a pair tells of what was done before.
+/// History of a pair, as its journal tells it.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JournalHistory {
-    /// What can be taken back, the oldest first.
+    /// Acts that can be taken back, the oldest first.
     pub done: Vec<Past>,
-    /// What was taken back and can be done again, the oldest first.
+    /// Acts that were taken back and can be done again, the oldest first.
     pub undone: Vec<Past>,
-    /// What of the journal cannot be read.
+    /// Fault of the journal: lines of it that cannot be read.
     pub problem: Option<TaskError>,
 }
 
@@ -197,7 +213,7 @@ impl Line {
         Some(self.person.clone()).filter(|person| !person.is_empty())
     }
 
-    /// What it says; `None` if a mask in it cannot be understood.
+    /// Act of the line; `None` if a mask in it cannot be understood.
     pub(super) fn read(self, rig: &Rig) -> Option<(Act, Past)> {
         let mut masks = BTreeMap::new();
         for line in self.masks {
@@ -213,7 +229,7 @@ impl Line {
     }
 }
 
-/// What can be taken back and what can be done again, the oldest first, of the lines of a journal.
+/// Acts that can be taken back and acts that can be done again, the oldest first, of the lines of a journal.
 ///
 /// Only as far as it leads to the labels as they are: where another program changed them, what came before is history,
 /// and nothing that can be undone.
@@ -248,7 +264,7 @@ pub(super) fn fold<'a>(
     let kept = done.iter().rev().take_while(|past| {
         let fits = past.change.leads_to(&now);
         if fits {
-            apply(&mut now, &past.change.clone().inverse());
+            past.change.clone().inverse().apply_to(&mut now);
         }
         fits
     });
@@ -258,26 +274,11 @@ pub(super) fn fold<'a>(
     let kept = undone.iter().rev().take_while(|past| {
         let fits = past.change.clone().inverse().leads_to(&now);
         if fits {
-            apply(&mut now, &past.change);
+            past.change.apply_to(&mut now);
         }
         fits
     });
     let first = undone.len() - kept.count();
     undone.drain(..first);
     (done, undone)
-}
-
-fn apply(labels: &mut PairLabels, change: &Change) {
-    for (place, [_, after]) in &change.masks {
-        labels.put(place, after.clone());
-    }
-    if let Some([_, after]) = change.review {
-        labels.review = after;
-    }
-    if let Some([_, after]) = &change.note {
-        labels.note.clone_from(after);
-    }
-    for (of, [_, after]) in &change.accepted {
-        labels.put_accepted(of, *after);
-    }
 }

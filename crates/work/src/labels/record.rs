@@ -1,4 +1,4 @@
-//! What the journal of a pair says about the work on it, apart from pixels.
+//! Records of the work on a pair, as its journal tells of it, apart from pixels.
 
 use serde::Deserialize;
 
@@ -13,10 +13,10 @@ pub struct Record {
     /// Who.
     #[serde(default)]
     pub person: String,
-    /// Whether it is new, taken back or done again.
+    /// Kind of the act: new, taken back or done again.
     #[serde(default)]
     pub act: Act,
-    /// What, e.g. `brush stroke`.
+    /// Name of the act, e.g. `brush stroke`.
     #[serde(default)]
     pub name: String,
     /// The masks it changed.
@@ -36,24 +36,24 @@ pub struct MaskRecord {
     /// The imprint, as it is in the file.
     #[serde(default)]
     pub of: serde_json::Value,
-    /// What the mask is made from now; `None` where it was removed.
+    /// Base of the mask after the act; `None` where it was removed.
     #[serde(default)]
     pub after: Option<Base>,
 }
 
-/// What a mask is made from.
+/// Base that a mask is made from.
 #[derive(Clone, Debug, Default, PartialEq, Deserialize)]
 pub struct Base {
     /// In words, as older journals say it, e.g. `Threshold 5.00 mm`.
     #[serde(default)]
     base: String,
-    /// Where its pixels come from, what the correction began from first.
+    /// Sources of its pixels, the one that the correction began from first.
     #[serde(default)]
     layers: Vec<Provenance>,
 }
 
 impl Base {
-    /// What the correction began from.
+    /// Source that the correction began from.
     pub fn provenance(&self) -> Provenance {
         self.layers.first().cloned().unwrap_or_else(|| Provenance::told(self.base.as_str()))
     }

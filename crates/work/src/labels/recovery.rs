@@ -26,18 +26,18 @@ pub struct Unsaved {
     pub name: String,
     /// All that is said of it.
     pub labels: PairLabels,
-    /// What was done last.
+    /// Act that was last.
     pub deed: Operation,
     /// Who drew it a second time, where these are those labels.
     pub repeat: Option<String>,
 }
 
-/// What was taken in from a folder.
+/// Outcome of taking in labels from a folder.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Recovered {
     /// The pairs.
     pub pairs: Vec<String>,
-    /// What was left in its folder, and why.
+    /// Labels that were left in their folder, and why.
     pub failed: Vec<TaskError>,
 }
 
@@ -57,7 +57,7 @@ struct Manifest {
     version: u32,
     /// The data set's folder; `None` for a built-in one.
     root: Option<PathBuf>,
-    /// What that folder was, whatever its path.
+    /// Identity of that folder, whatever its path.
     identity: Option<String>,
     title: String,
     pairs: Vec<Pair>,

@@ -20,8 +20,8 @@ use touch2touch_core::units::counted;
 #[derive(Clone, Debug)]
 pub struct Labels {
     store: Arc<Result<MaskStore, StoreError>>,
-    /// What whoever saves here holds, as far as it was read or given here: only differences are written, over what
-    /// somebody else may have written meanwhile.
+    /// Labels that whoever saves here holds, as far as they were read or given here: only differences are written, over
+    /// what somebody else may have written meanwhile.
     saved: Arc<Mutex<BTreeMap<String, PairLabels>>>,
 }
 
@@ -40,24 +40,24 @@ pub(super) fn store_error(what: &str, err: &StoreError) -> TaskError {
 }
 
 impl Labels {
-    /// Those of a data set; where there is no place for labels, there are none, and saving says why.
+    /// Labels of a data set; where there is no place for labels, there are none, and saving says why.
     pub fn of(dataset: &Dataset) -> Self {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: Arc::default() }
     }
 
-    /// Those in a folder that another program or person wrote, of the same sensors.
+    /// Labels in a folder that another program or person wrote, of the same sensors.
     pub fn in_folder(dataset: &Dataset, folder: &Path) -> Self {
         let store = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
         Self { store: Arc::new(Ok(store)), saved: Arc::default() }
     }
 
-    /// The same of a data set that grew: what was written since the opening stays known.
+    /// Labels of a data set that grew: what was written since the opening stays known.
     #[must_use]
     pub fn continued(&self, dataset: &Dataset) -> Self {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
     }
 
-    /// What a person drew a second time without seeing the first; in a folder of its own.
+    /// Labels that a person gave a second time without seeing the first; in a folder of their own.
     ///
     /// # Errors
     /// If there is no place for labels.
@@ -164,8 +164,8 @@ impl Labels {
         Ok(stored.map(hand_of))
     }
 
-    /// What was done to the labels of a pair before they were read, and what was taken back of it; as far as the journal
-    /// tells and it leads to `labels`.
+    /// Acts that changed the labels of a pair before they were read, and those that were taken back; as far as the
+    /// journal tells and it leads to `labels`.
     pub fn past(&self, name: &str, labels: &PairLabels) -> JournalHistory {
         let Ok(store) = &*self.store else { return JournalHistory::default() };
         // Without a journal there is nothing to take back; that it cannot be read is all that is wrong then.
@@ -174,7 +174,7 @@ impl Labels {
         JournalHistory { done, undone, problem: self.journal_problem(name) }
     }
 
-    /// What was done to the labels of a pair, the oldest first; nothing where there is no journal.
+    /// Records of the journal of a pair, the oldest first; none where there is no journal.
     ///
     /// # Errors
     /// If the journal cannot be read.
@@ -184,7 +184,7 @@ impl Labels {
         Ok(record::parse(&store.journal(name).map_err(|err| store_error(&what, &err))?))
     }
 
-    /// What is wrong with the journal of a pair: it cannot be read, or lines of it cannot. Masks do not depend on it.
+    /// Fault of a pair's journal: it cannot be read, or lines of it cannot. Masks do not depend on it.
     pub fn journal_problem(&self, name: &str) -> Option<TaskError> {
         let Ok(store) = &*self.store else { return None };
         let what = format!("Journal of {name}");

@@ -23,20 +23,20 @@ use touch2touch_core::units::counted;
 /// Proposals for which pairs, and what becomes of them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BatchSetup {
-    /// What proposes.
+    /// Source of the proposals, with its numbers.
     pub propose: ProposeSetup,
     /// The pairs. Those marked "done", "flagged" or "skip" are left as they are: somebody has judged them.
     pub pairs: Vec<PairId>,
-    /// Whether what was painted by hand is replaced as well.
+    /// True where masks painted by hand are replaced as well.
     pub over_drawn: bool,
     /// Who asked; else whom the system says.
     pub person: Option<String>,
 }
 
-/// What became of proposals for many pairs.
+/// Outcome of proposals for many pairs.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Batch {
-    /// What proposed.
+    /// Source of the proposals.
     pub source: &'static str,
     /// Pairs that have new masks, by name.
     pub changed: Vec<String>,
@@ -46,16 +46,16 @@ pub struct Batch {
     pub same: usize,
     /// Pairs that somebody judged, which were left as they are.
     pub judged: usize,
-    /// What could not be proposed, and why; by pair and finger.
+    /// Masks that could not be proposed, and why; by pair and finger.
     pub left_out: Vec<Remark>,
-    /// Whether all pairs asked for were looked at: false if stopped early.
+    /// True where all pairs asked for were looked at; false if stopped early.
     pub complete: bool,
     /// Time it took, seconds.
     pub seconds: f64,
 }
 
 impl Batch {
-    /// What became of it, in words.
+    /// Summary in words.
     pub fn text(&self) -> String {
         let mut text = format!("{} proposed in {}", counted(self.masks, "mask"), counted(self.changed.len(), "pair"));
         for (count, what) in [(self.same, "were so already"), (self.left_out.len(), "could not be proposed")] {
@@ -119,7 +119,7 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
     Ok(batch)
 }
 
-/// What is the same for all pairs.
+/// Settings of a batch that are the same for all pairs.
 #[derive(Clone, Copy)]
 struct ProposalBatch<'a> {
     dataset: &'a Dataset,

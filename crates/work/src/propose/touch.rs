@@ -7,8 +7,8 @@ use super::super::labels::{Labels, MaskPlace};
 use super::super::models::Models;
 use super::super::recipe::{Recipe, Stage};
 use super::{
-    Proposal, ProposalSource, Side, WHAT, automatic, cad_distances, carried_across, carried_from_pair, carries_from,
-    grown, near_cad,
+    CadAt, Proposal, ProposalSource, Side, Takes, WHAT, automatic, cad_distances, carried_across, carried_from_pair,
+    carries_from, grown, hand_pose, near_cad,
 };
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
@@ -16,7 +16,7 @@ use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 
-/// What proposes, with its numbers.
+/// Source of proposals, with its numbers.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ProposeSetup {
     /// The source.
@@ -30,14 +30,14 @@ pub struct ProposeSetup {
     pub carry_from: Option<PairId>,
 }
 
-/// What is proposed for some pads, or why nothing is.
+/// Proposals for some pads, or reasons why there are none.
 pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
 
-/// What is proposed for each of `pads`; `felt` are the imprints of the touch by the recipe of `setup`, and `all` the labels
-/// of its data set.
+/// Proposals for each of `pads`; `felt` are the imprints of the touch by the recipe of `setup`, and `all` the labels of
+/// its data set.
 ///
 /// # Errors
-/// What the source lacks, for all of them.
+/// The reason that holds for all of them: what the source lacks.
 pub fn propose(
     (touch, all): (Touch<'_>, &Labels),
     felt: &Felt,
@@ -62,8 +62,8 @@ pub fn propose(
             Ok(near_cad(&distances, setup.recipe.mask.cad_distance_m, at))
         })
     };
-    match setup.source {
-        ProposalSource::Automatic => {
+    match setup.source.takes() {
+        Takes::AutomaticMask => {
             let made = reach(&Recipe { hand: false, ..setup.recipe.clone() }, Stage::Mask)?;
             let made = made.contact();
             each(&|pad, _| {
@@ -71,28 +71,26 @@ pub fn propose(
                 Ok(automatic(one.clone(), &made.recipe, made.model.as_deref().unwrap_or_default()))
             })
         }
-        ProposalSource::CadTruth => {
+        Takes::CadModel(CadAt::Truth) => {
             let truth = sample.grasp_from_object.ok_or_else(|| lacks("the true pose of this pair is not known"))?;
             near(CadPose::Truth, truth.into())
         }
-        ProposalSource::CadRegistered => {
+        Takes::CadModel(CadAt::Registered) => {
             let felt = reach(&setup.recipe, Stage::Pose)?;
             let found = felt.pose().map_err(Clone::clone)?.grasp_from_object;
             near(CadPose::Registered(found), found.into())
         }
-        ProposalSource::CadHand => {
-            let accepted = labels.accepted(&of).filter(|accepted| accepted.by_hand);
-            let pose = setup.pose.or(accepted.map(|accepted| accepted.pose));
-            let pose = pose.ok_or_else(|| {
+        Takes::CadModel(CadAt::Hand) => {
+            let pose = hand_pose(setup.pose, labels.accepted(&of)).ok_or_else(|| {
                 lacks("nobody set the pose of this pair by hand").with_hint("Set it first, or name it with --pose.")
             })?;
             near(CadPose::Nudged(pose), pose)
         }
-        ProposalSource::Grow => each(&|pad, imprint| {
+        Takes::DrawnMask => each(&|pad, imprint| {
             let place = MaskPlace { pad, of: of.clone() };
             grown(imprint, labels.drawn(&place, imprint))
         }),
-        ProposalSource::Carry => {
+        Takes::OtherPair => {
             let reviews = all.reviews().states;
             let review = |name: &str| reviews.get(name).copied().unwrap_or_default();
             let from = setup.carry_from.or_else(|| carries_from(&touch.dataset.index, touch.pair, review));
@@ -104,7 +102,7 @@ pub fn propose(
             let other_labels = all.load(name)?;
             each(&|pad, imprint| carried_from_pair(name, (&other, &other_labels), Side { sample, pad, imprint }))
         }
-        ProposalSource::OtherFinger => {
+        Takes::OtherPad => {
             let (rig, felt) = (&touch.dataset.rig, reach(&setup.recipe, Stage::Mask)?);
             let found = felt.contact();
             each(&|pad, imprint| {

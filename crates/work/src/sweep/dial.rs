@@ -14,7 +14,7 @@ pub const MOST_VALUES: usize = 40;
 /// Largest size of a threshold, meters; as the settings have it.
 const THRESHOLD_M: f32 = 0.1;
 
-/// What can be turned.
+/// Dial that can be turned.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, Serialize)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
@@ -28,7 +28,7 @@ pub enum Dial {
     Trim,
     /// Distance beyond which the registration leaves a contact out.
     Gate,
-    /// How decoder outputs become meters.
+    /// Mapping of decoder outputs to meters.
     Shift,
 }
 
@@ -49,7 +49,7 @@ impl Dial {
         }
     }
 
-    /// What it does, in a line.
+    /// Description in a line.
     pub fn tooltip(self) -> &'static str {
         match self {
             Self::Threshold => "Imprint depth from which a pixel is contact, millimeters",
@@ -68,7 +68,7 @@ impl Dial {
         }
     }
 
-    /// Where somebody who never turned it starts: first, last and how many values.
+    /// Usual values for somebody who never turned it: first, last and their number.
     pub fn usual(self) -> (f64, f64, usize) {
         match self {
             Self::Threshold => (3.0, 12.0, 10),
@@ -150,7 +150,7 @@ impl Dial {
         (0..count).map(|i| self.setting(at(i))).collect()
     }
 
-    /// Where the dial stands; `own` is the mask model's own probability.
+    /// Setting that the dial stands at; `own` is the mask model's own probability.
     pub(super) fn of(self, in_force: &Recipe, made_by: &MaskRecipe, own: Option<f32>) -> Option<Setting> {
         match (self, made_by) {
             (Self::Threshold, MaskRecipe::Threshold(depth_m)) => Some(Setting::Threshold(depth_m.get())),
@@ -214,7 +214,7 @@ impl Setting {
         Ok(recipe)
     }
 
-    /// Its number in the dial's unit; `None` for a shift.
+    /// Number of the setting in the dial's unit; `None` for a shift.
     pub fn number(self) -> Option<f64> {
         match self {
             // The shortest decimal of the setting's own precision: 5, not 4.999999888.

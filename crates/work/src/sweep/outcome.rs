@@ -1,4 +1,4 @@
-//! What a value does to each pair, and in sum.
+//! Outcome of a value for each pair, and in sum.
 
 use std::collections::BTreeMap;
 
@@ -16,9 +16,9 @@ pub struct Outcome {
     /// The pair.
     #[serde(skip)]
     pub pair: PairId,
-    /// Its name.
+    /// Name of the pair.
     pub name: String,
-    /// Whether the true pose is known.
+    /// True where the true pose is known.
     pub truth: bool,
     /// The angle that the lab reports, radians.
     #[serde(rename = "angle_deg", serialize_with = "degrees")]
@@ -34,7 +34,7 @@ pub struct Outcome {
     pub rms_m: Option<f64>,
     /// Contact points.
     pub points: usize,
-    /// Whether a mask was drawn by hand.
+    /// True where a mask was drawn by hand.
     pub hand: bool,
     /// Why there is no pose.
     pub failure: Option<String>,
@@ -74,7 +74,7 @@ impl Outcome {
 pub struct Failure {
     /// The reason of the first of them; numbers in it are of that one.
     pub why: String,
-    /// How many.
+    /// Number of pairs.
     pub count: usize,
 }
 
@@ -125,7 +125,7 @@ impl Summary {
         }
     }
 
-    /// What more is better in, in order: success within 5 degrees, within 10, and a small median.
+    /// Figures of which more is better, in order: success within 5 degrees, within 10, and a small median.
     fn worth(&self) -> Option<[f64; 3]> {
         let angle = self.angle?;
         Some([angle.success_5, angle.success_10, -angle.median_deg?])
@@ -135,9 +135,9 @@ impl Summary {
 /// One value.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Point {
-    /// What the dial says; `None`: as everything is in force.
+    /// Value of the dial; `None`: as everything is in force.
     pub value: Option<Setting>,
-    /// Whether that is where the dial stands.
+    /// True where that is where the dial stands.
     pub in_force: bool,
     /// In sum.
     pub summary: Summary,
@@ -154,8 +154,8 @@ pub struct Series {
     pub base: Point,
     /// With each value, in their order.
     pub points: Vec<Point>,
-    /// Which of them is best: most pairs within 5 degrees, then within 10, then the least median error. `None` where
-    /// the truth is not known, or no value gives a pose.
+    /// Index of the best of them: most pairs within 5 degrees, then within 10, then the least median error. `None`
+    /// where the truth is not known, or no value gives a pose.
     pub best: Option<usize>,
 }
 
@@ -182,7 +182,7 @@ impl Series {
         Self { source, base, points, best: best.map(|(i, _)| i) }
     }
 
-    /// Whether the truth of some pair is known.
+    /// True where the truth of some pair is known.
     pub fn has_truth(&self) -> bool {
         self.base.summary.angle.is_some()
     }

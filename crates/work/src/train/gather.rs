@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use touch2touch_tuning::MaskTouch;
 
 use super::{Entry, MOST_MASKS, Remark, TrainPlan, TrainSetup, WHAT};
-use crate::bundles::BundleKind;
+use crate::bundles::{BundleKind, by_id};
 use crate::error::TaskError;
 use crate::export::DrawnMasks;
 use crate::imprint::imprint_of;
@@ -36,7 +36,7 @@ pub(super) struct Drawn {
     pub(super) imprint: DepthMap,
     /// As large.
     pub(super) mask: Mask,
-    /// Which of its pixels count; all without it.
+    /// Pixels of it that count; all without it.
     pub(super) counted: Option<Mask>,
 }
 
@@ -184,7 +184,7 @@ fn imprint(
     };
     let unknown = || TaskError::new(WHAT, "what decided the prediction that the mask is of cannot be read");
     let (bundle, config, shift) = of.parts().ok_or_else(unknown)?;
-    let known = setup.generators.iter().find(|known| known.kind == BundleKind::Generator && *known.id == *bundle);
+    let known = by_id(&setup.generators, bundle).filter(|known| known.kind == BundleKind::Generator);
     let generator = known
         .ok_or_else(|| TaskError::new(WHAT, "the model whose prediction the mask is of is not among the bundles"))?;
     let ends = generator.ends(&sample.rig).and_then(Result::ok);

@@ -1,4 +1,4 @@
-//! What is left out, and what is said before anything starts.
+//! Tests of the division, and of the words before anything starts.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What a training answers: scores on what was left out, and the new bundle.
+//! Answer of a training: scores on what was left out, and the new bundle.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -12,7 +12,7 @@ use crate::labels::ImprintSource;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 
-/// How well a mask model's masks fit those that people drew.
+/// Fit of a mask model's masks to those that people drew.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct MaskScore {
     /// Pixels in both over pixels in either.
@@ -38,16 +38,16 @@ pub struct HeldOut {
     /// The pair.
     #[serde(skip)]
     pub id: PairId,
-    /// Its name.
+    /// Name of the pair.
     pub pair: String,
     /// The tool, where known.
     pub tool: Option<String>,
     /// The pad.
     #[serde(skip)]
     pub pad: PadId,
-    /// Its name.
+    /// Name of the pad.
     pub finger: String,
-    /// Which imprint was masked.
+    /// Source of the imprint that was masked.
     pub imprint: ImprintSource,
     /// The model as it was.
     pub before: MaskScore,
@@ -86,16 +86,16 @@ pub struct Trained {
     pub seconds: f64,
     /// The most memory that the program had so far, MiB, where the system tells.
     pub peak_mib: Option<u64>,
-    /// What to be careful about.
+    /// Warnings, in words.
     pub warnings: Vec<String>,
     /// The new bundle's name.
     pub name: String,
-    /// Its folder.
+    /// Folder of the new bundle.
     pub bundle: PathBuf,
 }
 
 impl Trained {
-    /// Whether it is worse than before on what was left out.
+    /// True where it is worse than before on what was left out.
     pub fn is_worse(&self) -> bool {
         matches!((self.before, self.after), (Some(before), Some(after)) if after.dice < before.dice)
     }

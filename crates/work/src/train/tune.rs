@@ -33,7 +33,7 @@ const LOOKED_AT: usize = 8;
 const BATCH: usize = 16;
 /// Fewer steps are worth nothing: the rates rise for ten steps.
 const ENOUGH_STEPS: u32 = 30;
-/// What the run is called.
+/// Start of the names of the run's files.
 const FILE: &str = "masks";
 
 /// Trains, scores and writes.

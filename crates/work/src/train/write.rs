@@ -19,7 +19,8 @@ pub(super) fn check_folder(out: &Path, from: &BundleInfo) -> Result<(), TaskErro
     new_bundle::check_folder(WHAT, out, from, |_| false)
 }
 
-/// What is said of the training in the bundle. No clock and no place: the same training is the same bundle.
+/// Provenance of the new bundle: the training that made it. No clock and no place: the same training is the same
+/// bundle.
 pub(super) struct Provenance<'a> {
     pub(super) dataset: &'a Dataset,
     pub(super) gathered: &'a Gathered,

@@ -17,7 +17,7 @@ pub(crate) struct KeptRun {
 }
 
 impl KeptRun {
-    /// What was kept in a folder of runs of the one with this digest, if anything.
+    /// Kept files of the run with this digest, below the folder of kept runs, if anything.
     pub(crate) fn of(root: Option<&Path>, digest: &str) -> Self {
         let folder = root.map(|root| {
             remove_old(root);

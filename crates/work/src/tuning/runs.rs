@@ -10,14 +10,14 @@ use crate::job::{Curve, JobCx, Progress};
 
 /// Steps that are timed where the time is given.
 const TIMED: u32 = 2;
-/// How often a run is kept.
+/// Time between two moments at which a run is kept.
 const KEPT_EVERY: Duration = Duration::from_secs(20);
 
 /// A look at what a run has not seen.
 pub(crate) struct Look<'a, T> {
-    /// What its value is, e.g. `dB`.
+    /// Unit of its value, e.g. `dB`.
     pub(crate) unit: &'static str,
-    /// How many there are during a run.
+    /// Number of looks during a run.
     pub(crate) times: usize,
     /// The look.
     pub(crate) at: &'a dyn Fn(&T) -> Result<f64, TaskError>,
@@ -141,8 +141,8 @@ fn named(name: &str, unit: &'static str, [loss, looks]: &Curves) -> impl Iterato
     [curve("loss", loss), curve(unit, looks)].into_iter().filter(|curve| !curve.points.is_empty())
 }
 
-/// How many steps of each of some runs fit into a time, of which the share `stepping` goes into steps: a few are made
-/// and thrown away. A run that goes on keeps the number it began with.
+/// Number of steps of each of some runs that fit into a time, of which the share `stepping` goes into steps: a few are
+/// made and thrown away. A run that goes on keeps the number it began with.
 pub(crate) fn steps_within<T: Descent>(
     (time, stepping): (Duration, f64),
     runs: usize,

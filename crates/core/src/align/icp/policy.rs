@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// What the contacts are compared with.
+/// Model that the contacts are compared with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Target {
@@ -15,7 +15,7 @@ pub enum Target {
     Mesh,
 }
 
-/// How far a contact is from its model point.
+/// Residual: the distance of a contact from its model point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Residual {
@@ -28,13 +28,13 @@ pub enum Residual {
     Generalized,
 }
 
-/// What a residual costs.
+/// Kernel: the cost of a residual.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Kernel {
-    /// Its square, however large.
+    /// The square of the residual, however large.
     None,
-    /// Its square up to the width, then in proportion: far points still pull.
+    /// The square of the residual up to the width, then in proportion: far points still pull.
     Huber {
         /// Meters.
         width_m: f64,
@@ -81,13 +81,13 @@ impl Kernel {
     }
 }
 
-/// Which pairs are left out of a step.
+/// Rule by which pairs are left out of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Rejector {
     /// None.
     None,
-    /// Those farther apart than this. They pay as if they were that far, so that running away does not pay.
+    /// Pairs farther apart than this. They pay as if they were that far, so that running away does not pay.
     MaxDistance {
         /// Meters.
         distance_m: f64,
@@ -99,7 +99,7 @@ pub(crate) enum Rejector {
     },
 }
 
-/// How a step is found from the pairs.
+/// Method that finds a step from the pairs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Solver {
@@ -110,7 +110,7 @@ pub(crate) enum Solver {
     LevenbergMarquardt,
 }
 
-/// Which motions are open.
+/// Motions that are open.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Dof {

@@ -1,4 +1,4 @@
-//! What contacts are compared with, prepared once for each tool and kept with it.
+//! Models that contacts are compared with, prepared once for each tool and kept with it.
 
 use glam::{DVec2, DVec3};
 
@@ -26,7 +26,7 @@ pub fn in_space(tool: &ToolModel) -> Samples {
     tool.derived(|tool| InSpace(Samples::in_space(tool.surface()))).0.clone()
 }
 
-/// The same points projected along the closing axis (x = 0). Those on the outline of the silhouette carry its
+/// Samples of the surface projected along the closing axis (x = 0). Those on the outline of the silhouette carry its
 /// normal; the others, which say nothing about the place in the plane, carry none (zero).
 pub fn silhouette(tool: &ToolModel) -> Samples {
     let project = |tool: &ToolModel| {
@@ -48,8 +48,8 @@ pub fn silhouette(tool: &ToolModel) -> Samples {
     tool.derived(project).0.clone()
 }
 
-/// What to compare with in place of the triangles, where looking for the nearest triangle takes too long: points of
-/// the surface, close together, each with the plane of its triangle. `None` for nearly all tools.
+/// Samples of the surface, close together, each with the plane of its triangle, in place of the triangles where looking
+/// for the nearest triangle takes too long. `None` for nearly all tools.
 pub(crate) fn instead_of_triangles(tool: &ToolModel) -> Option<Samples> {
     let dense = |tool: &ToolModel| {
         let (mut effort, mut searches) = (0, 0);

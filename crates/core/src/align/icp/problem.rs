@@ -72,7 +72,7 @@ impl State {
     }
 }
 
-/// How far a step moves points, meters.
+/// Size of a step, meters: the larger of its turn (times [`ANGLE_SCALE_M`]) and its shift.
 fn size(step: &[f64; 6]) -> f64 {
     let norm = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
     norm(&step[..3]).max(norm(&step[3..]))
@@ -101,7 +101,7 @@ pub(super) struct Sums {
     pub(super) weight: f64,
     pub(super) inliers: usize,
     pub(super) inlier_squares: f64,
-    /// Whether a contact has another nearest model point than at the last look.
+    /// True where a contact has another nearest model point than at the last look.
     pub(super) changed: bool,
 }
 

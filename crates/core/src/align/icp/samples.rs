@@ -39,12 +39,12 @@ impl Samples {
         Self { index: Arc::new(index(&points)), points: points.into(), normals: normals.into() }
     }
 
-    /// How many there are.
+    /// Number of points.
     pub fn len(&self) -> usize {
         self.points.len()
     }
 
-    /// Whether there are none.
+    /// True without a point.
     pub fn is_empty(&self) -> bool {
         self.points.is_empty()
     }
@@ -54,7 +54,7 @@ impl Samples {
         self.points[item as usize]
     }
 
-    /// Its normal; zero where there is none.
+    /// Normal of a point, object frame; zero where there is none.
     pub fn normal(&self, item: u32) -> DVec3 {
         self.normals[item as usize]
     }

@@ -91,8 +91,8 @@ fn a_perfect_prediction_returns_the_clean_latent() {
                 for eta in [0.0, 1.0] {
                     let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
                     let config = GenerateConfig { steps, eta, spacing, ..Default::default() };
-                    let found = run(&mut model, &lab(), config).unwrap();
-                    for (a, b) in found.data().iter().zip(&clean) {
+                    let sample = run(&mut model, &lab(), config).unwrap();
+                    for (a, b) in sample.data().iter().zip(&clean) {
                         assert!((a - b).abs() < 1e-5, "{prediction:?} {steps} {spacing:?} {eta}: {a} for {b}");
                     }
                 }
@@ -110,8 +110,8 @@ fn gaussian_data_comes_back_with_its_mean_and_spread() {
         for eta in [0.0, 0.5, 1.0] {
             let mut model = Gaussian { schedule: lab(), mean: means.clone(), std: 0.5, prediction };
             let config = GenerateConfig { steps: 250, eta, seed: 3, ..Default::default() };
-            let found = run(&mut model, &lab(), config).unwrap();
-            let rest: Vec<f64> = found.data().iter().zip(&means).map(|(&x, m)| f64::from(x) - m).collect();
+            let sample = run(&mut model, &lab(), config).unwrap();
+            let rest: Vec<f64> = sample.data().iter().zip(&means).map(|(&x, m)| f64::from(x) - m).collect();
             let mean = rest.iter().sum::<f64>() / 1024.0;
             let std = (rest.iter().map(|r| (r - mean).powi(2)).sum::<f64>() / 1024.0).sqrt();
             assert!(mean.abs() < 0.07, "{prediction:?} eta {eta}: mean off by {mean}");
@@ -128,10 +128,10 @@ fn deterministic_sampling_follows_the_exact_flow() {
     let mut errors = Vec::new();
     for steps in [50, 1000] {
         let mut model = Gaussian { schedule: lab(), mean: vec![mean], std, prediction: Prediction::Epsilon };
-        let found = run(&mut model, &lab(), GenerateConfig { steps, ..Default::default() }).unwrap();
+        let samples = run(&mut model, &lab(), GenerateConfig { steps, ..Default::default() }).unwrap();
         let a = lab().alpha_bar()[999];
         let mut noise = GaussianNoise::new(42);
-        let worst = found.data().iter().map(|&x| {
+        let worst = samples.data().iter().map(|&x| {
             let start = noise.draw();
             let z = (start - a.sqrt() * mean) / (a * std * std + 1.0 - a).sqrt();
             (f64::from(x) - (mean + std * z)).abs()
@@ -249,10 +249,11 @@ fn the_second_order_follows_the_exact_flow_more_closely() {
     let spacing = Spacing::Lab;
     let error = |sampler: Sampler, steps: u32| {
         let mut model = Gaussian { schedule: lab(), mean: vec![mean], std, prediction: Prediction::V };
-        let found = run(&mut model, &lab(), GenerateConfig { steps, sampler, spacing, ..Default::default() }).unwrap();
+        let samples =
+            run(&mut model, &lab(), GenerateConfig { steps, sampler, spacing, ..Default::default() }).unwrap();
         let a = lab().steps(steps, spacing, Prediction::V).unwrap()[0].alpha_bar;
         let mut noise = GaussianNoise::new(42);
-        let worst = found.data().iter().map(|&x| {
+        let worst = samples.data().iter().map(|&x| {
             let z = (noise.draw() - a.sqrt() * mean) / (a * std * std + 1.0 - a).sqrt();
             (f64::from(x) - (mean + std * z)).abs()
         });
@@ -272,8 +273,8 @@ fn every_sampler_returns_a_perfect_prediction_and_stays_finite() {
                 for spacing in [Spacing::Lab, Spacing::Trailing] {
                     let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
                     let config = GenerateConfig { steps, sampler, spacing, ..Default::default() };
-                    let found = run(&mut model, &lab(), config).unwrap();
-                    let worst = found.data().iter().zip(&clean).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                    let sample = run(&mut model, &lab(), config).unwrap();
+                    let worst = sample.data().iter().zip(&clean).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
                     assert!(worst < 1e-5, "{sampler:?} {prediction:?} {steps} {spacing:?}: {worst}");
                 }
             }
@@ -305,8 +306,8 @@ fn e22_every_number_of_steps_stays_finite_with_every_sampler() {
         let eta = f64::from(steps % 11) / 10.0;
         let mut model = Perfect { schedule: lab(), clean: vec![0.3, -2.0], prediction, calls: 0 };
         let config = GenerateConfig { steps, eta, sampler, spacing, ..Default::default() };
-        let found = run(&mut model, &lab(), config).unwrap();
-        let worst = found.data().iter().zip([0.3f32, -2.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        let sample = run(&mut model, &lab(), config).unwrap();
+        let worst = sample.data().iter().zip([0.3f32, -2.0]).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 1e-5, "{config:?}: {worst}");
     }
 }
@@ -373,4 +374,15 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
     let config = GenerateConfig { guidance: f64::INFINITY, ..Default::default() };
     let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
     assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Guidance(_))));
+}
+
+#[test]
+fn choices_are_keys() {
+    let of = |eta, guidance| GenerateConfig { eta, guidance, ..GenerateConfig::default() };
+    assert_eq!(of(0.0, 1.0), of(-0.0, 1.0));
+    assert_eq!(of(f64::NAN, 1.0), of(f64::NAN, 1.0), "a key finds itself");
+    let mut keys = [of(0.5, 2.0), of(f64::NAN, 1.0), of(-0.0, 1.0), of(0.5, 1.0)];
+    keys.sort();
+    assert_eq!(keys, [of(0.0, 1.0), of(0.5, 1.0), of(0.5, 2.0), of(f64::NAN, 1.0)]);
+    assert_eq!(std::collections::HashSet::from([of(0.0, 1.0), of(-0.0, 1.0), of(0.5, 1.0)]).len(), 2);
 }

@@ -12,7 +12,7 @@ fn shipped(name: &str) -> Vec<u8> {
     std::fs::read(format!("{BUNDLE}/{name}.onnx")).unwrap()
 }
 
-/// What rten makes of the shipped graph.
+/// Output that rten computes with the shipped graph.
 fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, output: &str) -> Vec<f32> {
     let model = Model::load(shipped(name)).unwrap();
     let mut all: Vec<(_, ValueOrView<'_>)> = inputs
@@ -29,9 +29,9 @@ fn run(name: &str, inputs: &[(&str, &[usize], &[f32])], timestep: Option<i32>, o
     result.into_tensor::<f32>().unwrap().into_data()
 }
 
-fn assert_close(found: &[f32], expected: &[f32], tolerance: f32) {
-    assert_eq!(found.len(), expected.len());
-    let worst = found.iter().zip(expected).map(|(f, e)| (f - e).abs()).fold(0.0, f32::max);
+fn assert_close(actual: &[f32], expected: &[f32], tolerance: f32) {
+    assert_eq!(actual.len(), expected.len());
+    let worst = actual.iter().zip(expected).map(|(f, e)| (f - e).abs()).fold(0.0, f32::max);
     assert!(worst < tolerance, "{worst}");
 }
 
@@ -55,10 +55,10 @@ fn the_networks_equal_the_shipped_graphs() {
     let latents: Vec<f32> = random.normals(n * sizes.latent());
     let x = Tensor::new(&[n, 4, 16, 16], latents.clone());
     for t in [999, 499] {
-        let found = denoise(&leaves, &sizes, &schedule, &x, t, &condition);
+        let prediction = denoise(&leaves, &sizes, &schedule, &x, t, &condition);
         let inputs: [(&str, &[usize], &[f32]); 2] =
             [("latent", &[n, 4, 16, 16], &latents), ("condition", &[n, 64, 16, 16], condition.values())];
-        assert_close(found.values(), &run("denoiser", &inputs, Some(t as i32), "prediction"), 1e-5);
+        assert_close(prediction.values(), &run("denoiser", &inputs, Some(t as i32), "prediction"), 1e-5);
     }
 
     let expected = run("decoder", &[("latent", &[n, 4, 16, 16], &latents)], None, "image");
@@ -168,8 +168,8 @@ fn another_architecture_is_refused_by_the_name_of_the_weight() {
     assert!(without("enter.bias").contains("\"enter.bias\" is missing"));
 
     let wide = Sizes { condition: 16, ..fixture::sizes() };
-    let found = read(&fixture::file(&wide.denoiser_layout(), 2)).unwrap_err().to_string();
-    assert!(found.contains("enter.weight") && found.contains("[8, 20, 3, 3]"), "{found}");
+    let refusal = read(&fixture::file(&wide.denoiser_layout(), 2)).unwrap_err().to_string();
+    assert!(refusal.contains("enter.weight") && refusal.contains("[8, 20, 3, 3]"), "{refusal}");
     // The shipped mask network is no generator.
     let mask = std::fs::read(format!("{BUNDLE}/../mask_unet/mask_unet.onnx")).unwrap();
     assert!(read(&mask).unwrap_err().to_string().contains("denoiser"));

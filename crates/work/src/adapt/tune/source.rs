@@ -28,7 +28,7 @@ const SIMULATED: u64 = 6;
 pub(super) struct Source {
     graphs: BTreeMap<Role, Vec<u8>>,
     schedule: NoiseSchedule,
-    /// How pictures are prepared, without mean and deviation: they belong to the networks that are tuned.
+    /// Preparation of pictures, without mean and deviation: they belong to the networks that are tuned.
     input: GeneratorInput,
     mean: [f32; 3],
     std: [f32; 3],

@@ -12,9 +12,9 @@ const MODELS_VARIABLE: &str = "TOUCH2TOUCH_MODELS";
 /// Bundles and what was wrong with the others.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Found {
-    /// Usable, in the order of the places and then of the folder names; each hash once.
+    /// Usable, in the order of the places and then of the folder names; those of one identity and name once.
     pub bundles: Vec<Bundle>,
-    /// What kept the others from being used.
+    /// Faults that kept the others from being used.
     pub problems: Vec<Problem>,
 }
 
@@ -59,7 +59,9 @@ impl Found {
 
     fn open(&mut self, origin: &Origin) {
         match Bundle::open(origin) {
-            Ok(bundle) if self.bundles.iter().all(|b| b.hash() != bundle.hash()) => self.bundles.push(bundle),
+            Ok(bundle) if self.bundles.iter().all(|b| (b.hash(), b.name()) != (bundle.hash(), bundle.name())) => {
+                self.bundles.push(bundle)
+            }
             Ok(_) => {}
             Err(mut err) => self.problems.append(&mut err.problems),
         }

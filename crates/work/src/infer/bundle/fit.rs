@@ -66,7 +66,7 @@ fn tensor(pictures: &[&Grid<f32>]) -> Tensor {
 /// Reads the pictures of a fit for a decoder's picture of this size.
 ///
 /// # Errors
-/// What is wrong with them.
+/// A sentence that says what is wrong with them.
 pub(super) fn read(path: &Path, bytes: &[u8], spec: &FitSpec, size: [usize; 2]) -> Result<Fitted, String> {
     let mut arrays = npz::read_bytes(path, bytes).map_err(|err| err.to_string())?;
     let response = match pictures(&mut arrays, "basis", size)? {

@@ -24,10 +24,10 @@ const MAX_SIDE: usize = 4096;
 /// Most values of one tensor: four pictures with the longest sides.
 const MAX_VALUES: usize = 4 * MAX_SIDE * MAX_SIDE;
 
-/// What a bundle is.
+/// Kind of a bundle, with its description.
 #[derive(Clone, Debug, PartialEq)]
 pub enum BundleSpec {
-    /// What one sensor felt to what another would have felt.
+    /// Touch of one sensor to the touch that another would have felt.
     Generator(Box<GeneratorSpec>),
     /// Imprint to contact mask.
     MaskUnet(MaskSpec),
@@ -38,27 +38,27 @@ pub enum BundleSpec {
 /// A latent-diffusion generator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GeneratorSpec {
-    /// How the difference image is prepared.
+    /// Preparation of the difference image.
     pub input: GeneratorInput,
     /// Shape of the condition.
     pub condition: TensorSpec,
     /// Shape and scale of the latent.
     pub latent: LatentSpec,
-    /// How noise was added in training.
+    /// Noise schedule of the training.
     pub schedule: Schedule,
-    /// The same as the manifest has it.
+    /// Noise schedule, as the manifest has it.
     pub schedule_spec: ScheduleSpec,
-    /// What the denoiser's output means.
+    /// Meaning of the denoiser's output.
     pub prediction: Prediction,
-    /// How the decoder's picture is read.
+    /// Reading of the decoder's picture.
     pub output: OutputSpec,
     /// Statistics for the paper's shift; `None` if the bundle has none.
     pub shift: Option<ShiftStats>,
-    /// What to generate with if nobody chooses.
+    /// Settings to generate with if nobody chooses.
     pub defaults: GenerateConfig,
-    /// What the denoiser's graph takes as its timestep.
+    /// Type of the timestep that the denoiser's graph takes.
     pub timestep: TimestepType,
-    /// How classifier-free guidance is done; `None` if the model was not trained for it.
+    /// Classifier-free guidance; `None` if the model was not trained for it.
     pub guidance: Option<GuidanceSpec>,
     /// The fit to a rig, if it was fitted to one.
     pub fit: Option<FitSpec>,
@@ -68,7 +68,7 @@ pub struct GeneratorSpec {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GuidanceSpec {
-    /// What stands in the condition's place.
+    /// Condition without information, which takes the condition's place.
     pub unconditional: Unconditional,
     /// The scale to generate with if nobody chooses; 1 is none.
     pub scale: f64,
@@ -80,7 +80,7 @@ pub struct GuidanceSpec {
 pub enum Unconditional {
     /// A condition of zeros.
     ZeroCondition,
-    /// What the condition encoder makes of a GelSlim that feels nothing: a difference of zeros.
+    /// Condition that the encoder makes of a GelSlim that feels nothing: a difference of zeros.
     ZeroDifference,
 }
 
@@ -135,7 +135,8 @@ pub enum TimestepType {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct GeneratorInput {
-    /// Which sensor: of a color sensor the difference of touched and untouched image, RGB; of a depth sensor the imprint.
+    /// Sensor: of a color sensor the picture is the difference of touched and untouched image, RGB; of a depth sensor
+    /// the imprint.
     pub sensor: SensorSpec,
     /// `[width, height]` the picture is resized to, pixels.
     pub size: [usize; 2],
@@ -145,7 +146,7 @@ pub struct GeneratorInput {
     pub mean: Vec<f64>,
     /// Divided by per channel.
     pub std: Vec<f64>,
-    /// How it is resized.
+    /// Resampling by which it is resized.
     #[serde(default = "bilinear")]
     pub resampling: Resampling,
     /// Rotation of the prepared image: 0 or 180 degrees.
@@ -199,7 +200,7 @@ pub struct LatentSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ScheduleSpec {
-    /// Which formula.
+    /// Formula of the betas.
     pub kind: ScheduleKind,
     /// Training steps.
     pub steps: usize,
@@ -240,19 +241,19 @@ impl ScheduleSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OutputSpec {
-    /// Which sensor would have felt it.
+    /// Sensor that would have felt the picture.
     pub sensor: SensorSpec,
     /// `[width, height]` of the decoder's picture.
     pub size: [usize; 2],
     /// Channels of the decoder's picture.
     pub channels: usize,
-    /// What -1 and 1 mean, meters: of a depth sensor.
+    /// Depths that -1 and 1 mean, meters: of a depth sensor.
     #[serde(default)]
     pub range_m: Option<DepthRange>,
-    /// What -1 and 1 mean, differences on the 0..255 scale: of a color sensor.
+    /// Differences that -1 and 1 mean, on the 0..255 scale: of a color sensor.
     #[serde(default)]
     pub range: Option<[f64; 2]>,
-    /// How the channels of a depth picture become one.
+    /// Reduction of the channels of a depth picture to one.
     #[serde(default)]
     pub reduction: Reduction,
     /// Rotation from the picture to the sensor's own raw orientation: 0 or 180 degrees.
@@ -260,10 +261,10 @@ pub struct OutputSpec {
     pub rotation_deg: u32,
     /// `[width, height]` of the imprint (or color picture) that the decoder's picture stands for.
     pub imprint_size: [usize; 2],
-    /// How the picture is brought to that size.
+    /// Resampling by which the picture is brought to that size.
     #[serde(default = "bilinear")]
     pub resampling: Resampling,
-    /// Where the picture has the center of the color sensor's window, pixels of the imprint in its raw orientation: of a model
+    /// Center of the color sensor's window in the picture, pixels of the imprint in its raw orientation: of a model
     /// that draws it in the same place for every pad. Without it, pictures stay where they are drawn.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub window_px: Option<[f64; 2]>,
@@ -276,9 +277,9 @@ fn bilinear() -> Resampling {
 /// A contact mask UNet.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MaskSpec {
-    /// How the imprint is prepared.
+    /// Preparation of the imprint.
     pub input: MaskInput,
-    /// How the output is read.
+    /// Reading of the output.
     pub output: MaskOutput,
 }
 
@@ -286,13 +287,13 @@ pub struct MaskSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MaskInput {
-    /// Which sensor: a depth sensor.
+    /// Sensor: a depth sensor.
     pub sensor: SensorSpec,
     /// `[width, height]`, pixels.
     pub size: [usize; 2],
     /// The imprint's depth that becomes 0 and 1, meters.
     pub range_m: DepthRange,
-    /// How depth becomes 0..1.
+    /// Conversion of the scaled depth to 0..1.
     #[serde(default)]
     pub cast: Cast,
     /// Rotation of the raw imprint before the graph (and back after it): 0 or 180 degrees.
@@ -300,7 +301,7 @@ pub struct MaskInput {
     pub rotation_deg: u32,
 }
 
-/// What happens between the scaled imprint and the graph.
+/// Conversion between the scaled imprint and the graph.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Cast {
@@ -327,9 +328,9 @@ pub struct MaskOutput {
 /// A tool classifier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ClassifierSpec {
-    /// How the imprint is prepared.
+    /// Preparation of the imprint.
     pub input: ClassifierInput,
-    /// What it can name.
+    /// Classes that it can name.
     pub output: ClassifierOutput,
 }
 
@@ -337,7 +338,7 @@ pub struct ClassifierSpec {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ClassifierInput {
-    /// Which sensor: a depth sensor.
+    /// Sensor: a depth sensor.
     pub sensor: SensorSpec,
     /// `[width, height]`, pixels; resized bilinearly.
     pub size: [usize; 2],

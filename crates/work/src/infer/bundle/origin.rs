@@ -1,4 +1,4 @@
-//! Where a bundle lies: in a folder, or in the program itself.
+//! Origin of a bundle: a folder, or the program itself.
 //!
 //! The program carries the bundles of `assets/models`, so that one copied file predicts on a machine that has nothing else.
 
@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 
 use super::MANIFEST;
-use crate::io::digest::sha256;
+use crate::io::model_id::identity;
 
 use crate::io::files;
 
-/// What stands before the name of a bundle of the program, wherever a folder could be named.
+/// Text before the name of a bundle of the program, wherever a folder could be named.
 const PREFIX: &str = "built-in:";
 
 /// A file's name and content.
@@ -42,8 +42,7 @@ static EMBEDDED: &[(&str, &[Embedded])] = embedded! {
 #[cfg(not(feature = "onnx"))]
 static EMBEDDED: &[(&str, &[Embedded])] = &[];
 
-/// Where a bundle lies. As text a folder's path, or `built-in:` and a name; both are understood where a folder is
-/// named.
+/// Origin of a bundle. As text a folder's path, or `built-in:` and a name; both are understood where a folder is named.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Origin {
     /// A folder.
@@ -58,10 +57,10 @@ impl Origin {
         EMBEDDED.iter().map(|(name, _)| Self::BuiltIn(name))
     }
 
-    /// Whether a bundle of this hash is one of the program's.
+    /// True of a bundle of this identity that the program brings.
     pub(crate) fn ships(hash: &str) -> bool {
         Self::built_in()
-            .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| sha256(&manifest) == hash))
+            .any(|origin| origin.file(MANIFEST).read(files::SMALL).is_ok_and(|manifest| identity(&manifest) == hash))
     }
 
     /// The last part of the folder's path, or the name in the program.
@@ -130,7 +129,7 @@ pub struct BundleFile {
 }
 
 impl BundleFile {
-    /// Its path on the disk, or its name in the program.
+    /// Path of the file on the disk, or its name in the program.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -138,7 +137,7 @@ impl BundleFile {
     /// The whole content, of a file on the disk at most `limit` bytes.
     ///
     /// # Errors
-    /// Those of [`files::read`]; none for one of the program.
+    /// The errors of [`files::read`]; none for a file of the program.
     pub fn read(&self, limit: u64) -> io::Result<Cow<'static, [u8]>> {
         match self.embedded {
             Some(bytes) => Ok(Cow::Borrowed(bytes)),
@@ -173,7 +172,7 @@ mod tests {
         for (name, files) in EMBEDDED {
             assert_eq!(names(&models.join(name)), files.iter().map(|(file, _)| (*file).to_owned()).collect());
             let manifest = std::fs::read(models.join(name).join(MANIFEST)).unwrap();
-            assert!(Origin::ships(&sha256(&manifest)) && !Origin::ships(&sha256(&manifest[1..])), "{name}");
+            assert!(Origin::ships(&identity(&manifest)) && !Origin::ships(&identity(&manifest[1..])), "{name}");
             for (file, bytes) in *files {
                 assert!(std::fs::read(models.join(name).join(file)).unwrap() == *bytes, "{name}/{file}");
             }

@@ -13,14 +13,14 @@ use touch2touch_core::rig::{Rig, Sensor, SensorId, SensorKind};
 pub struct SensorSpec {
     /// The name that the rig gives it, such as `gelslim`.
     pub key: String,
-    /// What its picture holds.
+    /// Kind of its picture: color or depth.
     pub kind: SensorKind,
     /// `[width, height]` of its stored picture, pixels.
     pub size: [usize; 2],
 }
 
 impl SensorSpec {
-    /// How a rig's sensor is declared.
+    /// Declaration of a rig's sensor.
     pub fn of(sensor: &Sensor) -> Self {
         Self { key: sensor.key.to_string(), kind: sensor.kind, size: sensor.size() }
     }
@@ -36,13 +36,13 @@ impl fmt::Display for SensorSpec {
 /// The sensors between which a generator predicts.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SensorPair {
-    /// What it starts from.
+    /// Sensor that the generator starts from.
     pub input: SensorSpec,
-    /// What it predicts.
+    /// Sensor that the generator predicts.
     pub output: SensorSpec,
 }
 
-/// Where a generator starts and ends in a rig.
+/// Sensors of a rig at which a generator starts and ends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Ends {
     /// The sensor whose reading is the condition.
@@ -58,11 +58,11 @@ pub struct Ends {
     .sensors.output, .sensors.input, list(.rig), fitting(.rig)
 )]
 pub struct Misfit {
-    /// Its name.
+    /// Name of the bundle.
     pub bundle: String,
-    /// What it is for.
+    /// Sensors that it is for.
     pub sensors: Box<SensorPair>,
-    /// What the data has.
+    /// Sensors of the data.
     pub rig: Vec<SensorSpec>,
 }
 
@@ -81,8 +81,8 @@ impl SensorPair {
         Self { input: SensorSpec::of(input), output: SensorSpec::of(output) }
     }
 
-    /// Where the generator named `bundle` starts and ends in `rig`: the sensor that it starts from must be there as it was
-    /// declared, and the sensor that it predicts must not be there as another.
+    /// Sensors of `rig` at which the generator named `bundle` starts and ends: the sensor that it starts from must be
+    /// there as it was declared, and the sensor that it predicts must not be there as another.
     ///
     /// # Errors
     /// [`Misfit`] says what was asked, what is there and what would fit.
@@ -102,7 +102,7 @@ impl SensorPair {
 }
 
 impl Bundle {
-    /// Where the bundle, if it is a generator, starts and ends in `rig`; `None` for another kind of bundle.
+    /// Sensors of `rig` at which the bundle starts and ends, if it is a generator; `None` for another kind of bundle.
     ///
     /// # Errors
     /// [`Misfit`].

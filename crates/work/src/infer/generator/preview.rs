@@ -14,8 +14,8 @@ pub trait Observer {
     /// Called before each step and once at the end; `Break` cancels within one step.
     fn progress(&mut self, progress: Progress) -> ControlFlow<()>;
 
-    /// Whether a picture of `item`, as the model sees it after these steps, would be looked at now. Nothing is computed
-    /// for an answer of `false`.
+    /// True where a picture of `item`, as the model sees it after these steps, would be looked at now. Nothing is
+    /// computed for an answer of `false`.
     fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
         let _ = (after, item);
         false

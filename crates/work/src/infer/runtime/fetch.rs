@@ -93,9 +93,9 @@ pub enum FetchError {
     /// The wheel is not the pinned one.
     #[error("the downloaded {} has SHA-256 {found}, not {expected}: it was not unpacked", path.display())]
     Checksum {
-        /// Which file.
+        /// The file.
         path: PathBuf,
-        /// Its hash.
+        /// Hash of the file.
         found: String,
         /// The pinned hash.
         expected: &'static str,
@@ -109,7 +109,7 @@ pub enum FetchError {
     /// The library cannot be written.
     #[error("{source}: {}", path.display())]
     Io {
-        /// Where.
+        /// The file or folder.
         path: PathBuf,
         /// Why.
         source: std::io::Error,

@@ -6,21 +6,21 @@ use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often the process is looked at.
+/// Time between two looks at the process.
 const POLL: Duration = Duration::from_millis(5);
-/// How often its memory is asked for, where nothing else bounds it.
+/// Time between two looks at its memory, where nothing else bounds it.
 const POLL_MEMORY: Duration = Duration::from_millis(200);
 /// Most bytes of what it says that are kept.
 const MAX_TEXT: u64 = 1 << 16;
 
-/// What the process may take.
+/// Limits of the process.
 pub(super) struct Limits {
     /// Bytes.
     pub(super) memory: u64,
     pub(super) time: Duration,
 }
 
-/// How it ended.
+/// End of the process.
 #[derive(Debug)]
 pub(super) enum End {
     Ended(ExitStatus),
@@ -30,7 +30,7 @@ pub(super) enum End {
     TooMuch,
 }
 
-/// What was seen of it.
+/// Output and end of the process.
 #[derive(Debug)]
 pub(super) struct ProcessEnd {
     pub(super) end: End,

@@ -40,7 +40,7 @@ impl BuiltIn {
         }
     }
 
-    /// What to call it.
+    /// Title for people.
     pub fn title(self) -> String {
         match self {
             Self::Demo => "Demo".into(),

@@ -23,7 +23,7 @@ pub enum OpenError {
     Rig {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Fault of the file.
         why: String,
     },
     /// Nothing in the folder looks like a data set.
@@ -32,18 +32,18 @@ pub enum OpenError {
         /// The folder.
         path: PathBuf,
     },
-    /// How it is to be read is not said so that it can be understood.
+    /// The file that says how the data are to be read cannot be understood.
     #[error("how the data are to be read is not understood: {reason} ({})", file.display())]
     ReadAs {
         /// The file that says it.
         file: PathBuf,
-        /// What is wrong with it.
+        /// Fault of the file.
         reason: String,
     },
 }
 
 impl OpenError {
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check the path and its permissions",
@@ -56,7 +56,7 @@ impl OpenError {
         }
     }
 
-    /// The same as an entry of a problem list.
+    /// Entry of a problem list with the same message and advice.
     pub fn to_problem(&self) -> Problem {
         let (Self::Io { path, .. }
         | Self::Rig { path, .. }
@@ -92,7 +92,7 @@ pub enum LoadError {
     MostlyInvalid {
         /// The file.
         file: PathBuf,
-        /// What of it, such as "pixels of the right imprint".
+        /// Pixels that are meant, such as "pixels of the right imprint".
         what: String,
         /// The share that is no measurement.
         share: f64,
@@ -102,7 +102,7 @@ pub enum LoadError {
     Bug {
         /// The pair's files.
         files: Vec<PathBuf>,
-        /// What the panic said.
+        /// Message of the panic.
         message: String,
     },
     /// The pair is not one of this data set.
@@ -125,7 +125,7 @@ impl LoadError {
         }
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Pt(err) => err.hint(),
@@ -137,7 +137,7 @@ impl LoadError {
         }
     }
 
-    /// The same as an entry of a problem list.
+    /// Entry of a problem list with the same message and advice.
     pub fn to_problem(&self) -> Problem {
         Problem {
             file: self.file().map(Path::to_owned).unwrap_or_default(),

@@ -26,7 +26,7 @@ use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, 
 
 const BUBBLES: &str = "bubbles";
 const GELSLIMS: [&str; 2] = ["gelslims", "gelslims_no_distortion"];
-/// What the lab puts before the tool's name in the name of a tool folder.
+/// Text before the tool's name in the names of the lab's tool folders.
 const TOOL_PREFIXES: [&str; 3] = [
     "bubble_style_transfer_dataset_bubbles_",
     "gelslim_style_transfer_dataset_gelslim_",
@@ -44,7 +44,7 @@ pub(super) struct Lab {
     pub(super) folders: Vec<PathBuf>,
     pub(super) pairs: Vec<PairFiles>,
     pub(super) meshes: BTreeMap<String, PathBuf>,
-    /// Whether the touches lie directly in one folder, as a robot may write them.
+    /// True where the touches lie directly in one folder, as a robot may write them.
     pub(super) flat: bool,
 }
 

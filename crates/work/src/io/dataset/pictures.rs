@@ -31,7 +31,7 @@ use touch2touch_core::upright::{self, TurnReading};
 
 use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, last_integer, problem, same_name};
 
-/// What the darkest and brightest value of a bubble picture are taken for, meters.
+/// Depths that the darkest and the brightest value of a bubble picture are taken for, meters.
 pub(crate) const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
 
 /// Difference (0..255 scale) per gray level of an unclipped picture: red, green, blue.
@@ -72,7 +72,7 @@ pub(super) struct Pictures {
     rig: Arc<Rig>,
 }
 
-/// What the names of the pictures end in, in lower case.
+/// Ends of the pictures' names, in lower case, in the order of their kinds.
 fn suffixes(rig: &Rig) -> [String; KINDS] {
     let of = |sensor: Option<&Sensor>, without: &Sensor| format!("_{}", sensor.unwrap_or(without).key.to_lowercase());
     let (color, depth) = (of(rig.color(), &lab::GELSLIM), of(rig.depth(), &lab::BUBBLE));
@@ -208,7 +208,7 @@ impl Pictures {
         Ok(Some((upright, reading)))
     }
 
-    /// Whether a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
+    /// True where a channel of the GelSlim picture was cut off at black or white: half of its range is lost.
     pub(super) fn is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
         let Some(path) = self.file(id, 0)? else { return Ok(None) };
         let tile = images::read_rgb(path)?;

@@ -1,5 +1,5 @@
-//! What a loaded sample must satisfy to be a touch of the lab's rig. The doctor and whoever loads a pair get the same
-//! verdict, in the sample's notes.
+//! Rules that a loaded sample must satisfy to be a touch of the lab's rig. The doctor and whoever loads a pair get the
+//! same verdict, in the sample's notes.
 
 use std::path::Path;
 
@@ -16,8 +16,8 @@ const MAX_IMPRINT_M: f64 = 0.08;
 const DEPTH_RANGE_M: [f64; 2] = [0.02, 0.5];
 /// Focal lengths of a camera with 224 x 171 pixels: 13 to 160 degrees of view.
 const FOCAL_RANGE_PX: [f64; 2] = [20.0, 1000.0];
-/// Where a camera's principal point lies, as a share of the image's sides: near the middle. Numbers of an image scaled
-/// by a half or by two are out of it.
+/// Range of a camera's principal point, as a share of the image's sides: near the middle. Numbers of an image scaled by
+/// a half or by two are out of it.
 const CENTER_RANGE: [f64; 2] = [0.3, 0.7];
 /// Pixels are square, but for the calibration's errors.
 const MAX_ASPECT: f64 = 1.25;

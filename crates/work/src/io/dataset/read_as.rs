@@ -14,7 +14,7 @@ pub const READ_AS_FILE: &str = "read-as.txt";
 /// Most bytes of that file: some words.
 const MAX_BYTES: u64 = 4096;
 
-/// How the data set of a folder is read.
+/// Ways in which the folder's [`READ_AS_FILE`] says that its data set is read otherwise than stored; none without it.
 ///
 /// # Errors
 /// If the file is there and cannot be read, or says something else.
@@ -43,12 +43,12 @@ pub fn write_read_as(root: &Path, read_as: &[ReadAs]) -> std::io::Result<()> {
 }
 
 impl Dataset {
-    /// How it is read otherwise than it is stored.
+    /// Ways in which it is read otherwise than it is stored.
     pub fn read_as(&self) -> &[ReadAs] {
         &self.read_as
     }
 
-    /// The same data set, read so whatever its file says.
+    /// Data set that is read in these ways, whatever its file says.
     #[must_use]
     pub fn reading(mut self, read_as: Vec<ReadAs>) -> Self {
         let said = self.said_read_as();
@@ -76,7 +76,7 @@ impl Dataset {
         self.read_as.iter().for_each(|read_as| read_as.apply(sample));
     }
 
-    /// How the pictures of imprints are laid down anew.
+    /// Turns by which the pictures of imprints are laid down anew.
     pub(super) fn lays(&self) -> impl Iterator<Item = Turn> + '_ {
         self.read_as.iter().filter_map(|read_as| match read_as {
             ReadAs::Lay(_, lay) => Some(lay.turn()),

@@ -28,7 +28,7 @@ pub enum ToolUnit {
     Meters,
     /// Rarely anyone's.
     Micrometers,
-    /// Where parts are drawn in them.
+    /// Inches, where parts are drawn in them.
     Inches,
 }
 
@@ -71,7 +71,7 @@ impl ToolUnit {
         Self::iter().filter(move |unit| is_tool_length(size * unit.meters()))
     }
 
-    /// What reading a file in this unit is.
+    /// Scale of a file in this unit.
     pub fn scale(self) -> ToolScale {
         if self == Self::Meters { ToolScale::Meters } else { ToolScale::Factor(self.meters()) }
     }
@@ -87,7 +87,7 @@ impl FromStr for ToolUnit {
     }
 }
 
-/// What the numbers of a CAD file mean.
+/// Unit of a CAD file's numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum ToolScale {
     /// Meters; a model that is too large or too small for that is an error.
@@ -124,7 +124,7 @@ impl FromStr for ToolScale {
 }
 
 impl ToolScale {
-    /// What [`UNIT_FILE`] beside `model` says; `None` without one.
+    /// Scale that [`UNIT_FILE`] beside `model` names; `None` without one.
     fn beside(model: &Path) -> Result<Option<Self>, MeshError> {
         let unknown = |reason| MeshError::UnitFile { file: model.with_file_name(UNIT_FILE), reason };
         said_beside(model)?.map(|text| text.parse().map_err(unknown)).transpose()
@@ -166,7 +166,7 @@ pub(crate) fn write_beside(model: &Path, word: &str) -> std::io::Result<()> {
 pub struct ToolFile {
     /// The model in meters.
     pub mesh: TriMesh,
-    /// What is odd about its file.
+    /// Oddities of its file.
     pub notes: Vec<Problem>,
 }
 

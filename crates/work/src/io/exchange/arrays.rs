@@ -7,7 +7,7 @@ use super::found::{IGNORE_NPY, IMPRINT_NPY, MASK_NPY};
 use super::{Content, ExportError, ExportReport, PARTS, io};
 use crate::io::{atomic, npz};
 
-/// What lies beside the arrays, because an array says neither what it is nor in which unit.
+/// Text that lies beside the arrays, because an array says neither what it is nor in which unit.
 const ABOUT: &str = "\
 Contact masks as numpy arrays, in the parts train, val and test. One name (STEM) for each pair and finger;
 touch2touch_export.json says which.

@@ -26,7 +26,7 @@ pub(super) const ANNOTATIONS: &str = "annotations";
 const CONTACT: &str = "contact";
 const IGNORE: &str = "ignore";
 
-/// Which pair and finger an image is of.
+/// Pair and finger that an image is of.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Of {
     pair: String,
@@ -38,7 +38,7 @@ struct Of {
 pub(super) struct Annotations {
     /// Images and annotations of each part.
     parts: [(Vec<Value>, Vec<Value>); 3],
-    /// Those given so far. Pycocotools takes an annotation 0 for none.
+    /// Numbers given last, to an image and to an annotation, from 1: pycocotools takes an annotation 0 for none.
     last: [u64; 2],
 }
 

@@ -57,7 +57,7 @@ impl Format {
         }
     }
 
-    /// What it is, in a sentence.
+    /// Description in a sentence.
     pub fn text(self) -> &'static str {
         match self {
             Self::Unet => {
@@ -76,7 +76,7 @@ impl Format {
     }
 }
 
-/// Where a mask belongs in an export.
+/// Place of a mask in an export.
 pub(super) struct Place<'a> {
     /// The folder of the export.
     pub(super) root: &'a Path,

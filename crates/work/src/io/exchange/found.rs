@@ -18,9 +18,9 @@ pub(super) const IGNORE_PNG: &str = ".ignore.png";
 pub struct ReadError {
     /// The file or folder.
     pub file: PathBuf,
-    /// What is wrong.
+    /// Fault of the file.
     pub what: String,
-    /// What to do about it.
+    /// Advice for the user.
     pub hint: &'static str,
 }
 
@@ -56,7 +56,7 @@ impl Coded {
     }
 }
 
-/// Where the pixels of a mask lie.
+/// Place of a mask's pixels.
 #[derive(Clone, Debug)]
 pub(super) enum Stored {
     /// In pictures: mask and ignored pixels.
@@ -70,7 +70,7 @@ pub(super) enum Stored {
 /// A mask that was found.
 #[derive(Clone, Debug)]
 pub struct Listed {
-    /// Its name, without folder and ending.
+    /// Name of the mask, without folder and ending.
     pub stem: String,
     /// The file.
     pub file: PathBuf,
@@ -103,7 +103,7 @@ pub struct Listing {
     pub format: Format,
     /// The masks.
     pub masks: Vec<Listed>,
-    /// What looks like one and cannot be taken.
+    /// Files that look like a mask and cannot be taken.
     pub refused: Vec<ReadError>,
 }
 
@@ -136,7 +136,7 @@ fn array(file: &Path) -> Result<Mask, ReadError> {
     mask_of(file, [width, height], array.into_f32().into_iter())
 }
 
-/// What an error says apart from its file, which is said once.
+/// Message of an error without its file, which is said once.
 fn unplaced(err: &impl std::fmt::Display, file: &Path) -> String {
     err.to_string().replace(&format!(" ({})", file.display()), "")
 }

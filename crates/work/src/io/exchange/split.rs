@@ -100,7 +100,7 @@ pub(super) fn stems(entries: &[ExportEntry], rig: &Rig) -> Vec<String> {
         .collect()
 }
 
-/// What the stems of an export mean, for files that come without its list.
+/// Entries by the stems that an export gives them, for files that come without its list.
 #[derive(Clone, Debug)]
 pub(crate) struct Stems(HashMap<String, Vec<usize>>);
 

@@ -55,7 +55,7 @@ pub(super) fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) 
     })
 }
 
-/// What a training folder holds and what the loader would refuse.
+/// Content of a training folder and everything in it that the loader would refuse.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct CheckReport {
     /// Images in train, val and test.

@@ -32,7 +32,7 @@ impl MaskStore {
         }
     }
 
-    /// Where the journal of a pair lies, whether it exists or not.
+    /// Path of a pair's journal, whether it exists or not.
     pub fn journal_file(&self, pair: &str) -> PathBuf {
         self.folder.join(format!("{}{JOURNAL_SUFFIX}", names::label(pair)))
     }

@@ -12,7 +12,7 @@ const ALIGNMENT: usize = 64;
 /// Longest header. numpy itself refuses longer ones.
 const MAX_HEADER: usize = 10_000;
 
-/// What the header says.
+/// Fields of the header.
 #[derive(Debug, PartialEq)]
 pub(super) struct Header {
     /// `<f4` and the like.

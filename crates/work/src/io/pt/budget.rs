@@ -1,9 +1,9 @@
-//! What a `.pt` file would cost, found before anything of it is unpickled.
+//! Cost of a `.pt` file in memory, found before anything of it is unpickled.
 //!
-//! A pickle is a program for a stack machine: a byte of it makes a value of a hundred bytes, a few bytes copy everything
-//! made so far, and compression makes the program itself a thousand times smaller. This walks through the program without
-//! making its values and adds up what they would take. A program that is malformed is left to the reader, which stops at
-//! the same place.
+//! A pickle is a program for a stack machine: a byte of it makes a value of a hundred bytes, a few bytes copy
+//! everything made so far, and compression makes the program itself a thousand times smaller. This module walks through
+//! the program without making its values and adds up what they would take. A program that is malformed is left to the
+//! reader, which stops at the same place.
 
 use std::collections::HashMap;
 use std::fs::File;
@@ -17,12 +17,13 @@ const MAX_COST: u64 = 64 << 20;
 const MAX_NAMES: u64 = 16 << 20;
 /// Most bytes of a compressed entry once it is unpacked. `torch.save` does not compress.
 const MAX_UNPACKED: u64 = 64 << 20;
-/// What a value is taken to cost beside its text: more than it does, with the spare room of growing lists and tables.
+/// Bytes that a value is taken to cost beside its text: more than it does, with the spare room of growing lists and
+/// tables.
 const VALUE: u64 = 256;
 /// Longest position in a list, as part of a tensor's name.
 const POSITION: u64 = 20;
 
-/// What old files without a zip begin with, within this many bytes.
+/// Bytes at the start of an old file, without a zip, that hold [`LEGACY_MAGIC`].
 const LEGACY_WINDOW: usize = 64;
 const LEGACY_MAGIC: [&[u8]; 2] =
     [&[0x6c, 0xfc, 0x9c, 0x46, 0xf9, 0x20, 0x6a, 0xa8, 0x50, 0x19], b"119547037146038801333356"];
@@ -91,7 +92,7 @@ fn zip(file: File) -> Result<(), String> {
     Ok(())
 }
 
-/// What a value is, as far as its cost goes.
+/// Properties of a value that its cost depends on.
 #[derive(Clone, Copy, Default)]
 struct Weight {
     /// Bytes in memory.
@@ -102,7 +103,7 @@ struct Weight {
     names: u64,
     /// Length, if it is a text.
     text: u64,
-    /// Where it is kept for later.
+    /// Number under which the program keeps it for later.
     memo: Option<u32>,
 }
 

@@ -1,4 +1,4 @@
-//! What can be wrong with a `.pt` file.
+//! Faults of a `.pt` file.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ pub enum PtError {
     Io {
         /// The file.
         file: PathBuf,
-        /// What was tried.
+        /// Failed action, as the message begins.
         what: &'static str,
         /// The system's reason.
         source: std::io::Error,
@@ -20,7 +20,7 @@ pub enum PtError {
     Damaged {
         /// The file.
         file: PathBuf,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
     /// The file is not what `torch.save` writes for a dict.
@@ -28,7 +28,7 @@ pub enum PtError {
     NotADict {
         /// The file.
         file: PathBuf,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
     /// The file would take more memory than a dict of tensors needs.
@@ -36,7 +36,7 @@ pub enum PtError {
     TooLarge {
         /// The file.
         file: PathBuf,
-        /// What it asks for.
+        /// Demand of the file that is too large.
         reason: String,
     },
     /// The dict has no such key.
@@ -78,7 +78,7 @@ pub enum PtError {
         file: PathBuf,
         /// The key asked for.
         key: String,
-        /// What was found.
+        /// Reason, as the message ends.
         reason: String,
     },
     /// A tensor to be written whose length does not match its shape.
@@ -111,7 +111,7 @@ impl PtError {
         }
     }
 
-    /// What to do about it.
+    /// Advice for the user.
     pub fn hint(&self) -> &'static str {
         match self {
             Self::Io { .. } => "check that the file exists and may be read, and that the disk has room",

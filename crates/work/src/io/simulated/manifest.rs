@@ -1,4 +1,4 @@
-//! What a simulated data set says about itself: that it was begun, what was asked for, and, last of all, that it is whole.
+//! Manifest of a simulated data set: that it was begun, what was asked for, and, last of all, that it is whole.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -23,7 +23,7 @@ const MOST_BYTES: u64 = 1 << 20;
 struct Manifest {
     format: String,
     version: u32,
-    /// The same for all parts: they share the CAD models.
+    /// Tools, the same for all parts: they share the CAD models.
     tools: Vec<String>,
     /// By layout.
     parts: BTreeMap<String, Part>,
@@ -31,10 +31,10 @@ struct Manifest {
 
 #[derive(Debug, Serialize, Deserialize)]
 struct Part {
-    /// Whether all of it was written.
+    /// True once all of it was written.
     finished: bool,
     pairs: usize,
-    /// What was asked for.
+    /// Recipe that was asked for.
     recipe: Value,
 }
 
@@ -150,7 +150,7 @@ fn first_entry(root: &Path) -> Result<Option<String>, WriteError> {
     Ok(names.into_iter().filter(|name| !name.starts_with('.')).min())
 }
 
-/// What is to be said about a data set whose simulation did not end.
+/// Problem of a data set whose simulation did not end.
 pub fn unfinished(root: &Path) -> Option<Problem> {
     let parts = read(root)?.parts;
     let open: Vec<String> =

@@ -1,4 +1,4 @@
-//! Where a bundle's pictures lie.
+//! Tests of the place of a bundle's pictures.
 
 use super::*;
 use touch2touch_core::rig::Rig;

@@ -9,7 +9,7 @@ use glam::{DAffine3, DMat3, DVec3};
 
 /// A true rotation stored with 32 bits is within 1e-6 of unit length, one typed with three digits within this.
 pub(super) const UNIT_TOLERANCE: f64 = 0.01;
-/// How well the conversion must be met. Stored with 32 bits it is met to 1e-6.
+/// Largest error of the recovered frame's conversion. Stored with 32 bits it is met to 1e-6.
 const TOLERANCE: f64 = 1e-3;
 /// Directions of the image's first column that are tried before refining.
 const STEPS: usize = 3600;

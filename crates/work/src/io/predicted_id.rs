@@ -1,0 +1,181 @@
+//! [`PredictedId`]: which predicted imprint, in words that stay.
+
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use super::model_id::current;
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::postprocess::ShiftMode;
+
+/// The words' version.
+const VERSION: &str = "v1";
+
+/// Values of the choices that are not named. Part of the format: a choice that is new gets a line with what was done
+/// without it, and no line ever changes.
+const UNNAMED: &str = r#"{
+    "steps": 50, "eta": 0.0, "seed": 42, "sampler": "ddim", "spacing": "trailing", "guidance": 1.0, "shift": "exact_inverse"
+}"#;
+
+/// All that decides a predicted imprint of a touch, apart from the engine: the identity of the generator's bundle, the choices
+/// of one generation, and the shift. Masks drawn on a prediction are filed under it, so it outlives versions of the program:
+/// choices are named, and those at their defaults left out, so that a new one changes no text.
+///
+/// A text that an earlier version wrote is read as what it means; one that none understands is kept as it is.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(from = "String", into = "String")]
+pub struct PredictedId(Arc<str>);
+
+impl PredictedId {
+    /// The prediction of a generator (its bundle's identity) with these choices.
+    pub fn new(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> Self {
+        // + 0.0 turns -0 into 0, which means the same.
+        let config = GenerateConfig { eta: config.eta + 0.0, guidance: config.guidance + 0.0, ..*config };
+        let mut named = object(serde_json::to_value(config));
+        named.insert("shift".into(), serde_json::to_value(shift).unwrap_or_default());
+        let unnamed = unnamed();
+        named.retain(|choice, value| unnamed.get(choice) != Some(value));
+        Self(format!("{bundle} {VERSION} {}", Value::Object(named)).into())
+    }
+
+    /// Text that is not understood, or stands for something else, as it is.
+    pub fn verbatim(text: String) -> Self {
+        Self(text.into())
+    }
+
+    /// A prediction of which nobody wrote down which one it is.
+    pub fn unknown() -> Self {
+        Self::verbatim(String::new())
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+
+    /// Bundle, choices and shift; `None` of what no version up to this one wrote.
+    pub fn parts(&self) -> Option<(&str, GenerateConfig, ShiftMode)> {
+        let (bundle, choices) = self.0.split_once(' ')?;
+        let named: Map<String, Value> = serde_json::from_str(choices.strip_prefix(VERSION)?).ok()?;
+        let mut all = unnamed();
+        for (choice, value) in named {
+            *all.get_mut(&choice)? = value;
+        }
+        let shift = serde_json::from_value(all.remove("shift")?).ok()?;
+        Some((bundle, serde_json::from_value(Value::Object(all)).ok()?, shift))
+    }
+}
+
+impl From<String> for PredictedId {
+    /// Identity from the text of a file.
+    fn from(text: String) -> Self {
+        let before_v1 = || {
+            let (bundle, choices) = text.split_once(' ')?;
+            let (config, shift) = serde_json::from_str::<(GenerateConfig, ShiftMode)>(choices).ok()?;
+            let config = GenerateConfig { eta: typed(config.eta), guidance: typed(config.guidance), ..config };
+            Some(Self::new(&current(bundle), &config, shift))
+        };
+        let by_identity = || {
+            let (bundle, choices) = text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION))?;
+            Some(Self(format!("{} {choices}", current(bundle)).into()))
+        };
+        before_v1().or_else(by_identity).unwrap_or_else(|| Self::verbatim(text))
+    }
+}
+
+impl From<PredictedId> for String {
+    fn from(id: PredictedId) -> Self {
+        id.0.as_ref().to_owned()
+    }
+}
+
+impl std::fmt::Display for PredictedId {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// The number that was typed, of one that the studio took for an `f32` before version 1.
+fn typed(value: f64) -> f64 {
+    let single = value as f32;
+    if f64::from(single) == value { single.to_string().parse().unwrap_or(value) } else { value }
+}
+
+fn unnamed() -> Map<String, Value> {
+    object(serde_json::from_str(UNNAMED))
+}
+
+fn object(value: Result<Value, serde_json::Error>) -> Map<String, Value> {
+    match value {
+        Ok(Value::Object(map)) => map,
+        other => unreachable!("choices are an object of names: {other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+    use touch2touch_core::diffusion::{Sampler, Spacing};
+
+    fn config() -> impl Strategy<Value = GenerateConfig> {
+        let sampler = prop_oneof![Just(Sampler::Ddim), Just(Sampler::Ddpm)];
+        let spacing = prop_oneof![Just(Spacing::Lab), Just(Spacing::Trailing)];
+        (1u32..1000, 0.0..=1.0f64, any::<u64>(), sampler, spacing, prop_oneof![Just(1.0), 0.0..20.0f64]).prop_map(
+            |(steps, eta, seed, sampler, spacing, guidance)| GenerateConfig {
+                steps,
+                eta,
+                seed,
+                sampler,
+                spacing,
+                guidance,
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn choices_come_back_and_every_one_counts(a in config(), b in config()) {
+            let id = |config| PredictedId::new("b0", config, ShiftMode::Raw);
+            let (bundle, back, shift) = id(&a).parts().map(|(b, c, s)| (b.to_owned(), c, s)).unwrap();
+            prop_assert_eq!((&*bundle, back, shift), ("b0", a, ShiftMode::Raw));
+            prop_assert_eq!(id(&a) == id(&b), a == b);
+            let again = PredictedId::from(id(&a).to_string());
+            prop_assert_eq!(again, id(&a));
+        }
+    }
+
+    #[test]
+    fn defaults_are_left_out_and_each_choice_has_one() {
+        let defaults: GenerateConfig = serde_json::from_value(Value::Object(unnamed())).unwrap();
+        let plain = PredictedId::new("b0", &defaults, ShiftMode::ExactInverse);
+        assert_eq!(plain.as_str(), "b0 v1 {}");
+        let mut choices = object(serde_json::to_value(GenerateConfig::default()));
+        choices.insert("shift".into(), Value::Null);
+        assert!(choices.keys().eq(unnamed().keys()), "a new choice has its line: {choices:?}");
+        let other = GenerateConfig { steps: 2, eta: 0.1, ..defaults };
+        let id = PredictedId::new("b0", &other, ShiftMode::Raw);
+        assert_eq!(id.as_str(), r#"b0 v1 {"eta":0.1,"shift":"raw","steps":2}"#);
+    }
+
+    #[test]
+    fn what_was_written_before_means_the_same() {
+        let config = GenerateConfig { steps: 2, eta: 0.1, sampler: Sampler::Ddpm, ..GenerateConfig::default() };
+        let id = PredictedId::new("b0", &config, ShiftMode::ExactInverse);
+        // By the verbs, which had 64 bits, and by the studio, which had 32.
+        for eta in [0.1, f64::from(0.1f32)] {
+            let before = serde_json::to_string(&(GenerateConfig { eta, ..config }, ShiftMode::ExactInverse)).unwrap();
+            assert_eq!(PredictedId::from(format!("b0 {before}")), id);
+        }
+        let without_guidance = r#"b0 [{"steps":50,"eta":0.0,"seed":42,"sampler":"ddim","spacing":"trailing"},"raw"]"#;
+        let (_, config, shift) =
+            PredictedId::from(without_guidance.to_owned()).parts().map(|(b, c, s)| (b.len(), c, s)).unwrap();
+        assert_eq!((config, shift), (GenerateConfig::default(), ShiftMode::Raw));
+        for odd in ["a prediction", "", "b0 v1 {\"later\":1}", "b0 v9 {}", "b0 [1,2]", "b0 v1 []"] {
+            let kept = PredictedId::from(odd.to_owned());
+            assert_eq!((kept.as_str(), kept.parts()), (odd, None));
+        }
+    }
+}
