@@ -145,7 +145,10 @@ impl Both {
             words.push("--json");
         }
         let output = run(&words, &self.home);
-        serde_json::from_slice(&output.stdout).map_err(|_| String::from_utf8_lossy(&output.stderr).into_owned())
+        let answer = serde_json::from_slice::<Value>(&output.stdout).ok();
+        // A table of poses without a row says on standard error why.
+        let answer = answer.filter(|answer| answer["cases"].as_array().is_none_or(|cases| !cases.is_empty()));
+        answer.ok_or_else(|| String::from_utf8_lossy(&output.stderr).into_owned())
     }
 
     /// What the command of a pane answers.

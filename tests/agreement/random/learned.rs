@@ -26,6 +26,9 @@ pub(in crate::agreement) fn a_fit_is_the_same_by_button_and_verb() {
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
     let mut recipe = Draws::new(15).posed();
     (recipe.mask, recipe.shift) = (choice, ShiftMode::ExactInverse);
+    // Of hardly more than noise there is no fit.
+    let (model, config) = recipe.generator.take().unwrap();
+    recipe.generator = Some((model, GenerateConfig { steps: 1, seed: config.seed, ..GenerateConfig::default() }));
     put(&mut both.studio, &recipe);
     let words = both.words(Pane::Adapt);
     both.studio.send(AdaptCommand::Start.into());
