@@ -1,14 +1,16 @@
 //! The application model: state, commands, jobs. No window.
 //!
-//! * [`state::State`] holds everything the studio shows; views get `&State`.
+//! * [`state::State`] holds everything the studio shows, each room's part in a file of its own, with the results; views get
+//!   `&State`. [`keys`] are the plain values that results are kept under.
 //! * [`command::Command`] is what can happen to it, by room; [`apply::apply`] is the only writer and is pure:
 //!   work and files come out as [`effect::Effect`]s.
 //! * A room is a feature ([`library`], [`follow`], [`view`], [`predict`], [`seeds`], [`labels`], [`inspect`],
 //!   [`workbench`], [`evaluate`], [`export`], [`adapt`], [`train`], [`dial`], [`settings`], [`tasks`]): its file has its commands
-//!   and what they do, `state.rs` in its folder what it keeps and how views find it.
-//! * [`results`] is the table of what is computed: each kind with its recipe, its job and its look-up in one file.
+//!   and what they do.
+//! * [`recipe`] is what the settings say, with the models that are there; [`results`] says how each result is computed and
+//!   looked up.
 //! * [`pane`] is the table of the panes: titles, places, which file of the window draws each and what it needs.
-//! * [`state::State::demands`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
+//! * [`demand::demands`] lists what the visible panes need and do not have; [`runtime::Runtime`] computes that on
 //!   its lanes (files, computing, models) and answers with commands.
 //! * [`action::Action`] is the table of what a person can trigger, with its keys: menus, palette and shortcut sheet are made
 //!   from it; [`act`] turns its rows into commands.
@@ -26,7 +28,6 @@ pub mod effect;
 pub mod evaluate;
 pub mod export;
 pub mod follow;
-pub mod history;
 pub mod inspect;
 pub mod jobs;
 pub mod keys;
@@ -34,11 +35,14 @@ pub mod labels;
 pub mod library;
 pub mod pane;
 pub mod predict;
+pub mod recipe;
 pub mod results;
 pub mod runtime;
+pub mod scores;
 pub mod seeds;
 pub mod services;
 pub mod settings;
+pub mod source;
 pub mod state;
 pub mod tasks;
 pub mod train;

@@ -1,16 +1,18 @@
 //! The studio and the command line are one program: what a button does, a verb does, and with the same numbers.
 
+mod edits;
 mod exchange;
 mod in_3d;
 mod influence;
 mod proposals;
+mod random;
 mod recipes;
+mod verbs;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
-use touch2touch::app::settings::prefer;
 
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
@@ -27,8 +29,10 @@ use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskChoice, MaskSettings, MaskSource, MaskTool, Versus, VersusMode};
 use touch2touch::app::state::{Lookup, State};
+use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
@@ -247,7 +251,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
         for source in ImprintSource::iter() {
             let case = poses["cases"].as_array().unwrap().iter();
             let case = case.filter(|case| case["name"] == name && case["imprint"] == source.key()).collect::<Vec<_>>();
-            let Lookup::Ready(pose) = state.pose(source) else {
+            let Lookup::Ready(pose) = results::pose(state, source) else {
                 assert!(
                     case.is_empty() || case[0]["angle_deg"].is_null(),
                     "{name} {source:?}: only the verb has a pose"
@@ -262,7 +266,7 @@ fn assert_same(place: Place, path: &str, home: &Path, pairs: usize) -> BTreeMap<
             *compared.entry(case[0]["mask"].as_str().unwrap().to_owned()).or_default() += 1;
         }
         for finger in state.rig().pads() {
-            let Lookup::Ready(found) = state.comparison(finger) else { continue };
+            let Lookup::Ready(found) = results::comparison(state, finger) else { continue };
             let key = state.finger_name(finger).to_string();
             let row = generated["pairs"].as_array().unwrap().iter();
             let row = row.filter(|row| row["name"] == name && row["finger"] == key.as_str()).collect::<Vec<_>>();
@@ -328,7 +332,7 @@ fn two_predictions_are_compared_by_one_function() {
             ("b", [&versus.b, &Subject::Measured]),
             ("a_b", [&versus.a, &versus.b]),
         ] {
-            let found = state.subjects_compared(one, other, pad).ready().expect(key);
+            let found = results::subjects_compared(state, one, other, pad).ready().expect(key);
             let seen = found.split.and_then(|split| split.seen.mae);
             assert_eq!(finger[key]["psnr_db"], optional(found.psnr_db), "{key}");
             assert_eq!(finger[key]["ssim"], optional(found.ssim), "{key}");
@@ -337,7 +341,7 @@ fn two_predictions_are_compared_by_one_function() {
         }
     }
     for (key, subject) in [("a_deg", &versus.a), ("b_deg", &versus.b)] {
-        let pose = state.subject_pose(subject).expect("a pose");
+        let pose = results::subject_pose(state, subject).expect("a pose");
         assert_eq!(report["poses"][key], number(pose.angle_rad.to_degrees()), "{key}");
     }
 }
@@ -526,7 +530,7 @@ fn a_dial_does_the_same_in_both() {
     {
         studio.send(DialCommand::Choose(dial).into());
         studio.send(DialCommand::Range(range, count).into());
-        let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+        let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
         studio.send(DialCommand::Start.into());
         let found = studio.state.dial.result.clone().expect("the dial was turned");
         let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
@@ -541,7 +545,7 @@ fn a_dial_does_the_same_in_both() {
     let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs[1].name.clone();
     studio.send(LibraryCommand::SetFilter(listed.clone()).into());
     studio.send(DialCommand::Over(DialPairs::Listed).into());
-    let words = studio.state.equivalent_words(Pane::Dial, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
     studio.send(DialCommand::Start.into());
     let found = studio.state.dial.result.clone().expect("the dial was turned");
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
@@ -555,14 +559,14 @@ fn a_dial_does_the_same_in_both() {
     studio.send(DialCommand::Use(Dial::Gate.parse("0.6").unwrap()).into());
     studio.send(DialCommand::Use(Dial::Threshold.parse("4").unwrap()).into());
     studio.predict(0);
-    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
     for said in ["--engine distance_field:gate=0.6", "--mask threshold --threshold-mm 4"] {
         assert!(words.join(" ").contains(said), "{words:?}");
     }
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
     let report = json(&words, home.path());
     for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
-        let shown = studio.state.pose(source).ready().unwrap();
+        let shown = results::pose(&studio.state, source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
@@ -579,7 +583,7 @@ fn every_pane_says_a_command_that_the_program_understands() {
             let choice = MaskChoice { source, ..MaskChoice::default() };
             studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
             for pane in Pane::iter() {
-                let Some(words) = studio.state.equivalent_words(pane, 0.004) else { continue };
+                let Some(words) = export::equivalent_words(&studio.state, pane, 0.004) else { continue };
                 said += 1;
                 if let Err(err) = touch2touch::headless::check_command(&words) {
                     panic!("{pane:?}: {words:?}: {err}");
@@ -592,18 +596,18 @@ fn every_pane_says_a_command_that_the_program_understands() {
     studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
     studio.send(prefer(|s| s.mask = MaskSettings::default()).into());
     studio.predict(3);
-    let words = studio.state.equivalent_words(Pane::Metrics, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
     let report = json(&words, home.path());
     for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
-        let shown = studio.state.pose(source).ready().unwrap();
+        let shown = results::pose(&studio.state, source).ready().unwrap();
         assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
 
 /// The value of an option in the command of a pane.
 fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
-    let words = studio.state.equivalent_words(pane, 0.004)?;
+    let words = export::equivalent_words(&studio.state, pane, 0.004)?;
     touch2touch::headless::check_command(&words).unwrap();
     let at = words.iter().position(|word| word == option)?;
     words.get(at + 1).cloned()
@@ -633,52 +637,5 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), Some(listed.join(",")));
     // Nothing is marked done: there is nothing to fit, and no command for it.
     studio.send(AdaptCommand::Choose(AdaptPairs::Done).into());
-    assert_eq!(studio.state.equivalent_words(Pane::Adapt, 0.004), None);
-}
-
-#[test]
-fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = lab_folder(home.path());
-    let path = folder.to_str().unwrap();
-    let name = name_of(&json(&["pose", path], home.path()), 0);
-    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
-    let mask = MaskSettings { tool: MaskTool::Polygon, wand_m: 0.0004, clean_mm: 1.5, ..MaskSettings::default() };
-    let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
-    let mask = MaskSettings { choice, ..mask };
-    studio.send(prefer(move |s| s.mask = mask.clone()).into());
-    let finger = lab::RIGHT;
-    let begin = |at_px, erase| LabelsCommand::BeginStroke { finger, source: ImprintSource::Measured, at_px, erase };
-    studio.send(begin([20.0, 20.0], false).into());
-    for corner in [[60.5, 25.0], [50.0, 70.0]] {
-        studio.send(LabelsCommand::Corner(corner).into());
-    }
-    studio.send(LabelsCommand::EndStroke.into());
-    studio.send(prefer(|s| s.mask.tool = MaskTool::Wand).into());
-    studio.send(begin([87.0, 70.0], true).into());
-    studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
-    studio.send(LabelsCommand::EndStroke.into());
-    studio.send(LabelsCommand::CleanUp(studio.state.settings.mask.clean_up(CleanKind::Smooth)).into());
-    let drawn = studio.state.drawn_mask(ImprintSource::Measured, finger).unwrap().mask.clone();
-    drop(studio);
-    let stored =
-        || Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap().measured(finger).unwrap().mask.clone();
-    assert_eq!(stored(), drawn, "on the disk");
-    let begun = ["label", path, "--pair", &name, "--finger", "right", "--mask", "threshold"];
-    json(&[&begun[..], &["--remove-mask"]].concat(), home.path());
-    let polygon = r#"{"tool": "polygon", "paint": "contact", "points": [[20, 20], [60.5, 25], [50, 70], [50, 70]]}"#;
-    let wand = r#"{"tool": "wand", "tolerance_m": 0.0004, "paint": "free", "points": [[87, 70], [99, 70]]}"#;
-    let draw = ["--draw", polygon, "--draw", wand, "--clean", "smooth=1.5"];
-    json(&[&begun[..], &draw[..]].concat(), home.path());
-    assert_eq!(stored(), drawn, "by the verb");
-    assert!(drawn.as_slice().contains(&true));
-    // The mask of a prediction is another one, until it is taken over.
-    let of_prediction = ["--imprint", "predicted", "--from", "measured", "--steps", "1"];
-    let labeled = json(&[&begun[..], &of_prediction[..]].concat(), home.path());
-    let pair = &labeled["pairs"][0];
-    assert_eq!((pair["masks"].as_array().unwrap().len(), pair["predicted"].as_array().unwrap().len()), (1, 1));
-    let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
-    let taken = labels.masks.iter().find(|(place, _)| place.of.source() == ImprintSource::Predicted).unwrap();
-    assert_eq!(taken.1.mask, drawn);
-    assert!(taken.1.base().contains("measured"), "{}", taken.1.base());
+    assert_eq!(export::equivalent_words(&studio.state, Pane::Adapt, 0.004), None);
 }

@@ -13,7 +13,6 @@ mod whole;
 
 use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
-use touch2touch::app::settings::prefer;
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{
@@ -22,8 +21,10 @@ use touch2touch::app::command::{
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Level;
+use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 
@@ -40,12 +41,15 @@ fn from_opening_to_the_figures() {
     let mut bench = Bench::open();
     assert_eq!(bench.state.library.order.len(), 12);
     assert_eq!(bench.state.pair_name(), "tool_a/data_0", "the first pair is shown at once");
-    assert!(matches!(bench.state.imprint(ImprintSource::Measured, RIGHT), Lookup::Waiting));
+    assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Waiting));
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Error, Pane::Metrics]));
     bench.settle();
     assert!(bench.state.tasks.is_idle());
-    assert_eq!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
-    assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Absent(Absent::NoPrediction)));
+    assert_eq!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
+    assert!(matches!(
+        results::imprint(&bench.state, ImprintSource::Predicted, RIGHT),
+        Lookup::Absent(Absent::NoPrediction)
+    ));
     bench.send(PredictCommand::Generate);
     let task = bench.state.tasks.running.values().next().unwrap();
     assert_eq!(
@@ -55,10 +59,10 @@ fn from_opening_to_the_figures() {
     );
     bench.settle();
     assert_eq!((bench.services.generated(), bench.services.batches.load(Ordering::Relaxed)), (2, 1));
-    let recipe = bench.state.chosen(RIGHT).unwrap().clone();
-    assert_eq!(recipe.seed, 42);
-    assert_eq!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
-    let comparison = bench.state.comparison(RIGHT).ready().unwrap();
+    let recipe = results::chosen(&bench.state, RIGHT).unwrap().clone();
+    assert_eq!(recipe.config.seed, 42);
+    assert_eq!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
+    let comparison = results::comparison(&bench.state, RIGHT).ready().unwrap();
     assert!(comparison.psnr_db.is_some_and(f64::is_finite) && comparison.mae_m > 0.0);
     // The same recipe again is there already.
     let runs = bench.services.generated();
@@ -68,13 +72,13 @@ fn from_opening_to_the_figures() {
     // Another range mapping needs no model.
     bench.send(prefer(|s| s.shift = ShiftMode::Raw));
     bench.settle();
-    assert!(bench.state.comparison(RIGHT).ready().is_some());
+    assert!(results::comparison(&bench.state, RIGHT).ready().is_some());
     assert_eq!(bench.services.generated(), runs);
     // A bundle without statistics has no paper shift: the pane says so, the log does not repeat it.
     let errors = bench.errors();
     bench.send(prefer(|s| s.shift = ShiftMode::PaperShift));
     bench.settle();
-    assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Failed(_)));
+    assert!(matches!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT), Lookup::Failed(_)));
     assert_eq!(bench.errors(), errors);
 }
 
@@ -84,7 +88,7 @@ fn what_is_not_on_screen_is_not_computed() {
     bench.settle();
     assert_eq!(bench.services.source.loads(), 0, "no pane, no work");
     bench.send(panes(&[Pane::Log, Pane::Settings]));
-    assert!(bench.state.demands().is_empty());
+    assert!(demand::demands(&bench.state).is_empty());
     bench.send(panes(&[Pane::GelDifference]));
     bench.settle();
     let loaded = bench.services.source.loads();
@@ -109,11 +113,11 @@ fn a_late_result_lands_under_its_own_key() {
     let first = bench.state.pair_key().unwrap();
     bench.send(LibraryCommand::Step(1));
     bench.settle();
-    assert!(bench.state.chosen(RIGHT).is_none(), "the pair now shown has no prediction");
-    assert!(bench.state.shown(first.finger(RIGHT)).is_some());
+    assert!(results::chosen(&bench.state, RIGHT).is_none(), "the pair now shown has no prediction");
+    assert!(results::shown(&bench.state, first.finger(RIGHT)).is_some());
     bench.send(LibraryCommand::Step(-1));
     bench.settle();
-    assert!(bench.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
+    assert!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().is_some());
     // Of a data set that is not open any more nothing is kept.
     bench.send(PredictCommand::GenerateNewSeed);
     bench.send(LibraryCommand::Reload);
@@ -183,14 +187,14 @@ fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     assert_eq!(bench.errors(), 1);
-    assert!(matches!(bench.state.imprint(ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
+    assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Failed(_)));
     bench.settle();
     assert_eq!((bench.errors(), bench.services.source.loads_of(1)), (1, 1));
     assert!(bench.services.source.loads() > loads, "the neighbors are loaded all the same");
     bench.services.source.heal();
     bench.send(TasksCommand::Retry);
     bench.settle();
-    assert!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().is_some());
+    assert!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().is_some());
 }
 
 #[test]
@@ -203,7 +207,7 @@ fn a_panic_in_a_job_is_caught_and_the_lane_goes_on() {
     assert_eq!(bench.errors(), 1);
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
-    assert!(bench.state.imprint(ImprintSource::Measured, RIGHT).ready().is_some());
+    assert!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().is_some());
     bench.send(PredictCommand::Generate);
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());

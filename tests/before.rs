@@ -8,6 +8,7 @@ use sha2::{Digest as _, Sha256};
 use touch2touch::app::command::{Command, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
+use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
@@ -75,11 +76,11 @@ fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
     runtime
         .tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::ScenePredicted].into()))]);
     runtime.settle(&mut state);
-    let shown = state.chosen(lab::RIGHT).expect("it is predicted by itself");
-    assert_eq!((shown.steps, shown.config().eta, state.outdated(lab::RIGHT)), (2, 0.1, None));
-    assert!(state.drawn_mask(ImprintSource::Predicted, lab::RIGHT).is_some());
-    assert!(state.by_hand(ImprintSource::Predicted).is_some());
-    state.accepted_elsewhere().len()
+    let shown = results::chosen(&state, lab::RIGHT).expect("it is predicted by itself");
+    assert_eq!((shown.config.steps, shown.config.eta, results::outdated(&state, lab::RIGHT)), (2, 0.1, None));
+    assert!(results::drawn_mask(&state, ImprintSource::Predicted, lab::RIGHT).is_some());
+    assert!(results::by_hand(&state, ImprintSource::Predicted).is_some());
+    results::accepted_elsewhere(&state).len()
 }
 
 #[test]

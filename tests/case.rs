@@ -6,10 +6,11 @@ use std::sync::Arc;
 use touch2touch::app::command::{Command, Pane, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
-use touch2touch::app::results::shown::Why;
+use touch2touch::app::results::Why;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
+use touch2touch::app::{export, results};
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -110,23 +111,26 @@ fn a_case_of_a_model_of_ones_own_is_the_same_where_that_model_is_not() {
 
     // It brings its model: predicted again, with the same result.
     let state = studio(&file, there.path());
-    let shown = state.chosen(lab::RIGHT).expect("it is predicted");
-    assert_eq!((state.made_with(shown).as_str(), state.outdated(lab::RIGHT)), ("mine · 1 step · seed 42", None));
-    assert!(state.case_lacks().is_empty());
-    assert_eq!(bits(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
+    let shown = results::chosen(&state, lab::RIGHT).expect("it is predicted");
+    assert_eq!(
+        (state.library.made_with(shown).as_str(), results::outdated(&state, lab::RIGHT)),
+        ("mine · 1 step · seed 42", None)
+    );
+    assert!(export::case_lacks(&state).is_empty());
+    assert_eq!(bits(results::imprint(&state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
 
     // Without it the case's own imprint is shown, said to be, and nothing of the model that ships.
     let lean = without_models(&file);
     let state = studio(&lean, there.path());
-    let outdated = state.outdated(lab::RIGHT).expect("it cannot be made here");
+    let outdated = results::outdated(&state, lab::RIGHT).expect("it cannot be made here");
     assert_eq!((outdated.made_with.as_str(), outdated.why), ("mine · 1 step · seed 42", Why::Held));
-    assert_eq!(bits(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
-    assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "it is posed as it was");
-    assert!(state.can_generate().is_err(), "nothing else is generated in its place");
+    assert_eq!(bits(results::imprint(&state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap()), bits(held));
+    assert!(results::pose(&state, ImprintSource::Predicted).ready().is_some(), "it is posed as it was");
+    assert!(results::can_generate(&state).is_err(), "nothing else is generated in its place");
     assert!(
-        matches!(&state.case_lacks()[..], [one] if one.contains("generator mine is not")),
+        matches!(&export::case_lacks(&state)[..], [one] if one.contains("generator mine is not")),
         "{:?}",
-        state.case_lacks()
+        export::case_lacks(&state)
     );
     let opened = open(&lean, there.path()).unwrap();
     let err = check(&opened, &opened.bundles(), &Models::new(None), &JobCx::unwatched()).unwrap_err();

@@ -230,8 +230,11 @@ fn a_prediction_is_found_again_after_a_restart_and_never_for_another_image() {
     let (a, b) = (image(0.0), image(1.0));
     let services = start();
     let info = bundle(&services);
-    let recipe = |finger, seed| {
-        PredictionKey::new(touch(finger), info.id.clone(), EngineChoice::Rten, &GenerateConfig { seed, ..config() })
+    let recipe = |finger, seed| PredictionKey {
+        touch: touch(finger),
+        bundle: info.id.clone(),
+        config: GenerateConfig { seed, ..config() },
+        runtime: EngineChoice::Rten,
     };
     let item = |seed, difference| GenerateInput { difference, seed, size: [0, 0] };
     assert!(services.stored(std::slice::from_ref(&info), EngineChoice::Rten, touch(lab::RIGHT), &a).is_empty());

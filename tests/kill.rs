@@ -16,7 +16,6 @@ use std::process::{Command as Process, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use touch2touch::app::settings::prefer;
 
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -27,9 +26,11 @@ use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::{DrawnMask, MaskPlace, PairLabels, Review};
 use touch2touch::app::library::Place;
+use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::live::{LiveSource, open_source};
 use touch2touch::app::services::{DataSource, Services};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Settings};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch_core::contact::ContactMask;
@@ -261,8 +262,8 @@ fn start(mut runtime: Runtime, folder: &Path) -> (Runtime, State) {
 /// Whether the selected pair can be drawn on: everything a stroke starts from is there.
 fn ready(state: &State) -> bool {
     let known = |finger| {
-        let mask = state.mask_in_force(ImprintSource::Measured, finger);
-        let imprint = state.imprint(ImprintSource::Measured, finger).ready().is_some();
+        let mask = results::mask_in_force(state, ImprintSource::Measured, finger);
+        let imprint = results::imprint(state, ImprintSource::Measured, finger).ready().is_some();
         imprint && !matches!(mask, Err(Lookup::Waiting | Lookup::Stale(_)))
     };
     state.entry().is_some() && state.document.is_editable(state.pair_name()) && lab::PADS.into_iter().all(known)

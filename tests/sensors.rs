@@ -14,6 +14,7 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Level;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::Picture;
 use touch2touch_core::rig::{PadId, Rig, SensorKind, lab};
@@ -55,7 +56,7 @@ fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -
     let mut asked = false;
     while !done(&state) {
         assert!(begin.elapsed().as_secs() < 120, "{:?}", state.log.entries);
-        let ready = !asked && state.sample().ready().is_some() && !state.library.bundles.is_empty();
+        let ready = !asked && results::sample(&state).ready().is_some() && !state.library.bundles.is_empty();
         asked |= ready;
         runtime.tick(&mut state, if ready { vec![Command::Predict(PredictCommand::Generate)] } else { Vec::new() });
         std::thread::sleep(std::time::Duration::from_millis(2));
@@ -106,21 +107,22 @@ fn the_reverse_direction_goes_through_every_verb() {
 fn the_studio_shows_a_predicted_color_picture() {
     let home = tempfile::tempdir().unwrap();
     let name = "Tiny generator from Soft Bubble to GelSlim";
-    let shown = |state: &State| state.predicted_color(lab::RIGHT).is_some_and(|lookup| lookup.ready().is_some());
+    let shown =
+        |state: &State| results::predicted_color(state, lab::RIGHT).is_some_and(|lookup| lookup.ready().is_some());
     let state = studio(Place::Demo, name, home.path(), shown);
-    let picture = state.predicted_color(lab::RIGHT).unwrap().ready().unwrap();
+    let picture = results::predicted_color(&state, lab::RIGHT).unwrap().ready().unwrap();
     assert_eq!(picture.size(), lab::GELSLIM.size());
     // The same as the generator itself makes of the imprint.
     let mut generator =
         Generator::open(&Bundle::open(&bundle("bubble_to_gelslim")).unwrap(), EngineChoice::Auto).unwrap();
-    let condition = state.touch(lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
-    let config = state.chosen(lab::RIGHT).unwrap().config();
+    let condition = results::touch(&state, lab::RIGHT).ready().unwrap().picture(lab::BUBBLE_ID).unwrap();
+    let config = results::chosen(&state, lab::RIGHT).unwrap().config;
     let raw = generator.generate(&condition, &config, &mut |_| std::ops::ControlFlow::Continue(())).unwrap();
     assert_eq!(generator.picture(&raw, ShiftMode::default()), Ok(Picture::Color(picture.clone())));
     for absent in [
-        state.imprint(ImprintSource::Predicted, lab::RIGHT).without::<()>(),
-        state.comparison(lab::RIGHT).without(),
-        state.ledger(lab::RIGHT).without(),
+        results::imprint(&state, ImprintSource::Predicted, lab::RIGHT).without::<()>(),
+        results::comparison(&state, lab::RIGHT).without(),
+        results::ledger(&state, lab::RIGHT).without(),
     ] {
         assert!(matches!(absent, Lookup::Absent(Absent::PredictsColor)), "{absent:?}");
     }
@@ -185,11 +187,11 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     }
     // The studio takes the one bundle that fits, though another is named, and shows the prediction.
     let name = "Tiny generator of the tests";
-    let shown = |state: &State| state.imprint(ImprintSource::Predicted, thumb).ready().is_some();
+    let shown = |state: &State| results::imprint(state, ImprintSource::Predicted, thumb).ready().is_some();
     let state = studio(Place::Path(PathBuf::from(&set)), name, &home, shown);
-    assert_eq!(state.bundle(BundleKind::Generator).unwrap().name, "Tiny generator from DIGIT to Soft Bubble");
+    assert_eq!(recipe::bundle(&state, BundleKind::Generator).unwrap().name, "Tiny generator from DIGIT to Soft Bubble");
     let misfits = state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator && !b.fits(&state.rig()));
     assert!(misfits.count() >= 2, "those of the lab's sensors");
     assert_eq!((state.finger_name(thumb).as_ref(), state.fingers()), ("thumb", vec![thumb]));
-    assert_eq!(state.imprint(ImprintSource::Predicted, thumb).ready().unwrap().size(), [175, 140]);
+    assert_eq!(results::imprint(&state, ImprintSource::Predicted, thumb).ready().unwrap().size(), [175, 140]);
 }

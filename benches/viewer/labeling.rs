@@ -6,9 +6,10 @@ use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use serde_json::json;
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::results::Results;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
+use touch2touch::app::state::results::Results;
 use touch2touch_core::catalog;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::sim;
@@ -72,7 +73,7 @@ pub(super) fn strokes() -> std::io::Result<serde_json::Value> {
         studio.send(prefer(|s| s.mask.tool = MaskTool::Brush));
         studio.send(prefer(move |s| s.mask.radius_px = radius_px));
         let state = studio.harness.state().state();
-        let imprint = state.imprint(ImprintSource::Measured, state.selection.finger);
+        let imprint = results::imprint(state, ImprintSource::Measured, state.selection.finger);
         let size = imprint.ready().map_or([0, 0], |imprint| imprint.size());
         let Some(place) = canvas(&studio) else {
             return Err(std::io::Error::other("the imprint is not on screen"));
@@ -126,7 +127,7 @@ pub(super) fn paging() -> std::io::Result<serde_json::Value> {
     let mut studio = Studio::on(Some(folder.path().to_owned()), false, false)?;
     let felt = |studio: &Studio| {
         let state = studio.harness.state().state();
-        state.imprint(ImprintSource::Measured, state.selection.finger).ready().is_some()
+        results::imprint(state, ImprintSource::Measured, state.selection.finger).ready().is_some()
     };
     studio.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
     studio.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));

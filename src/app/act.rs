@@ -1,6 +1,5 @@
-//! What the rows of actions say: the command that an [`Action`] is now.
+//! The words of the rows of actions: the command that an [`Action`] is now.
 
-use super::settings::prefer;
 use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
@@ -9,16 +8,20 @@ use super::command::{
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
     UiRequest, ViewCommand, WorkbenchCommand,
 };
-use super::export::state::Output;
-use super::inspect::state::Inspected;
-use super::keys::{ImprintSource, Request, ShiftMode};
-use super::labels::state::Review;
-use super::library::state::Place;
-use super::settings::state::scene::{LayerLook, SceneLayer, SceneLook};
-use super::settings::state::{ColorRange, MaskTool, Workspace};
+use super::keys::{ImprintSource, ShiftMode};
+use super::pane::Workspace;
+use super::settings::prefer;
+use super::state::export::Output;
+use super::state::inspect::Inspected;
+use super::state::labels::Review;
+use super::state::library::Place;
+use super::state::results::Request;
+use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
+use super::state::settings::{ColorRange, MaskTool};
+use super::state::tasks::TaskKind;
+use super::state::workbench::{SceneTool, Section};
 use super::state::{Absent, State};
-use super::tasks::state::TaskKind;
-use super::workbench::state::{SceneTool, Section};
+use super::{adapt, dial, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 
@@ -66,22 +69,22 @@ fn ui(request: UiRequest) -> Option<Command> {
     does(ViewCommand::Ui(request))
 }
 
-/// Where a data set is open.
+/// The command, where a data set is open.
 fn opened(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.library.open.is_some(), command)
 }
 
-/// Where the list has pairs.
+/// The command, where the list has pairs.
 fn listed(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(!state.library.order.is_empty(), command)
 }
 
-/// Where a pair is selected.
+/// The command, where a pair is selected.
 fn of_pair(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.entry().is_some(), command)
 }
 
-/// Where the labels of the selected pair can be changed.
+/// The command, where the labels of the selected pair can be changed.
 fn editable(state: &State, command: impl Into<Command>) -> Option<Command> {
     when(state.document.is_editable(state.pair_name()), command)
 }
@@ -115,10 +118,10 @@ fn follow(state: &State) -> Option<Command> {
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 
-/// Whether the mask of the active finger was corrected.
+/// True where the mask of the active finger was corrected.
 fn is_corrected(state: &State) -> bool {
     let finger = state.selection.finger;
-    state.drawn_mask(state.worked_on(finger), finger).is_some()
+    results::drawn_mask(state, results::worked_on(state, finger), finger).is_some()
 }
 
 /// The shifts, one after the other; the refit, where there is one, comes after the last of the others.
@@ -135,7 +138,7 @@ fn next_shift(state: &State) -> Option<Command> {
 fn cancel(state: &State) -> Option<Command> {
     if state.document.stroke.is_some() {
         does(LabelsCommand::CancelStroke)
-    } else if state.proposes() {
+    } else if results::proposes(state) {
         does(ViewCommand::Propose(false))
     } else if let Some(command) = escape(state) {
         does(command)
@@ -143,7 +146,7 @@ fn cancel(state: &State) -> Option<Command> {
         does(InspectCommand::StopBasin)
     } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
         does(LibraryCommand::Brush(None))
-    } else if state.seeds_to_come() > 0 {
+    } else if state.tasks.seeds_to_come() > 0 {
         does(SeedsCommand::Run(false))
     } else {
         when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
@@ -152,20 +155,20 @@ fn cancel(state: &State) -> Option<Command> {
 
 /// Accepts the proposal that is shown, or else the pose in hand.
 fn accept_shown(state: &State) -> Option<Command> {
-    if state.proposes() {
+    if results::proposes(state) {
         return editable(state, LabelsCommand::AcceptProposal);
     }
     editable(state, WorkbenchCommand::AcceptHand).filter(|_| state.workbench.hand.is_some())
 }
 
-/// Whether the measured imprints of all pairs can be scored now.
+/// True where the measured imprints of all pairs can be scored now.
 fn can_rank(state: &State) -> bool {
-    state.scores_key().is_some() && state.running(TaskKind::Evaluate).is_none()
+    results::scores_key(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
 
-/// Whether the pose tool is in hand and there is a tool to be moved.
+/// True where the pose tool is in hand and there is a tool to be moved.
 fn in_hand(state: &State) -> bool {
-    state.workbench.tool == SceneTool::Pose && state.tool().ready().is_some()
+    state.workbench.tool == SceneTool::Pose && results::tool(state).ready().is_some()
 }
 
 /// Takes a tool of the 3D panes, or puts it away.
@@ -178,7 +181,7 @@ fn nudge(state: &State, axis: PoseAxis, steps: f64) -> Option<Command> {
     when(in_hand(state), WorkbenchCommand::Nudge(axis, steps * axis.step()))
 }
 
-/// What Escape gives up in the 3D panes: the pose in hand, then a measurement, then the point read.
+/// The command of Escape in the 3D panes: it gives up the pose in hand, then a measurement, then the point read.
 fn escape(state: &State) -> Option<WorkbenchCommand> {
     let bench = &state.workbench;
     if bench.hand.is_some() {
@@ -194,19 +197,19 @@ fn escape(state: &State) -> Option<WorkbenchCommand> {
 
 /// A command of the time machine, where it is on screen and shows a step for which it can do something.
 fn inspect(state: &State, useful: impl Fn(Inspected<'_>) -> bool, command: InspectCommand) -> Option<Command> {
-    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| state.inspected())??;
+    let shown = state.selection.panes.contains(&Pane::TimeMachine).then(|| results::inspected(state))??;
     when(useful(shown), command)
 }
 
 /// Asks where the cloud, pose and mesh of an imprint go, where there is a cloud.
 fn export(state: &State, source: ImprintSource) -> Option<Command> {
-    when(state.pair_export(source).is_some(), ExportCommand::Place(Output::Pair(source)))
+    when(export::pair_export(state, source).is_some(), ExportCommand::Place(Output::Pair(source)))
 }
 
 /// Accepts the pose shown, or withdraws it if it is the accepted one.
 fn accept(state: &State, source: ImprintSource) -> Option<Command> {
-    let shown = state.pose(source).ready()?.grasp_from_object;
-    let accepted = state.accepted(source);
+    let shown = results::pose(state, source).ready()?.grasp_from_object;
+    let accepted = results::accepted(state, source);
     let editable = state.document.is_editable(state.pair_name());
     when(editable, LabelsCommand::AcceptPose(source, accepted != Some(shown.into())))
 }

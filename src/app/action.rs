@@ -24,7 +24,7 @@ pub enum Group {
     Mask,
     /// Registration.
     Pose,
-    /// What is shown and how.
+    /// The view: what is shown, and how.
     View,
     /// Help.
     Help,
@@ -44,7 +44,7 @@ impl Group {
         }
     }
 
-    /// Its actions, in the order of the table.
+    /// The actions, in the order of the table.
     pub fn actions(self) -> impl Iterator<Item = Action> {
         Action::iter().filter(move |action| action.group() == self)
     }
@@ -66,9 +66,9 @@ macro_rules! actions {
         Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
         Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],
-            state => when(state.can_draw(), ExportCommand::Ask(!state.export.asking));
+            state => when(export::can_draw(state), ExportCommand::Ask(!state.export.asking));
         SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [],
-            state => when(state.can_draw(), ExportCommand::Place(Output::Case));
+            state => when(export::can_draw(state), ExportCommand::Place(Output::Case));
         OwnPreferences, File, "Back to my preferences", "Gives your own preferences back, while the case stays open", [],
             state => when(state.own.is_some(), ExportCommand::OwnPreferences);
         ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [],
@@ -106,23 +106,23 @@ macro_rules! actions {
             state => when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter));
 
         Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)],
-            state => when(state.can_generate().is_ok(), PredictCommand::Generate);
+            state => when(results::can_generate(state).is_ok(), PredictCommand::Generate);
         GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)],
-            state => when(state.can_generate().is_ok(), PredictCommand::GenerateNewSeed);
+            state => when(results::can_generate(state).is_ok(), PredictCommand::GenerateNewSeed);
         RunSeeds, Generate, "Several seeds", "Predicts the touch with several seeds, one after the other, or stops; shows where they disagree", [],
-            state => when(state.can_generate().is_ok() && state.selection.panes.contains(&Pane::Seeds), SeedsCommand::Run(!state.seeds_running()));
+            state => when(results::can_generate(state).is_ok() && state.selection.panes.contains(&Pane::Seeds), SeedsCommand::Run(!results::seeds_running(state)));
         LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)],
             _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
-            state => when(state.can_adapt() && state.running(TaskKind::Fit).is_none(), AdaptCommand::Start);
+            state => when(adapt::can_adapt(state) && state.tasks.of_kind(TaskKind::Fit).is_none(), AdaptCommand::Start);
         UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
-            state => when(state.fitted().is_some() && !state.uses_fit(), AdaptCommand::Use);
+            state => when(adapt::fitted(state).is_some() && !adapt::uses_fit(state), AdaptCommand::Use);
         EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [],
-            state => when(state.evaluation_setup().is_some() && state.running(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
+            state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
             state => when(can_rank(state), EvaluateCommand::All);
         TurnDial, Generate, "Turn the dial", "Poses many pairs with every value of the chosen dial (mask threshold, probability, gate, trim, shift)", [],
-            state => when(state.running(TaskKind::Dial).is_none() && state.sweep_setup().is_ok(), DialCommand::Start);
+            state => when(state.tasks.of_kind(TaskKind::Dial).is_none() && dial::setup(state).is_ok(), DialCommand::Start);
         RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [],
@@ -132,7 +132,7 @@ macro_rules! actions {
         NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)],
             state => next_shift(state);
         Refit, Generate, "Refit on this data set", "Computes shift statistics of this data set's predictions and measurements, and uses them", [],
-            state => when(state.can_generate().is_ok(), PredictCommand::Refit);
+            state => when(results::can_generate(state).is_ok(), PredictCommand::Refit);
 
         Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Brush));
@@ -187,23 +187,23 @@ macro_rules! actions {
         NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)],
             _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
         ProposeAll, Mask, "Propose for all listed", "Makes what the source proposes the mask of every pair in the list that is not marked done, flagged or skipped; hand work stays, and each pair can be undone", [],
-            state => when(state.can_propose_all(), LabelsCommand::ProposeAll);
+            state => when(labels::can_propose_all(state), LabelsCommand::ProposeAll);
         LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)],
-            state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || state.proposes());
+            state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
         TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [],
             state => editable(state, LabelsCommand::TakeOver);
         ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
         Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)],
-            state => when(state.history.next_undo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Undo);
+            state => when(state.history.next_undo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Undo);
         Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)],
-            state => when(state.history.next_redo(state.pair_name(), &state.mask_places()).is_some(), LabelsCommand::Redo);
+            state => when(state.history.next_redo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Redo);
         TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [],
             _ => ui(UiRequest::ShowPane(Pane::Train));
         StartTraining, Mask, "Start training", "Trains the mask model on the masks of pairs marked done; the new model makes the automatic masks when it is ready", [],
-            state => when(state.train_setup().is_some() && state.running(TaskKind::Train).is_none(), TrainCommand::Start);
+            state => when(train::setup(state).is_some() && state.tasks.of_kind(TaskKind::Train).is_none(), TrainCommand::Start);
         UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
-            state => when(state.trained().is_some() && !state.uses_trained(), TrainCommand::Use);
+            state => when(train::trained(state).is_some() && !train::uses_trained(state), TrainCommand::Use);
         MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)],
             _ => does(prefer(|s| s.mask_visible ^= true));
         MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)],
@@ -276,7 +276,7 @@ macro_rules! actions {
         Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [],
             state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [],
-            _ => does(prefer(|s| s.pose_engine = next_of(&s.pose_engine.by).into()));
+            _ => does(prefer(|s| s.registration = next_of(&s.registration.by).into()));
 
         LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)],
             _ => does(prefer(|s| s.range.locked ^= true));
@@ -373,7 +373,7 @@ macro_rules! define {
                 match self { $( Self::$name => $label, )* }
             }
 
-            /// What it does.
+            /// The effect, in words.
             pub fn tooltip(self) -> &'static str {
                 match self { $( Self::$name => $tooltip, )* }
             }
@@ -383,7 +383,7 @@ macro_rules! define {
                 match self { $( Self::$name => Group::$group, )* }
             }
 
-            /// Its shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
+            /// The shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
             pub fn defaults(self) -> &'static [Shortcut] {
                 match self { $( Self::$name => const { &[$($shortcut),*] }, )* }
             }
@@ -395,7 +395,7 @@ use Key as K;
 actions!(define);
 
 impl Action {
-    /// Whether it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
+    /// True where it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
     pub(crate) fn is_nudge(self) -> bool {
         matches!(
             self,

@@ -1,31 +1,34 @@
 //! The room of fitting a generator to one's own pairs.
 
-pub mod state;
-
-pub use state::AdaptPairs;
-pub(crate) use state::AdaptState;
-pub(crate) use state::TUNING_STEPS;
+pub use super::state::adapt::AdaptPairs;
+pub(crate) use super::state::adapt::{AdaptState, TUNING_STEPS};
 
 use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
-use super::services::DataSource;
+use super::keys::ImprintSource;
 use super::settings::{self, prefer};
+use super::source::DataSource;
 use super::state::State;
-use super::tasks;
-use super::tasks::state::{Level, TaskKind};
-use touch2touch_work::adapt::{self, AdaptSetup, Adapted};
-use touch2touch_work::bundles::{self, BundleInfo};
+use super::state::adapt::FOLDS;
+use super::state::tasks::{Level, TaskKind};
+use super::{recipe, tasks};
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::adapt::{self, AdaptSetup, Adapted, HeldBack};
+use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::names;
-use touch2touch_work::job::JobCx;
+use touch2touch_work::job::{Curve, JobCx};
+use touch2touch_work::labels::Review;
+use touch2touch_work::recipe::Recipe;
+use touch2touch_work::tuning::Tuning;
 
-/// What can happen to the fit.
+/// A command to the fit.
 #[derive(Clone, Copy, Debug)]
 pub enum AdaptCommand {
-    /// Which pairs are fitted.
+    /// The pairs that are fitted.
     Choose(AdaptPairs),
-    /// Whether the networks themselves are tuned as well.
+    /// True where the networks themselves are tuned as well.
     Tune(bool),
     /// With how many steps.
     Steps(u32),
@@ -45,7 +48,7 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
             state.adapt.steps = steps.clamp(*TUNING_STEPS.start(), *TUNING_STEPS.end());
         }
         AdaptCommand::Start => {
-            let (Some(setup), Some(open)) = (state.adapt_setup(), &state.library.open) else { return };
+            let (Some(setup), Some(open)) = (setup(state), &state.library.open) else { return };
             let source = open.source.clone();
             tasks::start(
                 state,
@@ -55,11 +58,11 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
             );
         }
         AdaptCommand::Keep => {
-            let Some(adapted) = state.refused_fit().cloned() else { return };
+            let Some(adapted) = state.adapt.refused().cloned() else { return };
             tasks::start(state, "Keep the fit", Fit::Refused(adapted), effects);
         }
         AdaptCommand::Use => {
-            let Some(name) = state.fitted().map(|bundle| bundle.name.clone()) else { return };
+            let Some(name) = fitted(state).map(|bundle| bundle.name.clone()) else { return };
             settings::step(state, prefer(move |s| s.generate.bundle = Some(name.clone())), effects);
         }
     }
@@ -71,7 +74,7 @@ pub enum Fit {
     New {
         /// The data.
         source: Arc<dyn DataSource>,
-        /// What to what.
+        /// The two scores, before and after.
         setup: Box<AdaptSetup>,
     },
     /// As it was done before and refused: only writes it.
@@ -121,4 +124,78 @@ impl Errand for Fit {
         }
         state.adapt.result = Some(adapted.clone());
     }
+}
+
+/// The pairs that a fit started now would take.
+pub(crate) fn pairs(state: &State) -> Box<dyn Iterator<Item = PairId> + '_> {
+    let Some(open) = &state.library.open else { return Box::new(std::iter::empty()) };
+    let pairs = &open.source.index().pairs;
+    let all = (0..pairs.len() as u32).map(PairId);
+    match state.adapt.pairs {
+        AdaptPairs::All => Box::new(all),
+        AdaptPairs::Done => {
+            Box::new(all.filter(|id| state.document.review(&pairs[id.0 as usize].name) == Review::Done))
+        }
+        AdaptPairs::Listed => Box::new(state.library.order.iter().copied()),
+    }
+}
+
+/// The generator that is fitted: the chosen one, or the one that it was fitted from.
+fn to_be_fitted(state: &State) -> Option<&BundleInfo> {
+    let chosen = recipe::bundle(state, BundleKind::Generator).ok()?;
+    match chosen.fit() {
+        Some(fit) => state.library.bundle(&fit.from_sha256),
+        None => Some(chosen),
+    }
+}
+
+/// True where there is something to fit, and pairs to fit it to.
+pub(crate) fn can_adapt(state: &State) -> bool {
+    to_be_fitted(state).is_some() && pairs(state).next().is_some()
+}
+
+/// The setup of a fit started now; `None` without data, pairs or a depth generator.
+pub fn setup(state: &State) -> Option<AdaptSetup> {
+    let bundle = to_be_fitted(state)?.clone();
+    can_adapt(state).then(|| AdaptSetup {
+        recipe: Recipe {
+            generator: Some((bundle.clone().into(), state.settings.generate.config(&bundle))),
+            ..recipe::in_force(state, ImprintSource::Predicted)
+        },
+        pairs: pairs(state).collect(),
+        folds: FOLDS,
+        tuning: state.adapt.tune.then_some(Tuning::Steps(state.adapt.steps)),
+        unfinished: None,
+        out: None,
+        force: false,
+        replace: false,
+    })
+}
+
+/// The curves of the tuning, or of the last one.
+pub(crate) fn tuning_curves(state: &State) -> &[Curve] {
+    match (state.tasks.of_kind(TaskKind::Fit), &state.adapt.result) {
+        (Some((_, task)), _) => &task.progress.curves,
+        (None, Some(result)) => &result.curves,
+        (None, None) => &[],
+    }
+}
+
+/// The chosen touch as the model drew it before and after the fit; the first one where the chosen one is not among
+/// those that were left out.
+pub fn held_back(state: &State) -> Option<&HeldBack> {
+    let all = &state.adapt.result.as_ref()?.held_back;
+    let of_pair = || all.iter().filter(|held| Some(held.pair) == state.selection.pair);
+    of_pair().find(|held| held.pad == state.selection.finger).or_else(|| of_pair().next()).or_else(|| all.first())
+}
+
+/// True where the last fit is what predicts now.
+pub(crate) fn uses_fit(state: &State) -> bool {
+    let now = recipe::bundle(state, BundleKind::Generator).ok().map(|bundle| &bundle.id);
+    fitted(state).is_some_and(|fitted| Some(&fitted.id) == now)
+}
+
+/// The bundle that was fitted to the open data set.
+pub fn fitted(state: &State) -> Option<&BundleInfo> {
+    state.library.bundle(state.adapt.bundle.as_deref()?)
 }

@@ -5,19 +5,19 @@ use std::sync::Arc;
 
 use super::effect::{Effect, Ended, NotSaved};
 use super::jobs::Lane;
-use super::keys::{DatasetSeq, Revision};
-use super::labels::state::Merged;
-use super::results::{Computed, Preview, Request};
-use super::services::Followed;
-use super::settings::state::Settings;
+use super::keys::{DatasetSeq, Preview, Revision};
+use super::source::Followed;
 use super::state::State;
-use super::tasks::state::{Level, TaskKind, Ticket};
-use super::{evaluate, export, follow, labels, library, settings, tasks, workbench};
+use super::state::labels::Merged;
+use super::state::results::{Computed, Request};
+use super::state::settings::Settings;
+use super::state::tasks::{Level, TaskKind, Ticket};
+use super::{evaluate, export, follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
 
-/// What the runtime answers.
+/// An answer of the runtime.
 #[derive(Clone, Debug)]
 pub enum Answer {
     /// A touch arrived in the followed folder.
@@ -26,7 +26,7 @@ pub enum Answer {
     Bundles(Vec<BundleInfo>, Vec<TaskError>),
     /// The settings file was read.
     SettingsLoaded(Box<Settings>, Option<TaskError>),
-    /// What the runtime was asked for because it is shown.
+    /// The demands that were handed to the runtime.
     Demanded(Vec<Request>),
     /// A result that a pane asked for, of an opening.
     Computed(DatasetSeq, Computed),
@@ -34,7 +34,7 @@ pub enum Answer {
     Previewed(Ticket, Arc<Preview>),
     /// A job is under way.
     Progressed(Ticket, Progress),
-    /// What a person started is done.
+    /// An errand is done.
     Ended(Ticket, Ended),
     /// The system was asked to show a place.
     Revealed,
@@ -74,7 +74,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         Answer::Demanded(list) => state.tasks.demanded = list,
         Answer::Computed(seq, computed) if state.library.is_open(seq) => {
             let request = computed.request();
-            computed.keep(state);
+            results::keep(computed, state);
             react(state, &request);
         }
         // One that comes after its result, or after Cancel, is too late.
@@ -82,7 +82,7 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             state.results.previews.insert(preview.recipe.touch, preview);
         }
         Answer::Progressed(ticket, progress) => {
-            if state.running(TaskKind::Evaluate).is_some_and(|(running, _)| running == ticket) {
+            if state.tasks.of_kind(TaskKind::Evaluate).is_some_and(|(running, _)| running == ticket) {
                 evaluate::progressed(state, &progress);
             }
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
@@ -132,7 +132,7 @@ fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effec
     }
 }
 
-/// What the rooms do about a result that is there now.
+/// The rooms' reaction to a result that is there now.
 fn react(state: &mut State, request: &Request) {
     match request {
         Request::Sample(key) if state.is_selected(*key) => {
@@ -173,7 +173,7 @@ fn failed_request(state: &mut State, request: Request, err: TaskError) {
     }
     // What a pane shows in place of the result is not said a second time, except what nobody would look for there.
     let awaited = matches!(&request, Request::Run(key) if workbench::run_failed(state, key));
-    if request.failed(state, &err) || awaited || err.kind == TaskErrorKind::Panicked {
+    if results::failed(&request, state, &err) || awaited || err.kind == TaskErrorKind::Panicked {
         state.log.error(&err);
     }
     state.tasks.failed.insert(request, err);

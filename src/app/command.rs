@@ -14,10 +14,10 @@ pub use super::predict::PredictCommand;
 pub use super::seeds::SeedsCommand;
 pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
+pub use super::state::view::{CameraPreset, Hover, UiRequest};
 pub use super::tasks::TasksCommand;
 pub use super::train::TrainCommand;
 pub use super::view::ViewCommand;
-pub use super::view::state::{CameraPreset, Hover, UiRequest};
 pub use super::workbench::WorkbenchCommand;
 
 macro_rules! commands {
@@ -65,6 +65,6 @@ commands! {
     Settings(SettingsCommand),
     /// To running jobs and the log.
     Tasks(TasksCommand),
-    /// What the runtime answers.
+    /// An answer of the runtime.
     Answer(Answer),
 }

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use super::jobs::Lane;
 use super::keys::{DatasetSeq, Revision};
-use super::labels::state::PairLabels;
 use super::results::preview::Onlooker;
-use super::services::{DataSource, SharedServices};
-use super::settings::state::Settings;
+use super::services::SharedServices;
+use super::source::DataSource;
 use super::state::State;
-use super::tasks::state::{TaskKind, Ticket};
-use super::view::state::UiRequest;
+use super::state::labels::PairLabels;
+use super::state::settings::Settings;
+use super::state::tasks::{TaskKind, Ticket};
+use super::state::view::UiRequest;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{Operation, Unsaved};
@@ -21,13 +22,13 @@ use touch2touch_work::labels::{Operation, Unsaved};
 pub struct LabelsToSave {
     /// The opening of the data set it is of.
     pub seq: DatasetSeq,
-    /// Its name.
+    /// The name.
     pub name: String,
     /// The number of this request.
     pub revision: Revision,
-    /// What to write.
+    /// The labels to write.
     pub labels: PairLabels,
-    /// What was done.
+    /// The deed.
     pub deed: Operation,
     /// Who draws it a second time, apart from the pair's labels; `None` for these.
     pub repeat: Option<String>,
@@ -38,7 +39,7 @@ pub struct LabelsToSave {
 pub struct NotSaved {
     /// The data set they are of.
     pub source: Arc<dyn DataSource>,
-    /// What was to be written.
+    /// The labels that were to be written.
     pub save: LabelsToSave,
     /// Why not.
     pub err: TaskError,
@@ -50,7 +51,7 @@ impl std::fmt::Debug for NotSaved {
     }
 }
 
-/// What an errand works with besides what it holds.
+/// The access of an errand to what it does not hold itself.
 pub struct Access {
     /// Files and models.
     pub services: SharedServices,
@@ -60,18 +61,18 @@ pub struct Access {
 
 /// A job that a person starts, with all that it needs. `tasks::start` lists it; the rest follows.
 pub trait Errand: Send + 'static {
-    /// What it ends with.
+    /// The value that it ends with.
     type End: Send + Sync + 'static;
 
-    /// Its row among what can be started.
+    /// The row among what can be started.
     const KIND: TaskKind;
 
-    /// What it does, for errors.
+    /// The work that it does, for errors.
     fn what(&self) -> String {
         Self::KIND.name().to_owned()
     }
 
-    /// Where it runs.
+    /// The lane that it runs on.
     fn lane(&self) -> Lane {
         Self::KIND.lane()
     }
@@ -82,22 +83,22 @@ pub trait Errand: Send + 'static {
     /// If it cannot be done, or was told to stop.
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError>;
 
-    /// What follows from its end.
+    /// The consequences of its end.
     fn ended(end: &Self::End, state: &mut State, effects: &mut Vec<Effect>);
 }
 
 /// The body of an errand.
 type Doing = Box<dyn FnOnce(&Access, &JobCx) -> Result<Ended, TaskError> + Send>;
-/// What follows from its end.
+/// The consequences of its end.
 type Follows = Arc<dyn Fn(&mut State, &mut Vec<Effect>) + Send + Sync>;
 
 /// An errand on its way to its lane.
 pub struct Started {
-    /// What it does, for errors.
+    /// The work that it does, for errors.
     pub what: String,
-    /// Where it runs.
+    /// The lane that it runs on.
     pub lane: Lane,
-    /// How.
+    /// The way.
     pub body: Doing,
 }
 
@@ -112,7 +113,7 @@ impl Started {
 /// The end of an errand.
 #[derive(Clone)]
 pub struct Ended {
-    /// What it was.
+    /// The kind.
     pub kind: TaskKind,
     follows: Follows,
 }
@@ -151,9 +152,9 @@ pub enum Effect {
     KeepLabels {
         /// The data.
         source: Arc<dyn DataSource>,
-        /// What is to be written.
+        /// The labels to be written.
         unsaved: Vec<Unsaved>,
-        /// Where to; `None` = where they wait for the next opening.
+        /// The folder; `None` = where they wait for the next opening.
         folder: Option<PathBuf>,
         /// The requests that it is the answer to.
         revisions: Vec<(String, Revision)>,

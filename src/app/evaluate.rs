@@ -1,34 +1,31 @@
 //! The room of the results table.
 
-pub mod state;
-
-pub(crate) use state::GRASPS;
-pub use state::ScoreChoice;
-pub(crate) use state::{Grade, ScoreTable, SourceScores};
+pub(crate) use super::state::evaluate::GRASPS;
+pub use super::state::evaluate::ScoreChoice;
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
-use super::services::DataSource;
+use super::source::DataSource;
 use super::state::State;
-use super::tasks;
-use super::tasks::state::{Level, TaskKind};
+use super::state::tasks::{Level, TaskKind};
+use super::{results, tasks};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::evaluate::{self, Evaluation, Setup};
 use touch2touch_work::job::{JobCx, Progress};
 use touch2touch_work::queue::measured_only;
 
-/// How often what was scored so far is looked up while all pairs are scored.
+/// The grasps after which the scores so far are looked up while all pairs are scored.
 const LOOKS: u64 = 24;
 
-/// What can happen to the results table.
+/// A command to the results table.
 #[derive(Clone, Debug)]
 pub enum EvaluateCommand {
     /// Gives a generator a row, or none.
     Choose(Arc<str>, bool),
-    /// How many grasps of each tool.
+    /// The number of grasps of each tool.
     Grasps(Option<usize>),
     /// Shows what was published, or not.
     Published(bool),
@@ -53,8 +50,8 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         }
         EvaluateCommand::Grasps(grasps) => state.table.grasps_per_tool = grasps.map(|n| n.max(1)),
         EvaluateCommand::Published(shown) => state.table.published = shown,
-        EvaluateCommand::Start => start(state, state.evaluation_setup(), "Evaluate", effects),
-        EvaluateCommand::All => start(state, state.setup_of_all(), "Predict all of", effects),
+        EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Evaluate", effects),
+        EvaluateCommand::All => start(state, results::setup_of_all(state), "Predict all of", effects),
         EvaluateCommand::Rank => rank(state, effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
@@ -72,7 +69,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
 
 /// Has the measured imprints of every pair scored.
 pub(super) fn rank(state: &mut State, effects: &mut Vec<Effect>) {
-    let setup = state.setup_of_all().map(|setup| measured_only(&setup));
+    let setup = results::setup_of_all(state).map(|setup| measured_only(&setup));
     start(state, setup, "Rank the masks of", effects);
 }
 

@@ -1,11 +1,14 @@
 //! The room of what is taken away: figures and pictures.
 
 mod command;
-pub mod state;
+mod setup;
 
-pub(crate) use state::{CaseView, ImportForm};
-pub use state::{FigureForm, Output};
-pub(crate) use state::{MOST_PAIRS, SCALES};
+pub use super::keys::ImportForm;
+pub use super::state::export::{FigureForm, Output};
+pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
+pub use command::{equivalent, equivalent_words};
+pub(crate) use setup::{CaseView, can_draw, case_setup, figure_recipes, figure_setup, picture_setup};
+pub use setup::{PairExport, case_lacks, pair_export};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -15,12 +18,12 @@ use super::jobs::Lane;
 use super::keys::{ImprintSource, PredictionKey};
 use super::labels::ImportMasks;
 use super::results::prediction::generate;
-use super::settings::state::GenerateSettings;
 use super::state::State;
-use super::tasks::state::TaskKind;
+use super::state::settings::GenerateSettings;
+use super::state::tasks::TaskKind;
+use super::state::view::UiRequest;
 use super::tasks::{self, Write};
-use super::view::state::UiRequest;
-use super::{library, predict, settings};
+use super::{library, predict, results, settings};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
@@ -32,7 +35,7 @@ use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::case_file;
 use touch2touch_work::job::JobCx;
 
-/// What can happen to what is taken away.
+/// A command to what is taken away.
 #[derive(Clone, Debug)]
 pub enum ExportCommand {
     /// Opens or closes the form of a figure.
@@ -45,7 +48,7 @@ pub enum ExportCommand {
     SetMasks(ExportChoice),
     /// Says what an import of masks from a folder or file would change; `None` asks no more.
     AskImport(Option<PathBuf>),
-    /// Whether it replaces what was painted by hand as well.
+    /// True where it replaces what was painted by hand as well.
     ImportOverHand(bool),
     /// Does it.
     Import,
@@ -78,7 +81,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         ExportCommand::Import => import(state, effects),
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
         ExportCommand::WriteCase(file, camera) => {
-            let (Some(setup), Some(open)) = (state.case_setup(&camera), &state.library.open) else { return };
+            let (Some(setup), Some(open)) = (case_setup(state, &camera), &state.library.open) else { return };
             let source = open.source.clone();
             let (what, file) = ("Save the case", ended(file, case_file::ENDING));
             let write = Write::new(Lane::Models, what, file, move |file, access, cx| {
@@ -95,7 +98,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
     }
 }
 
-/// Where a case was opened: shows its pair as it was shown when it was made, and has it predicted again.
+/// Shows the pair of a case that was opened as it was shown when it was made, and has it predicted again.
 pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     state.export.predict = false;
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
@@ -115,7 +118,7 @@ pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
     let recipe = &case.recipe;
     state.settings.shift = recipe.shift;
     state.settings.mask.choice = recipe.mask;
-    state.settings.pose_engine = recipe.registration;
+    state.settings.registration = recipe.registration;
     state.settings.runtime = recipe.engine;
     if let Some((model, config)) = &recipe.generator {
         state.settings.generate = GenerateSettings {
@@ -166,14 +169,14 @@ pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
     let (pair, runtime) = (open.key(pair), case.recipe.engine);
     let imprints = held.imprints.iter().filter(|((source, _), _)| *source == ImprintSource::Predicted);
     for ((_, finger), imprint) in imprints {
-        let recipe = PredictionKey::new(pair.finger(*finger), id.clone(), runtime, config);
-        state.hold(recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
+        let recipe = PredictionKey { touch: pair.finger(*finger), bundle: id.clone(), config: *config, runtime };
+        results::hold(state, recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
     }
 }
 
 fn import(state: &mut State, effects: &mut Vec<Effect>) {
-    let (Some(setup), Some(open)) = (state.import_setup(), &state.library.open) else { return };
-    if state.running(TaskKind::Import).is_some() {
+    let (Some(setup), Some(open)) = (results::import_setup(state), &state.library.open) else { return };
+    if state.tasks.of_kind(TaskKind::Import).is_some() {
         return;
     }
     let source = open.source.clone();
@@ -185,7 +188,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
     match output {
         Output::Figure => {
             state.export.asking = false;
-            let setup = state.figure_setup();
+            let setup = figure_setup(state);
             draw(state, "Draw the figure", setup, ended(file, "png"), effects);
         }
         Output::Case => {}
@@ -199,7 +202,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             tasks::start(state, "Export masks", write, effects);
         }
         Output::Pair(source) => {
-            let Some(pair) = state.pair_export(source) else {
+            let Some(pair) = pair_export(state, source) else {
                 let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
@@ -212,7 +215,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             tasks::start(state, "Export the pair", write, effects);
         }
         Output::Picture { pane, scale, error_m } => {
-            let Some(setup) = state.picture_setup(pane, scale, error_m) else { return };
+            let Some(setup) = picture_setup(state, pane, scale, error_m) else { return };
             let ending = if scale.is_some() { "png" } else { "svg" };
             draw(state, &format!("Save {}", pane.title()), setup, ended(file, ending), effects);
         }
@@ -228,7 +231,7 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else {
         return state.log.error(&TaskError::new(title, "no data set is open"));
     };
-    let recipes = state.figure_recipes(&setup);
+    let recipes = figure_recipes(state, &setup);
     let write = Write::new(Lane::Models, "Figure", file, move |file, access, cx| {
         let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
             let mut made = PerPad::default();

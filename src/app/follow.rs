@@ -1,16 +1,15 @@
 //! The room of a followed folder: what arrives is listed, and the newest is shown and predicted.
 
 use super::effect::Effect;
-use super::keys::Request;
-use super::library::state::Follow;
-use super::results::Results;
-use super::services::Followed;
+use super::source::Followed;
 use super::state::State;
-use super::tasks::state::Ticket;
+use super::state::library::Follow;
+use super::state::results::{Request, Results};
+use super::state::tasks::Ticket;
 use super::{library, predict};
 use touch2touch_work::error::TaskError;
 
-/// What can happen to following.
+/// A command to the following of a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FollowCommand {
     /// Follows the folder that is open, or stops: what arrives is shown and predicted.

@@ -1,17 +1,17 @@
 //! The room of the time machine and the basin map: moving about in what was recorded.
 
-pub mod state;
+pub(crate) use super::state::inspect::Inspected;
+pub use super::state::inspect::{BasinColor, Inspect, Pin};
 
-pub use state::{BasinColor, Inspect, Pin};
-pub(crate) use state::{Inspected, Inspection};
-
-use super::keys::{ImprintSource, Request};
+use super::keys::ImprintSource;
+use super::results;
 use super::state::State;
+use super::state::results::Request;
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::error::TaskError;
 
-/// What a person does with the time machine and the basin map.
+/// A command to the time machine and the basin map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectCommand {
     /// Looks at the other imprint.
@@ -39,11 +39,11 @@ pub enum InspectCommand {
     Pin,
     /// Lets a kept step go.
     Unpin(usize),
-    /// Whether correspondences are drawn.
+    /// True where correspondences are drawn.
     Lines(bool),
     /// The plane of the basin map.
     Plane(Plane),
-    /// What colors the basin map.
+    /// The coloring of the basin map.
     Color(BasinColor),
     /// Gives up the basin map that is being computed.
     StopBasin,
@@ -75,7 +75,7 @@ pub(super) fn step(state: &mut State, command: InspectCommand) {
             go(state, at);
         }
         InspectCommand::By(by) => {
-            let Some(here) = state.inspected().map(|s| s.at) else { return };
+            let Some(here) = results::inspected(state).map(|s| s.at) else { return };
             let to = (here as i64).saturating_add(by).max(0) as usize;
             go(state, to);
             if state.inspect.at.is_none() || by < 0 {
@@ -91,7 +91,8 @@ pub(super) fn step(state: &mut State, command: InspectCommand) {
             state.inspect.at = None;
         }
         InspectCommand::Play(play) => {
-            let Some((last, steps)) = state.inspected().map(|s| (s.is_last(), s.inspection.num_steps(s.run))) else {
+            let Some((last, steps)) = results::inspected(state).map(|s| (s.is_last(), s.inspection.num_steps(s.run)))
+            else {
                 return;
             };
             state.inspect.playing = play && steps > 1;
@@ -110,7 +111,7 @@ pub(super) fn step(state: &mut State, command: InspectCommand) {
         InspectCommand::Color(color) => state.inspect.color = color,
         InspectCommand::StopBasin => {
             // What failed is not wanted any more, until somebody asks for it again; the runtime stops it.
-            if let Ok(Some(key)) = state.basin_key()
+            if let Ok(Some(key)) = results::basin_key(state)
                 && !state.results.basins.contains(&key)
             {
                 state.tasks.failed.insert(Request::Basin(key), TaskError::cancelled("Basin map"));
@@ -121,7 +122,7 @@ pub(super) fn step(state: &mut State, command: InspectCommand) {
 
 /// Shows a step of the run shown; at its end the end is meant, however many steps another run has.
 fn go(state: &mut State, at: usize) {
-    let Some(steps) = state.inspected().map(|s| s.inspection.num_steps(s.run)) else { return };
+    let Some(steps) = results::inspected(state).map(|s| s.inspection.num_steps(s.run)) else { return };
     state.inspect.at = (at + 1 < steps).then_some(at);
 }
 
@@ -132,18 +133,18 @@ pub(super) fn rewind(state: &mut State) {
 }
 
 fn pin(state: &mut State) {
-    let (Some(shown), Some(pair)) = (state.inspected(), state.pair_key()) else { return };
+    let (Some(shown), Some(pair)) = (results::inspected(state), state.pair_key()) else { return };
     let new = Pin {
         pair,
         source: state.inspect.source,
-        engine: state.settings.pose_engine,
+        registration: state.settings.registration,
         run: shown.run,
         at: shown.at,
         grasp_from_object: shown.step.grasp_from_object,
         cost_m2: shown.step.cost_m2,
         kernel_m: shown.step.kernel_m,
     };
-    let [first, second] = state.pins();
+    let [first, second] = state.inspect.pins_of(state.pair_key());
     state.inspect.pins = match (first, second) {
         (None, second) => [Some(new), second],
         (Some(first), None) => [Some(first), Some(new)],

@@ -3,7 +3,7 @@
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 
-/// Where a job runs. Each lane has its own threads, so that none waits for another kind of work.
+/// A lane, on which jobs run. Each has its own threads, so that none waits for another kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
 pub enum Lane {
     /// Reading and writing files: one thread, in order.
@@ -12,7 +12,7 @@ pub enum Lane {
     Compute,
     /// Running models: one thread, which keeps them loaded.
     Models,
-    /// What takes minutes and must not hold up anything else: one thread.
+    /// Work that takes minutes and must not hold up anything else: one thread.
     Batch,
 }
 
@@ -33,11 +33,11 @@ pub(crate) type Body<T> = Box<dyn FnOnce(&JobCx) -> Result<T, TaskError> + Send>
 
 /// A job that answers with a `T`. It holds its inputs: it needs the state no more.
 pub struct Job<T> {
-    /// Where it runs.
+    /// The lane that it runs on.
     pub lane: Lane,
-    /// What it does, for errors.
+    /// The work that it does, for errors.
     pub what: String,
-    /// How.
+    /// The way.
     pub body: Body<T>,
 }
 

@@ -1,28 +1,52 @@
-//! Names of what is open and looked at, and the words that recipes are made of. The recipes themselves stand with their
-//! results in [`super::results`].
+//! Names of what is open and looked at, and the keys of results: plain values that say what a result is of and how it is
+//! made.
+//!
+//! A key is a [`touch2touch_work::recipe::Recipe`] as far as it decides the result, with the touch. [`super::results`] says
+//! how each result is computed.
 
-pub use touch2touch_core::bits::{Bits, Bits64};
+pub mod dataset;
+pub mod imprint;
+pub mod inspection;
+pub mod mask;
+pub mod pose;
+pub mod prediction;
+pub mod proposal;
+pub mod versus;
+
+pub use touch2touch_core::bits::Bits;
 pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
+pub use touch2touch_core::pose::{Registration, RegistrationChoice};
 pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_work::labels::{ImprintSource, Revision};
 pub use touch2touch_work::mask::MaskRecipe;
 
-pub use super::results::Request;
-pub(crate) use super::results::cloud::CloudKey;
-pub(crate) use super::results::ensemble::EnsembleKey;
-pub use super::results::imprint::ImprintKey;
-pub(crate) use super::results::imprint::MetersKey;
-pub(crate) use super::results::mask::MaskKey;
-pub use super::results::mask::MaskVersion;
-pub use super::results::pose::PoseKey;
-pub use super::results::prediction::PredictionKey;
-pub(crate) use super::results::run::RunKey;
-pub(crate) use super::results::versus::{CloudDifferenceKey, VersusKey};
-pub use touch2touch_core::pose::{Registration, RegistrationChoice};
+pub use dataset::{
+    ImportForm, ImportPlanKey, LabelStatsKey, LabelsKey, MaskPlanKey, ScoresKey, ThumbnailKey, ToolKey, TrainPlanKey,
+};
+pub use imprint::{AmbiguityKey, ColorKey, EnsembleKey, ImprintKey, LedgerKey, MetersKey, PictureKey};
+pub use inspection::{Inspection, InspectionKey};
+pub use mask::{AutomaticMask, MaskKey, MaskVersion};
+pub use pose::{
+    BasinKey, CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RunKey,
+};
+pub(crate) use prediction::Keyed;
+pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, SeedKey, StoredKey};
+pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};
+pub use versus::{CloudDifferenceKey, VersusKey};
 
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PadId;
+
+/// The key of a result. Equal keys have equal results.
+pub trait Key: Clone + Ord + Send + 'static {
+    /// The result.
+    type Value: Send + Sync + 'static;
+
+    /// Bytes that a result holds.
+    fn bytes(_value: &Self::Value) -> usize {
+        0
+    }
+}
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -53,7 +77,7 @@ pub struct TouchKey {
     pub finger: PadId,
 }
 
-/// What a range mapping does, for its tooltip.
+/// The tooltip of a range mapping.
 pub(crate) fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => {
@@ -71,23 +95,5 @@ pub(crate) fn shift_tooltip(mode: ShiftMode) -> &'static str {
         ShiftMode::Refit(_) => {
             "The raw values with mean and deviation matched to this data set's own predictions and measurements"
         }
-    }
-}
-
-/// A pose (`grasp_from_object`) that compares and hashes by its bits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PoseBits([u64; 3]);
-
-impl From<PlanarPose> for PoseBits {
-    fn from(pose: PlanarPose) -> Self {
-        Self([pose.theta_rad, pose.y_m, pose.z_m].map(f64::to_bits))
-    }
-}
-
-impl PoseBits {
-    /// The pose.
-    pub fn get(self) -> PlanarPose {
-        let [theta_rad, y_m, z_m] = self.0.map(f64::from_bits);
-        PlanarPose { theta_rad, y_m, z_m }
     }
 }

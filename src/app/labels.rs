@@ -3,36 +3,35 @@
 mod batch;
 pub mod ghost;
 mod repeat;
-pub mod state;
 pub(super) mod unsaved;
 
+pub(crate) use super::state::labels::{Changed, Merged};
+pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
+pub(crate) use batch::can_propose_all;
 pub use batch::{ImportMasks, ProposeAll};
+pub use ghost::ghost;
 pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
-pub(crate) use state::{Changed, Merged};
-pub use state::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
-pub use unsaved::UnsavedCommand;
+pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;
 
 use glam::DVec3;
 
 use super::effect::{Effect, LabelsToSave};
-use super::history::{Edit, Gesture, KeptMask};
-use super::keys::ImprintSource;
-use super::settings;
+use super::keys::{ImprintSource, Revision};
+use super::state::history::Gesture;
+use super::state::tasks::Level;
 use super::state::{Lookup, State};
-use super::tasks::state::Level;
+use super::{results, settings};
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Sight, VisiblePixels};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::cloud::seen;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::labels::{Act, Operation, note, system_person};
-use touch2touch_work::propose::accepted;
+use touch2touch_work::label_edit::{self, Edited, LabelEdit, TakenUp};
+use touch2touch_work::labels::{Act, Operation};
 
-/// What can happen to the document.
+/// A command to the document.
 #[derive(Clone, Debug)]
 pub enum LabelsCommand {
     /// Pointer down on an image, raw bubble pixels. `erase` swaps brush and eraser for this stroke.
@@ -43,7 +42,7 @@ pub enum LabelsCommand {
         source: ImprintSource,
         /// Position.
         at_px: [f32; 2],
-        /// Whether to remove instead of the tool's own effect.
+        /// True to remove in place of the tool's own effect.
         erase: bool,
     },
     /// Pointer down on a 3D view.
@@ -84,7 +83,7 @@ pub enum LabelsCommand {
     Unsaved(UnsavedCommand),
 }
 
-/// How a drawing in a 3D view begins.
+/// The beginning of a drawing in a 3D view.
 #[derive(Clone, Debug)]
 pub struct StrokeIn3d {
     /// The finger drawn on: whose point the pointer meant.
@@ -97,7 +96,7 @@ pub struct StrokeIn3d {
     pub at_px: [f32; 2],
     /// The point at whose depth the brush has its size, meters, grasp frame.
     pub size_at: DVec3,
-    /// Whether to remove instead of the tool's own effect.
+    /// True to remove in place of the tool's own effect.
     pub erase: bool,
 }
 
@@ -138,7 +137,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
     }
 }
 
-/// Whether the selected pair may be edited; says why not.
+/// True where the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     if state.entry().is_none() {
         return false;
@@ -159,52 +158,18 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
 ///
 /// `None` while it is being computed: a correction must not start from something else than what is shown.
 fn start_from(state: &State, source: ImprintSource, finger: PadId) -> Option<DrawnMask> {
-    if let Some(hand) = state.drawn_mask(source, finger) {
+    if let Some(hand) = results::drawn_mask(state, source, finger) {
         return Some(hand.clone());
     }
-    match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
+    match (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            Some(DrawnMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe)))
+            Some(DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe)))
         }
         (Lookup::Waiting | Lookup::Stale(_), Ok(_)) => None,
         _ => {
-            let [width, height] = state.imprint(source, finger).ready()?.size();
+            let [width, height] = results::imprint(state, source, finger).ready()?.size();
             Some(DrawnMask::new(Mask::filled(width, height, false), Provenance::Nothing))
         }
-    }
-}
-
-impl State {
-    /// Who labels: the name in the preferences, else whom the system says; empty where nobody knows.
-    pub fn person(&self) -> String {
-        let named = Some(self.settings.person.trim()).filter(|name| !name.is_empty());
-        named.map(str::to_owned).or_else(system_person).unwrap_or_default()
-    }
-
-    /// The same; `None` where nobody knows.
-    pub(in crate::app) fn known_person(&self) -> Option<String> {
-        Some(self.person()).filter(|name| !name.is_empty())
-    }
-
-    /// The imprint whose mask the clean-ups work on: the one chosen, else the one that is there.
-    pub fn worked_on(&self, finger: PadId) -> ImprintSource {
-        let chosen = self.selection.imprint;
-        let is_there = |source: &ImprintSource| self.imprint(*source, finger).ready().is_some();
-        [chosen, chosen.other()].into_iter().find(is_there).unwrap_or(chosen)
-    }
-
-    /// Half the width of the brush in a 3D picture, pixels: as many millimeters as on the image, at the depth of a point
-    /// (meters, grasp frame).
-    pub(crate) fn brush_px(&self, sight: &Sight, size_at: DVec3) -> f32 {
-        let radius_m = f64::from(self.settings.mask.radius_px) / self.rig().depth_px_per_mm() * 1e-3;
-        sight.px_per_m(size_at).map_or(0.0, |scale| (radius_m * scale) as f32)
-    }
-
-    /// Where the pixels of a finger's imprint lie in a 3D picture.
-    fn seen(&self, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<VisiblePixels, TaskError> {
-        let sample = self.sample().ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;
-        let imprints = sample.rig.pads().map(|pad| self.imprint(source, pad).ready()).collect();
-        seen(sample, &imprints, finger, sight)
     }
 }
 
@@ -225,25 +190,25 @@ fn begin_stroke(
         let err = TaskError::new("Correct the mask", "the mask is still being computed").with_hint("Try again.");
         return state.log.error(&err);
     };
-    let allowed = match state.allowed(source, finger) {
+    let allowed = match results::allowed(state, source, finger) {
         Ok(allowed) => allowed,
         Err(why) => return state.log.error(&TaskError::new("Paint within limits", why)),
     };
-    let Some(place) = state.mask_place(source, finger) else { return };
-    let seen = match in_3d.as_ref().map(|(sight, _)| state.seen(source, finger, sight)).transpose() {
+    let Some(place) = results::mask_place(state, source, finger) else { return };
+    let seen = match in_3d.as_ref().map(|(sight, _)| seen(state, source, finger, sight)).transpose() {
         Ok(seen) => seen,
         Err(err) => return state.log.error(&err),
     };
     if let (Some((sight, size_at)), DrawTool::Brush { radius_px }) = (&in_3d, &mut tool) {
-        *radius_px = state.brush_px(sight, *size_at);
+        *radius_px = brush_px(state, sight, *size_at);
     }
-    let proposed = state.shown_proposal(source, finger).cloned();
+    let proposed = results::shown_proposal(state, source, finger).cloned();
     if paint == Paint::LetThrough && proposed.is_none() {
         let err = TaskError::new("Let the proposal through", "no proposal is shown here");
         return state.log.error(&err.with_hint("Propose a mask first, or paint contact."));
     }
     state.selection.imprint = source;
-    let (pair, pose) = (state.pair_name().to_owned(), state.shown_pose_key(source));
+    let (pair, pose) = (state.pair_name().to_owned(), ghost::shown_pose_key(state, source));
     start.revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
     let before = labels.put(&place, Some(start.clone()));
@@ -251,7 +216,7 @@ fn begin_stroke(
     drawing.sight = in_3d.map(|(sight, _)| Box::new(sight));
     let [width, height] = start.mask.size();
     let touched = Mask::filled(width, height, false);
-    let by = Provenance::hand(state.person());
+    let by = Provenance::hand(state.settings.labeler());
     let stroke = Stroke { pair, place, source, drawing, allowed, proposed, seen, pose, before, start, touched, by };
     state.document.stroke = Some(stroke);
     redraw(state, 0);
@@ -277,7 +242,7 @@ fn redraw(state: &mut State, from: usize) {
     let Some(mut stroke) = state.document.stroke.take() else { return };
     let labels = state.document.labels.get_mut(&stroke.pair);
     if let Some(mut hand) = labels.and_then(|labels| labels.masks.remove(&stroke.place)) {
-        let imprint = state.imprint(stroke.source, stroke.place.pad).ready();
+        let imprint = results::imprint(state, stroke.source, stroke.place.pad).ready();
         if imprint.is_some_and(|imprint| stroke.draw_on(&mut hand, imprint, from)) {
             hand.revision = state.document.next_revision();
         }
@@ -289,21 +254,14 @@ fn redraw(state: &mut State, from: usize) {
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
-    let labels = doc.labels.entry(stroke.pair.clone()).or_default();
-    let Some(now) = labels.masks.get(&stroke.place) else { return };
-    if now.is_same(&stroke.start) {
-        labels.put(&stroke.place, stroke.before);
-        return;
-    }
-    let (pair, finger, place) = (stroke.pair, stroke.place.pad, stroke.place);
-    let edit = Edit::Mask { pair: pair.clone(), place, mask: stroke.before.as_ref().map(KeptMask::of) };
-    let name = stroke.drawing.name();
-    let name = if stroke.drawing.sight.is_some() { format!("{name} in 3D") } else { name.to_owned() };
-    let how = serde_json::to_value(&stroke.drawing).ok();
-    record(state, &pair, Operation { how, ..Operation::named(name.clone()) }, edit, effects);
-    let (source, mask, before) = (stroke.source, Some(stroke.start.mask), stroke.pose);
+    let Stroke { pair, place, source, drawing, pose, before, start, .. } = stroke;
+    let labels = doc.labels.entry(pair.clone()).or_default();
+    let Some(mask) = labels.put(&place, before) else { return };
+    let (finger, shown, drawn) = (place.pad, Some(start.mask.clone()), mask.revision);
+    let edit = LabelEdit::Draw { on: TakenUp { place, mask: start }, mask, drawing: &drawing };
+    let Some(name) = change(state, &pair, edit, Some(drawn), effects) else { return };
     let revision = state.document.next_revision();
-    state.document.changed = Some(Changed { pair, source, name: name.into(), finger, revision, mask, before });
+    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask: shown, before: pose });
 }
 
 /// Takes in what somebody else made of a pair's masks meanwhile. What was done here before cannot be taken back any more: it
@@ -338,15 +296,29 @@ fn cancel_stroke(state: &mut State) {
     }
 }
 
-/// Records a change that was made; `edit` is its inverse. The pair counts as begun, and is saved.
-fn record(state: &mut State, pair: &str, deed: Operation, edit: Edit, effects: &mut Vec<Effect>) {
-    let mut edits = vec![edit];
-    if state.document.review(pair) == Review::Todo {
-        let before = state.document.set_review(pair, Review::InProgress);
-        edits.push(Edit::Review { pair: pair.to_owned(), review: before });
+/// Does something to the labels of a pair, which are saved: one gesture. New masks get the revision. Its name; `None` where
+/// nothing changed.
+fn change(
+    state: &mut State,
+    pair: &str,
+    edit: LabelEdit<'_>,
+    revision: Option<Revision>,
+    effects: &mut Vec<Effect>,
+) -> Option<Cow<'static, str>> {
+    let labels = state.document.pair(pair).cloned().unwrap_or_default();
+    match label_edit::edit(&labels, edit) {
+        Ok(edited) => {
+            let Edited { deed, change } = edited?;
+            let name = deed.name.clone();
+            state.history.make(&mut state.document, Gesture::forth(pair, name.clone(), &change, revision));
+            save_pair(state, pair, deed, effects);
+            Some(name)
+        }
+        Err(err) => {
+            state.log.error(&err);
+            None
+        }
     }
-    state.history.record(Gesture { name: deed.name.clone(), edits });
-    save_pair(state, pair, deed, effects);
 }
 
 /// Cleans the mask in force of the active finger up.
@@ -357,34 +329,26 @@ fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
         return;
     }
     let finger = state.selection.finger;
-    let source = state.worked_on(finger);
-    let (Some(mut hand), Some(place)) = (start_from(state, source, finger), state.mask_place(source, finger)) else {
+    let source = results::worked_on(state, finger);
+    let (Some(mask), Some(place)) = (start_from(state, source, finger), results::mask_place(state, source, finger))
+    else {
         return state.log.error(&TaskError::new(what, "there is no mask to work on yet"));
     };
-    if !hand.clean(clean_up, &state.rig()) {
-        return state.log.info(format!("{what}: nothing to change"));
+    let (rig, on) = (state.rig(), TakenUp { place: place.clone(), mask });
+    if !change_mask(state, &place, LabelEdit::CleanUp { on, clean_up, rig: &rig }, effects) {
+        state.log.info(format!("{what}: nothing to change"));
     }
-    let deed = Operation { how: serde_json::to_value(clean_up).ok(), ..Operation::named(what) };
-    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
-fn set_hand_mask(
-    state: &mut State,
-    deed: Operation,
-    place: MaskPlace,
-    mask: Option<DrawnMask>,
-    effects: &mut Vec<Effect>,
-) {
+/// Does something to the mask of an imprint of the selected pair; what it was before is still shown.
+fn change_mask(state: &mut State, place: &MaskPlace, edit: LabelEdit<'_>, effects: &mut Vec<Effect>) -> bool {
     let pair = state.pair_name().to_owned();
-    let revision = state.document.next_revision();
-    let mask = mask.map(|mask| KeptMask::of(&DrawnMask { revision, ..mask }));
-    let (source, finger, name) = (place.of.source(), place.pad, deed.name.clone());
-    let before = state.shown_pose_key(source);
-    let shown = state.mask_in_force(source, finger).ok().map(|mask| mask.mask.clone());
-    let mut edit = Edit::Mask { pair: pair.clone(), place, mask };
-    edit.swap(&mut state.document);
-    state.document.changed = Some(Changed { pair: pair.clone(), source, name, finger, revision, mask: shown, before });
-    record(state, &pair, deed, edit, effects);
+    let (source, finger, revision) = (place.of.source(), place.pad, state.document.next_revision());
+    let before = ghost::shown_pose_key(state, source);
+    let mask = results::mask_in_force(state, source, finger).ok().map(|mask| mask.mask.clone());
+    let Some(name) = change(state, &pair, edit, Some(revision), effects) else { return false };
+    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask, before });
+    true
 }
 
 fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
@@ -394,12 +358,14 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
         return;
     }
     let finger = state.selection.finger;
-    let source = state.worked_on(finger);
-    let Some(place) = state.mask_place(source, finger) else { return };
-    match (state.automatic_mask(source, finger), state.mask_recipe(finger)) {
+    let source = results::worked_on(state, finger);
+    let Some(place) = results::mask_place(state, source, finger) else { return };
+    match (results::automatic_mask(state, source, finger), results::mask_recipe(state, finger)) {
         (Lookup::Ready(mask), Ok(recipe)) => {
-            let adopted = DrawnMask::new(mask.clone(), state.automatic_provenance(source, finger, &recipe));
-            set_hand_mask(state, Operation::named("automatic mask taken over"), place, Some(adopted), effects);
+            let mask = DrawnMask::new(mask.clone(), results::automatic_provenance(state, source, finger, &recipe));
+            if !change_mask(state, &place, LabelEdit::Adopt(TakenUp { place: place.clone(), mask }), effects) {
+                state.log.info(format!("{WHAT}: nothing to change"));
+            }
         }
         (Lookup::Failed(err), _) => {
             let err = err.clone();
@@ -414,13 +380,13 @@ fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
 fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
     const WHAT: &str = "Accept the proposal";
     end_stroke(state, effects);
-    if !state.proposes() || !check_editable(state, WHAT) {
+    if !results::proposes(state) || !check_editable(state, WHAT) {
         return;
     }
     let finger = state.selection.finger;
-    let source = state.worked_on(finger);
-    let Some(place) = state.mask_place(source, finger) else { return };
-    let proposal = match state.proposal(source, finger) {
+    let source = results::worked_on(state, finger);
+    let Some(place) = results::mask_place(state, source, finger) else { return };
+    let proposal = match results::proposal(state, source, finger) {
         Lookup::Ready(proposal) => proposal.clone(),
         Lookup::Failed(err) => {
             let err = err.clone();
@@ -433,23 +399,20 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
         }
     };
     state.selection.proposing = false;
-    let drawn = state.drawn_mask(source, finger);
-    let hand = accepted(drawn, &proposal, state.settings.mask.over_drawn);
-    if drawn.is_some_and(|drawn| drawn.is_same(&hand)) {
-        return state.log.info(format!("{WHAT}: the mask is so already"));
+    let over_drawn = state.settings.mask.over_drawn;
+    let accept = LabelEdit::AcceptProposal { place: place.clone(), proposal: &proposal, over_drawn };
+    if !change_mask(state, &place, accept, effects) {
+        state.log.info(format!("{WHAT}: the mask is so already"));
     }
-    let how = serde_json::to_value(&proposal.provenance).ok();
-    let deed = Operation { how, ..Operation::named("proposal accepted") };
-    set_hand_mask(state, deed, place, Some(hand), effects);
 }
 
 fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
     let finger = state.selection.finger;
-    let source = state.worked_on(finger);
-    let Some(place) = state.mask_place(source, finger) else { return };
-    if state.drawn_mask(source, finger).is_some() && check_editable(state, "Remove the correction") {
-        set_hand_mask(state, Operation::named("correction removed"), place, None, effects);
+    let source = results::worked_on(state, finger);
+    let Some(place) = results::mask_place(state, source, finger) else { return };
+    if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Remove the correction") {
+        change_mask(state, &place, LabelEdit::Remove(place.clone()), effects);
     }
 }
 
@@ -461,18 +424,16 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
         return;
     }
     let finger = state.selection.finger;
-    let to = state.worked_on(finger);
+    let to = results::worked_on(state, finger);
     let from = to.other();
-    let size = state.imprint(to, finger).ready().map(|imprint| imprint.size());
-    let (Some(other), Some(place)) = (start_from(state, from, finger), state.mask_place(to, finger)) else {
+    let size = results::imprint(state, to, finger).ready().map(|imprint| imprint.size());
+    let places = results::mask_place(state, from, finger).zip(results::mask_place(state, to, finger));
+    let (Some(mask), Some((other, place))) = (start_from(state, from, finger), places) else {
         let why = format!("there is no mask on the {} imprint", from.key());
         return state.log.error(&TaskError::new(WHAT, why));
     };
-    if Some(other.mask.size()) != size {
-        return state.log.error(&TaskError::new(WHAT, "the imprints are not of one size"));
-    }
-    let copy = other.copied(from);
-    set_hand_mask(state, Operation::named("mask of the other imprint taken over"), place, Some(copy), effects);
+    let from = TakenUp { place: other, mask };
+    change_mask(state, &place, LabelEdit::TakeOver { from, to: place.clone(), size }, effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
@@ -481,68 +442,50 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     if state.document.review(&pair) == review || !check_editable(state, "Review state") {
         return;
     }
-    let before = state.document.set_review(&pair, review);
-    let edit = Edit::Review { pair: pair.clone(), review: before };
-    state.history.record(Gesture { name: "review state".into(), edits: vec![edit] });
-    save_pair(state, &pair, Operation::named("review state"), effects);
+    change(state, &pair, LabelEdit::Review(review), None, effects);
 }
 
 fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {
-    let text = note(text);
-    if !state.document.is_editable(pair) || state.document.note(pair) == text {
-        return;
+    if state.document.is_editable(pair) {
+        change(state, pair, LabelEdit::Note(text), None, effects);
     }
-    let before = state.document.set_note(pair, text);
-    let edit = Edit::Note { pair: pair.to_owned(), note: before };
-    state.history.record(Gesture { name: "note".into(), edits: vec![edit] });
-    save_pair(state, pair, Operation::named("note"), effects);
 }
 
 fn accept_pose(state: &mut State, source: ImprintSource, accept: bool, effects: &mut Vec<Effect>) {
     if !check_editable(state, "Accept the pose") {
         return;
     }
-    let pose = match (accept, state.pose(source)) {
+    let pose = match (accept, results::pose(state, source)) {
         (false, _) => None,
         (true, Lookup::Ready(pose)) => Some(pose.grasp_from_object.into()),
         (true, _) => return state.log.error(&TaskError::new("Accept the pose", "there is no pose yet")),
     };
-    let name = if accept { "pose accepted" } else { "pose withdrawn" };
-    set_accepted(state, name, source, pose, effects);
+    set_accepted(state, source, pose, effects);
 }
 
 /// Stores or withdraws the accepted pose of an imprint: one gesture. The pair must be editable.
 pub(super) fn set_accepted(
     state: &mut State,
-    name: &'static str,
     source: ImprintSource,
     pose: Option<AcceptedPose>,
     effects: &mut Vec<Effect>,
 ) {
-    let Some(of) = state.shown_imprint(source) else {
+    let Some(of) = results::shown_imprint(state, source) else {
         return state.log.error(&TaskError::new("Accept the pose", "the fingers show different predictions"));
     };
     let pair = state.pair_name().to_owned();
-    let before = state.document.pair(&pair).cloned().unwrap_or_default();
-    let mut after = before.clone();
-    after.accept(&of, pose);
-    let mut edits = Vec::new();
-    for of in [ImprintOf::unknown(), of] {
-        let pose = after.accepted.get(&of).copied();
-        if before.accepted.get(&of).copied() != pose {
-            edits.push(Edit::Pose { pair: pair.clone(), of, pose });
-        }
-    }
-    edits.iter_mut().for_each(|edit| edit.swap(&mut state.document));
-    state.history.record(Gesture { name: name.into(), edits });
-    save_pair(state, &pair, Operation::named(name), effects);
+    let edit = match pose {
+        Some(pose) => LabelEdit::AcceptPose(of, pose),
+        None => LabelEdit::WithdrawPose(of),
+    };
+    change(state, &pair, edit, None, effects);
 }
 
 fn undo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return cancel_stroke(state);
     }
-    let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
+    let (pair, shown) = (state.pair_name().to_owned(), results::mask_places(state));
     let name = state.history.undo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
     travelled(state, Act::Undo, &pair, name, effects);
 }
@@ -551,7 +494,7 @@ fn redo(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.stroke.is_some() {
         return;
     }
-    let (pair, shown) = (state.pair_name().to_owned(), state.mask_places());
+    let (pair, shown) = (state.pair_name().to_owned(), results::mask_places(state));
     let name = state.history.redo(&mut state.document, &pair, &shown).map(|gesture| gesture.name.clone());
     travelled(state, Act::Redo, &pair, name, effects);
 }
@@ -579,7 +522,7 @@ fn save_pair(state: &mut State, name: &str, deed: Operation, effects: &mut Vec<E
 
 fn save_again(state: &mut State, name: &str, mut deed: Operation, effects: &mut Vec<Effect>) {
     let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
-    deed.person = repeat.clone().or_else(|| state.known_person());
+    deed.person = repeat.clone().or_else(|| state.settings.known_labeler());
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.finished(name) else { return };
@@ -606,4 +549,19 @@ fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
     }
     settings::save(state, effects);
     state.log.push(Level::Info, "Labels and preferences are being written", None, None);
+}
+
+/// Half the width of the brush in a 3D picture, pixels: as many millimeters as on the image, at the depth of a point
+/// (meters, grasp frame).
+pub(crate) fn brush_px(state: &State, sight: &Sight, size_at: DVec3) -> f32 {
+    let radius_m = f64::from(state.settings.mask.radius_px) / state.rig().depth_px_per_mm() * 1e-3;
+    sight.px_per_m(size_at).map_or(0.0, |scale| (radius_m * scale) as f32)
+}
+
+/// The places of the pixels of a finger's imprint in a 3D picture.
+fn seen(state: &State, source: ImprintSource, finger: PadId, sight: &Sight) -> Result<VisiblePixels, TaskError> {
+    let sample =
+        results::sample(state).ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;
+    let imprints = sample.rig.pads().map(|pad| results::imprint(state, source, pad).ready()).collect();
+    touch2touch_work::cloud::seen(sample, &imprints, finger, sight)
 }

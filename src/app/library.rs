@@ -1,9 +1,7 @@
 //! The room of the open data set and its list.
 
-pub mod state;
-
-pub(crate) use state::OpenDataset;
-pub use state::{Follow, Library, Place, Sort, short_name};
+pub(crate) use super::state::library::OpenDataset;
+pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 
 use std::collections::BTreeSet;
 use std::ops::Range;
@@ -12,14 +10,15 @@ use std::sync::Arc;
 use super::adapt::AdaptState;
 use super::dial::DialState;
 use super::effect::{Access, Effect, Errand};
-use super::evaluate::state::ScoreChoice;
 use super::keys::DatasetSeq;
-use super::labels::state::{Document, Review};
-use super::results::{Request, Results};
-use super::services::{DataSource, Opened};
-use super::settings::state::MAX_RECENT;
+use super::services::Opened;
+use super::source::DataSource;
 use super::state::State;
-use super::tasks::state::{Level, TaskKind};
+use super::state::evaluate::ScoreChoice;
+use super::state::labels::{Document, Review};
+use super::state::results::{Request, Results};
+use super::state::settings::MAX_RECENT;
+use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
 use super::{evaluate, inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
@@ -31,7 +30,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::tool::UnitSet;
 
-/// What can happen to the data set and its list.
+/// A command to the data set and its list.
 #[derive(Clone, Debug)]
 pub enum LibraryCommand {
     /// Opens a place; what is open stays until the new one is read.
@@ -46,7 +45,7 @@ pub enum LibraryCommand {
         tool: String,
         /// The unit.
         unit: ToolUnit,
-        /// What the file beside it says now, as the person was told.
+        /// The unit that the file beside it says now, as the person was told.
         replacing: Option<String>,
     },
     /// Narrows the list.
@@ -196,7 +195,7 @@ pub struct ReadTool {
     source: Arc<dyn DataSource>,
     tool: String,
     unit: ToolUnit,
-    /// What the file beside it says now, as the person was told.
+    /// The unit that the file beside it says now, as the person was told.
     replacing: Option<String>,
 }
 
@@ -283,7 +282,7 @@ fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<
     }
 }
 
-/// Where nothing is ranked yet, that is begun.
+/// Begins the ranking where nothing is ranked yet.
 fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
     let sorted = std::mem::replace(&mut state.library.sort, Sort::Uncertain) == Sort::Uncertain;
     state.reorder();
@@ -333,7 +332,7 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     labels::end_repeats(state);
 }
 
-/// What is odd about the files of the selected pair, once it is loaded; each pair once.
+/// Says the oddities of the files of the selected pair, once it is loaded; each pair once.
 pub(super) fn say_notes(state: &mut State) {
     let Some((key, sample)) = state.pair_key().and_then(|key| Some((key, state.results.samples.get(&key)?.clone())))
     else {
@@ -354,7 +353,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     labels::end_stroke(state, effects);
     // What is being written goes on; what could not be would be forgotten.
     let failed = state.document.failed.clone();
-    let unsaved: Vec<_> = state.unsaved().into_iter().filter(|one| failed.contains_key(&one.name)).collect();
+    let unsaved: Vec<_> = labels::unsaved(state).into_iter().filter(|one| failed.contains_key(&one.name)).collect();
     if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
         effects.push(Effect::keep_waiting(open.source.clone(), unsaved));
     }

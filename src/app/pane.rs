@@ -1,10 +1,40 @@
 //! [`Pane`]: the panes of the window, one row each. Titles, menus, default places, what is drawn by which file of the
 //! window and what is computed while a pane is on screen all follow from its row.
 
-use super::keys::ImprintSource;
-use super::settings::state::Workspace;
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
 
-/// What a pane shows, as far as mouse, colors and links between panes depend on it.
+use super::keys::ImprintSource;
+use touch2touch_work::figure::FigurePane;
+
+/// The four arrangements of the same panes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Workspace {
+    /// Truth and prediction side by side.
+    #[default]
+    Inspect,
+    /// The cloud on the CAD.
+    Align,
+    /// Correcting masks.
+    Label,
+    /// Numbers.
+    Evaluate,
+}
+
+impl Workspace {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Inspect => "Inspect",
+            Self::Align => "Align",
+            Self::Label => "Label",
+            Self::Evaluate => "Evaluate",
+        }
+    }
+}
+
+/// The kind of a pane, as far as mouse, colors and links between panes depend on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// A list, a table or controls.
@@ -25,7 +55,7 @@ pub enum Kind {
     Map,
 }
 
-/// Where a pane lies in a workspace at first. Panes of one dock are its tabs, the one of the earlier row in front.
+/// The dock where a pane lies in a workspace at first. Panes of one dock are its tabs, the one of the earlier row in front.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) enum Dock {
     /// The column at the left.
@@ -38,7 +68,7 @@ pub(crate) enum Dock {
     Right(u8),
 }
 
-/// What is computed while a pane is on screen. Everything but [`Demand::Thumbnails`], [`Demand::Scores`] and
+/// A demand: what is computed while a pane is on screen. Everything but [`Demand::Thumbnails`], [`Demand::Scores`] and
 /// [`Demand::LabelStats`] is of the selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
@@ -50,7 +80,7 @@ pub enum Demand {
     Masks,
     /// The prediction against the measurement.
     Comparison,
-    /// What the GelSlim image leaves open.
+    /// The ambiguity of the GelSlim image.
     Ambiguity,
     /// The depth chain.
     Ledger,
@@ -74,9 +104,9 @@ pub enum Demand {
     Thumbnails,
     /// The scores that are kept of all pairs.
     Scores,
-    /// How far the labeling of the data set is.
+    /// The progress of the labeling of the data set.
     LabelStats,
-    /// What a training of the mask model would learn from.
+    /// The plan of a training of the mask model: what it would learn from.
     Training,
 }
 
@@ -230,19 +260,19 @@ macro_rules! define {
                 match self { $($( Self::$pane => [$title $(, $tab)?].last().unwrap_or(&$title), )*)* }
             }
 
-            /// What it shows, for the tooltip of its title.
+            /// The tooltip of its title.
             pub fn tip(self) -> &'static str {
                 match self { $($( Self::$pane => $tip, )*)* }
             }
 
-            /// What kind of thing that is.
+            /// The kind of what it shows.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
                 use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
-            /// What is computed for it.
+            /// The demands: what is computed for it.
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
@@ -252,7 +282,7 @@ macro_rules! define {
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }
 
-            /// Where it lies at first in the workspaces that have it.
+            /// The docks where it lies at first in the workspaces that have it.
             fn places(self) -> &'static [(Workspace, Dock)] {
                 use Dock::{Bottom, Left, Right, Top};
                 match self { $($( Self::$pane => &[$((Workspace::$workspace, $dock)),*], )*)* }
@@ -271,7 +301,7 @@ impl Pane {
         panes
     }
 
-    /// Where it lies at first in a workspace that has it.
+    /// The dock where it lies at first in a workspace that has it.
     pub(crate) fn dock(self, workspace: Workspace) -> Option<Dock> {
         self.places().iter().find(|(of, _)| *of == workspace).map(|(_, dock)| *dock)
     }
@@ -284,11 +314,32 @@ impl Pane {
         }
     }
 
-    /// Whether it shows something of the selected pair.
+    /// True where it shows something of the selected pair.
     pub(crate) fn is_of_pair(self) -> bool {
         let of_all =
             |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::LabelStats | Demand::Training);
         self.needs().iter().any(|need| !of_all(need))
+    }
+}
+
+impl Pane {
+    /// The name that a picture of it is offered under.
+    pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
+        let name = self.title().to_lowercase().replace(' ', "-");
+        format!("{name}.{}", if pixels { "png" } else { "svg" })
+    }
+
+    /// The column of a figure that shows the same; `None` for panes that are no pictures.
+    pub(crate) fn in_figure(self) -> Option<FigurePane> {
+        Some(match (self, self.kind()) {
+            (Self::GelDifference, _) => FigurePane::GelSlim,
+            (Self::GelRaw, _) => FigurePane::Raw,
+            (Self::GelReference, _) => FigurePane::Reference,
+            (_, Kind::Imprint(ImprintSource::Measured)) => FigurePane::Measured,
+            (_, Kind::Imprint(ImprintSource::Predicted)) => FigurePane::Predicted,
+            (Self::Error, _) => FigurePane::Error,
+            _ => return None,
+        })
     }
 }
 

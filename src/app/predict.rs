@@ -1,6 +1,5 @@
 //! The room of predictions: starting them, choosing among them, and the refit of their range.
 
-mod recipe;
 mod refit;
 
 pub use refit::Refit;
@@ -8,19 +7,19 @@ pub use refit::Refit;
 use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
-use super::keys::PredictionKey;
-use super::results::prediction::{self, Keyed};
-use super::services::DataSource;
+use super::keys::{Keyed, PredictionKey};
+use super::results::prediction;
+use super::source::DataSource;
+use super::state::tasks::TaskKind;
 use super::state::{Absent, State};
-use super::tasks::state::TaskKind;
-use super::{settings, tasks};
+use super::{recipe, results, settings, tasks};
 use touch2touch_core::rig::{PadId, Text};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::JobCx;
 
-/// What can happen to predictions.
+/// A command to predictions.
 #[derive(Clone, Debug)]
 pub enum PredictCommand {
     /// Generates for the selected pair with the settings.
@@ -40,7 +39,7 @@ pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec
         PredictCommand::Refit => refit::start(state, effects),
         PredictCommand::Choose(recipe) => {
             if state.results.predictions.contains(&recipe) {
-                state.pick(recipe);
+                results::pick(state, recipe);
             }
         }
     }
@@ -48,7 +47,7 @@ pub(super) fn step(state: &mut State, command: PredictCommand, effects: &mut Vec
 
 /// Starts the predictions of the fingers that are looked at, in one go; one that exists is shown instead.
 fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
-    if let Err(absent) = state.can_generate() {
+    if let Err(absent) = results::can_generate(state) {
         return state.log.error(&refusal(absent));
     }
     if new_seed || !state.settings.generate.seed_locked {
@@ -58,15 +57,15 @@ fn generate(state: &mut State, new_seed: bool, effects: &mut Vec<Effect>) {
     same_seed(state, effects);
 }
 
-/// The same with the seed as it is.
+/// Starts the predictions with the seed as it is.
 pub(super) fn same_seed(state: &mut State, effects: &mut Vec<Effect>) {
-    if let Err(absent) = state.can_generate() {
+    if let Err(absent) = results::can_generate(state) {
         return state.log.error(&refusal(absent));
     }
     // A finger without a GelSlim image is left out; while the sample loads, the job finds out.
-    let loaded = state.sample().ready().is_some();
-    let mut fingers = state.fingers_to_generate();
-    fingers.retain(|finger| !loaded || state.can_start(*finger));
+    let loaded = results::sample(state).ready().is_some();
+    let mut fingers = results::fingers_to_generate(state);
+    fingers.retain(|finger| !loaded || results::can_start(state, *finger));
     if fingers.is_empty() {
         return state.log.error(&refusal(Absent::NoInput));
     }
@@ -78,13 +77,13 @@ fn refusal(absent: Absent) -> TaskError {
 }
 
 fn start(state: &mut State, fingers: &[PadId], effects: &mut Vec<Effect>) {
-    let Ok(bundle) = state.bundle(BundleKind::Generator).cloned() else { return };
+    let Ok(bundle) = recipe::bundle(state, BundleKind::Generator).cloned() else { return };
     let (Some(pair), Some(open)) = (state.pair_key(), &state.library.open) else { return };
     let (source, sample) = (open.source.clone(), state.results.samples.get(&pair).cloned());
     let mut recipes: Vec<PredictionKey> = Vec::new();
     for finger in fingers {
-        let Some(recipe) = state.recipe(pair.finger(*finger)) else { continue };
-        state.unpick(recipe.touch);
+        let Some(recipe) = recipe::prediction(state, pair.finger(*finger)) else { continue };
+        state.results.shown.unpick(recipe.touch);
         if state.results.predictions.contains(&recipe) {
             continue;
         }
@@ -128,7 +127,7 @@ impl Errand for Generate {
 
     fn ended(made: &Keyed, state: &mut State, _: &mut Vec<Effect>) {
         for (key, prediction) in made {
-            state.keep_prediction(key.clone(), prediction.clone(), true);
+            results::keep_prediction(state, key.clone(), prediction.clone(), true);
         }
     }
 }

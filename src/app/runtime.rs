@@ -9,20 +9,22 @@ use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::time::{Duration, Instant};
 
+use lanes::{Event, Lanes};
+
 use super::answers::Answer;
 use super::apply::apply;
 use super::command::{Command, LabelsCommand, LibraryCommand, UnsavedCommand};
 use super::effect::Effect;
 use super::jobs::Lane;
-use super::keys::{DatasetSeq, Request, TouchKey};
-use super::library::state::Place;
-use super::results::Preview;
+use super::keys::{DatasetSeq, Preview, TouchKey};
 use super::results::preview::PreviewRequest;
 use super::services::SharedServices;
 use super::state::State;
-use super::tasks::state::Ticket;
-use super::view::state::UiRequest;
-use lanes::{Event, Lanes};
+use super::state::library::Place;
+use super::state::results::Request;
+use super::state::tasks::Ticket;
+use super::state::view::UiRequest;
+use super::{demand, labels, results};
 use touch2touch_work::io::caught::caught;
 use touch2touch_work::job::{Cancel, Progress};
 
@@ -64,7 +66,7 @@ pub struct Runtime {
     progress: Arc<std::sync::Mutex<BTreeMap<Ticket, Progress>>>,
     /// Pictures on the way, only the latest of each touch.
     previews: Arc<std::sync::Mutex<LatestPreviews>>,
-    /// What of them would be looked at.
+    /// The part of them that would be looked at.
     preview_wish: Arc<std::sync::Mutex<PreviewRequest>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
@@ -144,17 +146,17 @@ impl Runtime {
             self.run(state, command, &mut ui);
         }
         self.retry(state, &mut ui);
-        let wish = state.preview_wish();
+        let wish = results::preview_wish(state);
         if wish != *lock(&self.preview_wish) {
             *lock(&self.preview_wish) = wish;
         }
-        let wanted = state.demands();
+        let wanted = demand::demands(state);
         if wanted != state.tasks.demanded {
             self.run(state, Answer::Demanded(wanted), &mut ui);
         }
         let services = &self.services;
         self.lanes.demand(&state.tasks.demanded, |request| {
-            Some((state.library.open.as_ref()?.seq, request.job(state, services)?))
+            Some((state.library.open.as_ref()?.seq, results::job(request, state, services)?))
         });
         ui
     }
@@ -175,7 +177,7 @@ impl Runtime {
         }
     }
 
-    /// How long until [`Runtime::tick`] has to be called although nothing happens; `None` = not at all.
+    /// The time until [`Runtime::tick`] has to be called although nothing happens; `None` = not at all.
     pub fn next_tick(&self) -> Option<Duration> {
         Some(self.retry_at?.saturating_duration_since(Instant::now()))
     }
@@ -189,7 +191,7 @@ impl Runtime {
         while let Ok(Event { answer, .. }) = self.events.try_recv() {
             keep.extend(apply(state, answer.into()).into_iter().filter(|e| matches!(e, Effect::KeepLabels { .. })));
         }
-        let unsaved = state.unsaved();
+        let unsaved = labels::unsaved(state);
         if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
             keep.push(Effect::keep_waiting(open.source.clone(), unsaved));
         }

@@ -1,26 +1,25 @@
 //! The room of several seeds of one touch.
 
-pub mod state;
+pub use super::state::seeds::{COUNT, Seeds};
 
-pub use state::{COUNT, Seeds};
-
+use super::results;
 use super::state::State;
 
-/// What can be done with seeds.
+/// A command to the seeds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SeedsCommand {
-    /// How many; limited to [`COUNT`].
+    /// The number, limited to [`COUNT`].
     Count(usize),
     /// Makes those that are missing for the pair on screen, or stops.
     Run(bool),
-    /// Whether they are made for every pair that is shown.
+    /// True where they are made for every pair that is shown.
     EveryPair(bool),
 }
 
 pub(super) fn step(state: &mut State, command: SeedsCommand) {
     match command {
         SeedsCommand::Count(count) => state.seeds.count = count.clamp(*COUNT.start(), *COUNT.end()),
-        SeedsCommand::Run(true) => state.seeds.asked = state.seeds_of(),
+        SeedsCommand::Run(true) => state.seeds.asked = results::seeds_of(state),
         SeedsCommand::Run(false) => (state.seeds.asked, state.seeds.every) = (None, false),
         SeedsCommand::EveryPair(every) => state.seeds.every = every,
     }

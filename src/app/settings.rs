@@ -1,13 +1,12 @@
 //! The room of the preferences. Each change is saved.
 
-pub mod state;
-
-pub use state::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
-pub use state::versus::{Versus, VersusMode};
-pub(crate) use state::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
-pub use state::{
+pub use super::pane::Workspace;
+pub use super::state::settings::scene::{LayerLook, LayerSize, SceneLayer, SceneLook};
+pub use super::state::settings::versus::{Versus, VersusMode};
+pub(crate) use super::state::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MAX_CACHE_MIB, STEPS};
+pub use super::state::settings::{
     ColorMap, ColorRange, GenerateSettings, Last, MaskChoice, MaskSettings, MaskSource, MaskTool, ProposalSource,
-    Settings, Theme, ToolRow, Workspace,
+    Settings, Theme, ToolRow,
 };
 
 use std::fmt;
@@ -17,9 +16,10 @@ use serde_json::Value;
 
 use super::effect::Effect;
 use super::keys::ImprintSource;
+use super::results;
 use super::state::State;
 
-/// What can happen to the preferences.
+/// A command to the preferences.
 #[derive(Clone, Debug)]
 pub enum SettingsCommand {
     /// Takes over what a person changed ([`prefer`]).
@@ -28,7 +28,7 @@ pub enum SettingsCommand {
     RangeFromShown,
     /// The arrangement of the panes of a workspace, in the window's format.
     SetLayout(Workspace, String),
-    /// What is on screen as the window is closed.
+    /// The screen as the window is closed.
     Remember(Last),
     /// All preferences back to their defaults; recent places stay.
     ResetSettings,
@@ -114,7 +114,7 @@ fn range_from_shown(state: &mut State) {
     let mut values: Vec<f32> = Vec::new();
     for finger in state.fingers() {
         for source in [ImprintSource::Measured, ImprintSource::Predicted] {
-            if let Some(imprint) = state.imprint(source, finger).ready() {
+            if let Some(imprint) = results::imprint(state, source, finger).ready() {
                 values.extend(imprint.as_slice().iter().filter(|v| v.is_finite()));
             }
         }

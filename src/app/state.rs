@@ -2,45 +2,63 @@
 
 use std::sync::Arc;
 
-use super::adapt::state::AdaptState;
-use super::dial::state::DialState;
-use super::evaluate::state::TableState;
-use super::export::state::ExportState;
-use super::history::History;
-use super::inspect::state::Inspect;
+pub mod adapt;
+pub mod cache;
+pub mod dial;
+pub mod evaluate;
+pub mod export;
+pub mod history;
+pub mod inspect;
+pub mod labels;
+pub mod library;
+pub mod results;
+pub mod seeds;
+pub mod settings;
+pub mod shown;
+pub mod tasks;
+pub mod train;
+pub mod view;
+pub mod workbench;
+
 use super::keys::{PairKey, TouchKey};
-use super::labels::state::Document;
-use super::library::state::Library;
 use super::pane::Demand;
-use super::results::Results;
-use super::seeds::state::Seeds;
-use super::settings::state::Settings;
-use super::tasks::state::{Log, Tasks};
-use super::train::state::TrainState;
-use super::view::state::Selection;
-use super::workbench::state::Workbench;
+use adapt::AdaptState;
+use dial::DialState;
+use evaluate::TableState;
+use export::ExportState;
+use history::History;
+use inspect::Inspect;
+use labels::Document;
+use library::Library;
+use results::{Cached, Request, Results};
+use seeds::Seeds;
+use settings::Settings;
+use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
 use touch2touch_core::rig::{PadId, Rig, Text};
 use touch2touch_work::error::TaskError;
+use train::TrainState;
+use view::Selection;
+use workbench::Workbench;
 
 /// Everything the studio shows.
 #[derive(Debug, Default)]
 pub struct State {
     /// The open data set and its list.
     pub library: Library,
-    /// What is looked at.
+    /// The selection: everything that is looked at.
     pub selection: Selection,
-    /// What of a registration is looked at.
+    /// The part of a registration that is looked at.
     pub inspect: Inspect,
-    /// What a person made.
+    /// The document: everything that a person made.
     pub document: Document,
-    /// What can be undone.
+    /// The history of changes that can be undone.
     pub history: History,
-    /// What was computed.
+    /// The results: everything that was computed.
     pub results: Results,
     /// The results table of the data set.
     pub table: TableState,
-    /// What is chosen of the next figure.
+    /// The choices of the next figure and of what else is taken away.
     pub export: ExportState,
     /// The dial that is turned over pairs.
     pub dial: DialState,
@@ -48,17 +66,17 @@ pub struct State {
     pub adapt: AdaptState,
     /// The training of the mask model.
     pub train: TrainState,
-    /// What the 3D panes do and show besides.
+    /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,
-    /// What a person chose about seeds.
+    /// The choices of a person about seeds.
     pub seeds: Seeds,
-    /// What a person prefers; while a case is open, what it was saved with.
+    /// The preferences; while a case is open, those it was saved with.
     pub settings: Settings,
     /// The person's own preferences, while a case is open that has others.
     pub own: Option<Box<Settings>>,
-    /// What runs.
+    /// The tasks: everything that runs.
     pub tasks: Tasks,
-    /// What happened.
+    /// The event, in words.
     pub log: Log,
 }
 
@@ -105,19 +123,54 @@ impl State {
         Some(self.pair_key()?.finger(finger))
     }
 
-    /// Whether a pair is the one on screen.
+    /// True where a pair is the one on screen.
     pub(super) fn is_selected(&self, key: PairKey) -> bool {
         self.pair_key() == Some(key)
     }
 
-    /// Whether a pane on screen needs something.
+    /// True where a pane on screen needs something.
     pub(super) fn needs(&self, need: Demand) -> bool {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
     }
 
-    /// Whether a pane on screen shows something of the selected pair.
+    /// True where a pane on screen shows something of the selected pair.
     pub(super) fn shows_pair(&self) -> bool {
         self.selection.panes.iter().any(|pane| pane.is_of_pair())
+    }
+
+    /// The result of a recipe, or what stands in its place.
+    pub(crate) fn look<K: Cached>(&self, key: K) -> Lookup<'_, Arc<K::Value>> {
+        self.look_or(Ok(Some(key)), || None)
+    }
+
+    /// The result of a recipe that may be unknown still, or not be possible; meanwhile the one before.
+    pub(crate) fn look_or<'a, K: Cached>(
+        &'a self,
+        key: Result<Option<K>, Absent>,
+        before: impl FnOnce() -> Option<&'a Arc<K::Value>>,
+    ) -> Lookup<'a, Arc<K::Value>> {
+        let key = match key {
+            Ok(key) => key,
+            Err(absent) => return Lookup::Absent(absent),
+        };
+        if let Some(value) = key.as_ref().and_then(|key| K::cache(&self.results).get(key)) {
+            return Lookup::Ready(value);
+        }
+        match (key.and_then(|key| self.failure(key)), before()) {
+            (Some(err), _) => Lookup::Failed(err),
+            (None, Some(before)) => Lookup::Stale(before),
+            (None, None) => Lookup::Waiting,
+        }
+    }
+
+    /// Why a result could not be computed, if that was tried.
+    pub(crate) fn failure(&self, request: impl Into<Request>) -> Option<&TaskError> {
+        self.tasks.failed.get(&request.into())
+    }
+
+    /// Recomputes the order of the list.
+    pub(in crate::app) fn reorder(&mut self) {
+        self.library.reorder(&self.document, &self.table);
     }
 }
 
@@ -161,7 +214,7 @@ impl<'a, T: ?Sized> Lookup<'a, T> {
         }
     }
 
-    /// What is in its place, when there is no value.
+    /// The reason in its place, when there is no value.
     pub fn without<U: ?Sized>(self) -> Lookup<'a, U> {
         match self {
             Self::Ready(_) | Self::Stale(_) | Self::Waiting => Lookup::Waiting,
@@ -256,7 +309,7 @@ pub enum Absent {
 }
 
 impl Absent {
-    /// What is missing, as a sentence.
+    /// The sentence that says what is missing.
     pub fn text(self) -> &'static str {
         match self {
             Self::NothingOpen => "No data set is open. Drop a folder here, or open the demo.",

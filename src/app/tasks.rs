@@ -1,11 +1,9 @@
 //! The room of running jobs and the log.
 
-pub mod state;
-
 use std::path::PathBuf;
 
-pub(crate) use state::Task;
-pub use state::{Entry, Level, Log, TaskKind, Tasks, Ticket};
+pub(crate) use super::state::tasks::Task;
+pub use super::state::tasks::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 
 use super::effect::{Access, Effect, Errand, Started};
 use super::jobs::Lane;
@@ -13,7 +11,7 @@ use super::state::State;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::job::{JobCx, Progress};
 
-/// What can happen to jobs and log.
+/// A command to jobs and log.
 #[derive(Clone, Debug)]
 pub enum TasksCommand {
     /// Tells a job to stop.
@@ -59,7 +57,7 @@ pub(super) fn start<'a, E: Errand>(
     errand: E,
     effects: &mut Vec<Effect>,
 ) -> Option<&'a mut Task> {
-    if E::KIND.lane() == Lane::Batch && state.running(E::KIND).is_some() {
+    if E::KIND.lane() == Lane::Batch && state.tasks.of_kind(E::KIND).is_some() {
         return None;
     }
     state.tasks.last_ticket += 1;

@@ -1,29 +1,27 @@
 //! The room of training a mask model on the masks that people corrected.
 
-pub mod state;
-
-pub use state::TrainForm;
-pub(crate) use state::TrainState;
-pub(crate) use state::{MINUTES, STEPS};
+pub use super::state::train::TrainForm;
+pub(crate) use super::state::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainState};
 
 use std::collections::BTreeMap;
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
-use super::labels::state::PairLabels;
-use super::services::DataSource;
 use super::settings::{self, prefer};
+use super::source::DataSource;
 use super::state::State;
-use super::tasks;
-use super::tasks::state::{Level, TaskKind};
-use touch2touch_work::bundles::{self, BundleInfo};
+use super::state::labels::PairLabels;
+use super::state::tasks::{Level, TaskKind};
+use super::{recipe, tasks};
+use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::DrawnMasks;
-use touch2touch_work::job::JobCx;
+use touch2touch_work::job::{Curve, JobCx};
 use touch2touch_work::labels::Labels;
 use touch2touch_work::train::{self, TrainSetup, Trained};
 
-/// What can happen to the training.
+/// A command to the training.
 #[derive(Clone, Copy, Debug)]
 pub enum TrainCommand {
     /// Changes what is asked for.
@@ -38,7 +36,7 @@ pub(super) fn step(state: &mut State, command: TrainCommand, effects: &mut Vec<E
     match command {
         TrainCommand::SetForm(form) => state.train.form = form.validated(),
         TrainCommand::Start => {
-            let (Some(setup), Some(open)) = (state.train_setup(), &state.library.open) else { return };
+            let (Some(setup), Some(open)) = (setup(state), &state.library.open) else { return };
             let errand = Train { source: open.source.clone(), changed: state.document.labels.clone(), setup };
             tasks::start(state, TaskKind::Train.name(), errand, effects);
         }
@@ -48,7 +46,7 @@ pub(super) fn step(state: &mut State, command: TrainCommand, effects: &mut Vec<E
 
 /// Makes automatic masks with the trained model.
 fn take_up(state: &mut State, effects: &mut Vec<Effect>) {
-    let Some(name) = state.trained().map(|bundle| bundle.name.clone()) else { return };
+    let Some(name) = trained(state).map(|bundle| bundle.name.clone()) else { return };
     let bundle = name.clone();
     settings::step(state, prefer(move |s| s.mask.bundle = Some(bundle.clone())), effects);
     state.log.info(format!("Automatic masks are made by {name} from now on"));
@@ -57,7 +55,7 @@ fn take_up(state: &mut State, effects: &mut Vec<Effect>) {
 /// Trains a mask model, and keeps the new one where the program keeps models.
 pub struct Train {
     source: Arc<dyn DataSource>,
-    /// What was said about pairs, as far as it may not be on the disk yet.
+    /// The labels of pairs, as far as they may not be on the disk yet.
     changed: BTreeMap<String, PairLabels>,
     setup: TrainSetup,
 }
@@ -102,4 +100,40 @@ impl Errand for Train {
         }
         state.train.result = Some(trained.clone());
     }
+}
+
+/// The setup of a training started now; `None` without data or a mask model. Where the new bundle lies is not the
+/// state's to say.
+pub(crate) fn setup(state: &State) -> Option<TrainSetup> {
+    state.library.open.as_ref()?;
+    let generators = state.library.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator);
+    Some(TrainSetup {
+        start: recipe::bundle(state, BundleKind::Mask).ok()?.clone(),
+        generators: generators.cloned().collect(),
+        engine: state.settings.runtime,
+        choice: state.train.form.choice,
+        tuning: state.train.form.tuning(),
+        unfinished: None,
+        out: PathBuf::new(),
+    })
+}
+
+/// The curves of the training, or of the last one.
+pub(crate) fn curves(state: &State) -> &[Curve] {
+    match (state.tasks.of_kind(TaskKind::Train), &state.train.result) {
+        (Some((_, task)), _) => &task.progress.curves,
+        (None, Some(result)) => &result.curves,
+        (None, None) => &[],
+    }
+}
+
+/// The bundle that was trained on the open data set.
+pub fn trained(state: &State) -> Option<&BundleInfo> {
+    state.library.bundle(state.train.bundle.as_deref()?)
+}
+
+/// True where the trained bundle makes the automatic masks now.
+pub fn uses_trained(state: &State) -> bool {
+    let now = recipe::bundle(state, BundleKind::Mask).ok().map(|bundle| &bundle.id);
+    trained(state).is_some_and(|trained| Some(&trained.id) == now)
 }

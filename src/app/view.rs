@@ -1,8 +1,6 @@
 //! The room of what is on screen.
 
-pub mod state;
-
-pub use state::{CameraPreset, Hover, UiRequest};
+pub use super::state::view::{CameraPreset, Hover, UiRequest};
 
 use std::collections::BTreeSet;
 
@@ -11,12 +9,11 @@ use glam::DVec3;
 use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::labels;
-use super::pane::Pane;
-use super::settings::state::Workspace;
+use super::pane::{Pane, Workspace};
 use super::state::State;
 use touch2touch_core::rig::PadId;
 
-/// What can happen to what is on screen.
+/// A command to what is on screen.
 #[derive(Clone, Debug)]
 pub enum ViewCommand {
     /// Makes a finger the active one.

@@ -1,37 +1,36 @@
 //! The room of the workbench: layers, poses by hand, measuring.
 
-pub mod state;
-
-pub(crate) use state::SECTION_REACH_M;
-pub use state::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
+pub(crate) use super::state::workbench::SECTION_REACH_M;
+pub use super::state::workbench::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 
 use super::effect::Effect;
 use super::inspect::InspectCommand;
-use super::keys::{ImprintSource, Request, RunKey};
+use super::keys::{ImprintSource, RunKey};
 use super::state::State;
-use super::{inspect, labels};
+use super::state::results::Request;
+use super::{inspect, labels, results};
 use touch2touch_core::manual::{self, AcceptedPose, ManualCost, ManualPose, PoseAxis};
 use touch2touch_work::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;
 
-/// What can happen to the workbench.
+/// A command to the workbench.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WorkbenchCommand {
-    /// What colors the contact points.
+    /// The coloring of the contact points.
     SetLayer(Layer),
-    /// Whether the tool is moved along its weakest direction.
+    /// True where the tool is moved along its weakest direction.
     SetAnimateWeakest(bool),
-    /// Whether each 3D pane shows the clouds of both imprints.
+    /// True where each 3D pane shows the clouds of both imprints.
     SetBothClouds(bool),
-    /// What cuts the 3D views open; nothing does without one.
+    /// The plane that cuts the 3D views open; none does without one.
     SetSection(Option<Section>),
-    /// What a click does.
+    /// The effect of a click.
     SetTool(SceneTool),
-    /// Whether the tool can leave the plane; closing it brings the tool back into the plane.
+    /// True where the tool can leave the plane; closing it brings the tool back into the plane.
     SetSixDof(bool),
     /// The side that the pointer is over.
     SetSide(ImprintSource),
@@ -113,10 +112,10 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
     }
 }
 
-/// What a pose costs with the contact points of an imprint; `None` while cloud or model are not there.
+/// The cost of a pose with the contact points of an imprint; `None` while cloud or model are not there.
 fn cost_of(state: &State, source: ImprintSource, pose: ManualPose) -> Option<ManualCost> {
-    let clouds = state.cloud(source).ready()?;
-    let tool = &state.tool().ready()?.model;
+    let clouds = results::cloud(state, source).ready()?;
+    let tool = &results::tool(state).ready()?.model;
     Some(manual::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
 }
 
@@ -127,8 +126,8 @@ fn hold(state: &State) -> Option<ManualTry> {
         return Some(hand.clone());
     }
     // Without a model there is nothing to be moved.
-    state.tool().ready()?;
-    let began = state.manual_begins(source);
+    results::tool(state).ready()?;
+    let began = results::manual_begins(state, source);
     let cost = cost_of(state, source, began);
     Some(ManualTry { pair, source, pose: began, began, cost, began_cost: cost, icp: None, from_icp: None })
 }
@@ -164,7 +163,7 @@ fn start_icp(state: &mut State) {
     let Some(mut hand) = hold(state) else {
         return state.log.error(&TaskError::new(WHAT, "there is no tool to be moved"));
     };
-    let Ok(Some(pose)) = state.pose_key(hand.source) else {
+    let Ok(Some(pose)) = results::pose_key(state, hand.source) else {
         return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
     };
     let (source, start) = (hand.source, hand.pose.planar);
@@ -215,5 +214,5 @@ fn accept(state: &mut State, effects: &mut Vec<Effect>) {
     }
     let accepted = AcceptedPose { pose: hand.pose, by_hand: true };
     state.workbench.hand = None;
-    labels::set_accepted(state, "pose set by hand", hand.source, Some(accepted), effects);
+    labels::set_accepted(state, hand.source, Some(accepted), effects);
 }

@@ -49,8 +49,8 @@ pub(super) struct AdaptArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles, where the data have poses.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     };
     let output = Output::new(args.common, "fitting", pairs.len());
     let models = args.model.models();
-    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.engine)?;
+    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.registration)?;
     let setup = AdaptSetup {
         recipe,
         pairs,

@@ -20,7 +20,7 @@ use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::recipe::Stage;
-use touch2touch_work::tool::load_tool;
+use touch2touch_work::tool::{LoadedTool, load_tool};
 
 /// Arguments of `basin`.
 #[derive(Debug, Args)]
@@ -39,8 +39,8 @@ pub(super) struct BasinArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     json: JsonArgs,
     #[command(flatten)]
@@ -70,7 +70,8 @@ impl From<PlaneArg> for Plane {
 #[derive(Debug, Serialize)]
 struct Report {
     pair: String,
-    engine: String,
+    #[serde(rename = "engine")]
+    registration: String,
     imprint: &'static str,
     mask: String,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -95,9 +96,9 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let sample = dataset.load(id)?;
     let name = entry.tool.as_deref();
     let name = name.ok_or_else(|| anyhow::anyhow!("{}: no tool is named, so there is no CAD model", entry.name))?;
-    let (tool, odd) = load_tool(&dataset, name)?;
+    let LoadedTool { model: tool, notes: odd } = load_tool(&dataset, name)?;
     let models = args.model.models();
-    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?;
+    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
     notes.take(&output, &odd);
@@ -108,10 +109,10 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
     let own = felt.pose().map_err(Clone::clone)?;
     let started = Instant::now();
-    let basin = touch2touch_work::pose::basin(points, &tool, args.engine, args.plane.into(), &output.job())?;
+    let basin = touch2touch_work::pose::basin(points, &tool, args.registration, args.plane.into(), &output.job())?;
     let report = Report {
         pair: entry.name.clone(),
-        engine: args.engine.to_string(),
+        registration: args.registration.to_string(),
         imprint: args.imprint.key(),
         mask: contact.made_of(),
         mask_notes: contact.notes(&sample.rig),

@@ -39,8 +39,8 @@ pub(super) struct MakeArgs {
     #[arg(long)]
     measured_only: bool,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -79,7 +79,7 @@ fn run_make(args: &MakeArgs) -> VerbResult {
     let output = Output::new(args.common, "making", 1);
     let models = args.model.models();
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
-    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?.of(ImprintSource::Measured);
     // A shift is of predictions.
     let shift = if args.measured_only { Default::default() } else { recipe.shift };
     let labels = match args.mask.no_hand {

@@ -28,9 +28,10 @@ use touch2touch_work::io::npz;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
+use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::Stage;
-use touch2touch_work::subject::Subject;
+use touch2touch_work::subject::{MadeFrom, Subject};
 use touch2touch_work::tool::load_tool;
 
 /// Half the range of the difference's colors in a written picture, meters.
@@ -61,8 +62,8 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     tool: ToolArgs,
     /// The registration.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -154,14 +155,20 @@ impl Found {
 fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models) -> anyhow::Result<Found> {
     let Touch { dataset, pair, sample, .. } = touch;
     let cx = JobCx::unwatched();
-    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.engine);
-    match subject {
-        Subject::Measured => {
+    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
+    let made_from = subject.made_from(|generator| {
+        let own_mapping = subject.wish().is_some_and(|wish| wish.shift.is_some());
+        let model = if own_mapping { args.model.without_mapping() } else { args.model.clone() };
+        let model = generator.map_or_else(|| model.clone(), |name| model.with_generator(name));
+        recipe(&model, ImprintSource::Predicted)
+    })?;
+    match made_from {
+        MadeFrom::Measurement => {
             let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let tile = tile_of(dataset, pair, sample)?;
             Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile })
         }
-        Subject::Stored => {
+        MadeFrom::Picture => {
             let recipe = recipe(&args.model, ImprintSource::Measured)?;
             let found = beside(dataset, pair, sample)?;
             let found = found.ok_or_else(|| anyhow::anyhow!("there is no NAME_vqvae.png beside this pair"))?;
@@ -169,20 +176,19 @@ fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models
             let pads = sample.rig.pads().map(|pad| sample.pad(pad).map(|_| found.imprint.clone()));
             Ok(Found { felt: Felt::of_imprints(&recipe, pads.collect()), tile: Some(found.tile) })
         }
-        Subject::Predicted(wish) => {
-            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
+        MadeFrom::Prediction(recipe) => {
             Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile: None })
         }
-        Subject::Mean(wish, count) => {
-            let recipe = recipe(&args.model.with(wish), ImprintSource::Predicted)?;
+        MadeFrom::Mean(recipes) => {
+            let recipe = recipes.first().ok_or_else(|| anyhow::anyhow!("{subject}: no seed is asked for"))?;
             let mut imprints = PerPad::default();
             for (pad, _) in sample.pads.entries() {
                 if recipe.generating()?.picture(sample, pad)?.is_some() {
-                    let made = seeds_of((sample, pad), &recipe, *count, models, &cx)?;
+                    let made = seeds_of(OnPad { sample, pad }, recipe, recipes.len(), models, &cx)?;
                     imprints[pad] = Some(made.ensemble.spread.mean);
                 }
             }
-            Ok(Found { felt: Felt::of_imprints(&recipe, imprints), tile: None })
+            Ok(Found { felt: Felt::of_imprints(recipe, imprints), tile: None })
         }
     }
 }
@@ -199,10 +205,10 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         Some(name) => Some(load_tool(&dataset, name)?),
         None => None,
     };
-    notes.take(&output, tool.as_ref().map_or(&[], |(_, odd)| odd));
+    notes.take(&output, tool.as_ref().map_or(&[], |loaded| &loaded.notes));
     let lacks = TaskError::new("Compare", "no tool is named, so there is no CAD model");
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
-    let tool = tool.as_ref().map(|(tool, _)| tool);
+    let tool = tool.as_ref().map(|loaded| &loaded.model);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
     let models = args.model.models();
     let found = [find(args, &args.a, touch, &models)?, find(args, &args.b, touch, &models)?];

@@ -7,6 +7,7 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator as _;
 
 use super::Output;
+use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::{Labels, PairLabels};
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::recipe::{meters, millimeters};
@@ -70,7 +71,12 @@ impl MaskArgs {
 
 /// The labels of a pair, made in the studio or by `label`; damaged ones are said and do not hold up the rest.
 pub(super) fn labels_of(labels: &Labels, name: &str, output: &Output) -> PairLabels {
-    labels.load(name).unwrap_or_else(|err| {
+    readable(labels.load(name), output)
+}
+
+/// The labels that were read; none where they cannot be, which is said.
+pub(super) fn readable(labels: Result<PairLabels, TaskError>, output: &Output) -> PairLabels {
+    labels.unwrap_or_else(|err| {
         output.note(&format!("note: {err}; its labels are left out"));
         PairLabels::default()
     })

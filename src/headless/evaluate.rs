@@ -34,8 +34,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
@@ -176,7 +176,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     Ok(Setup {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        recipe: common(shift, &args.mask, mask_model, args.engine, args.runtime)?,
+        recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime)?,
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,

@@ -42,8 +42,8 @@ pub(super) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -63,7 +63,8 @@ fn parse_file() -> impl TypedValueParser<Value = PairFile> {
 struct Report {
     pair: String,
     imprint: &'static str,
-    engine: String,
+    #[serde(rename = "engine")]
+    registration: String,
     mask: String,
     files: Vec<PathBuf>,
     /// Oddities of the files of the pair.
@@ -80,9 +81,9 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     notes.take(&output, &sample.notes);
     let tool = entry.tool.as_deref().map(|name| load_tool(&dataset, name)).transpose();
     let tool = match tool {
-        Ok(found) => found.map(|(tool, odd)| {
-            notes.take(&output, &odd);
-            tool
+        Ok(found) => found.map(|loaded| {
+            notes.take(&output, &loaded.notes);
+            loaded.model
         }),
         // The cloud needs none.
         Err(err) if args.what == [PairFile::Cloud] => {
@@ -92,7 +93,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         Err(err) => return Err(err.into()),
     };
     let models = args.model.models();
-    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?;
+    let recipe = args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?;
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let lacks = TaskError::new("Export", "there is no CAD model");
     let touch =
@@ -117,7 +118,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         rig: &sample.rig,
         clouds: &clouds,
         mask: &mask,
-        engine: args.engine,
+        registration: args.registration,
         pose: found,
         truth,
         tool: entry.tool.as_deref().zip(tool.as_ref()),
@@ -126,7 +127,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let report = Report {
         pair: entry.name.clone(),
         imprint: args.imprint.key(),
-        engine: args.engine.to_string(),
+        registration: args.registration.to_string(),
         mask,
         files,
         notes: notes.into_list(&output),

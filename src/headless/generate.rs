@@ -20,7 +20,7 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::{PadTouch, Sample, Scale};
+use touch2touch_core::sample::{PadTouch, Scale};
 use touch2touch_core::{metrics, resample};
 use touch2touch_work::compare;
 use touch2touch_work::doubts;
@@ -30,6 +30,7 @@ use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::names::with_ending;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::prediction::Prediction;
 
 use report::{COLOR_CONVENTION, Pair, Report, Stored, Unit, convention, mean, take, text};
@@ -117,15 +118,16 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 }
                 let imprint = imprint_of(&predicted, shift, &sample, finger)?;
                 write(&stem, &imprint)?;
-                let drawn = Some((&predicted, shift));
-                score(&dataset, id, (finger, &sample), (&imprint, drawn), &mut pair)?;
+                let (drawn, on) = (Some((&predicted, shift)), OnPad { sample: &sample, pad: finger });
+                score(&dataset, id, on, (&imprint, drawn), &mut pair)?;
                 if args.ensemble.seeds > 1 {
                     let count = usize::from(args.ensemble.seeds);
-                    let found = seeds_of((&sample, finger), &recipe, count, &models, &JobCx::unwatched())?;
+                    let found = seeds_of(on, &recipe, count, &models, &JobCx::unwatched())?;
                     let mut of_mean = Pair::default();
-                    score(&dataset, id, (finger, &sample), (&found.ensemble.spread.mean, None), &mut of_mean)?;
-                    let scores = (of_mean.psnr_db, of_mean.ssim);
-                    pair.ensemble = Some(seeds::write(&stem, &found, config.seed, scores)?);
+                    score(&dataset, id, on, (&found.ensemble.spread.mean, None), &mut of_mean)?;
+                    let mut figures = seeds::write(&stem, &found, config.seed)?;
+                    (figures.mean_psnr_db, figures.mean_ssim) = (of_mean.psnr_db, of_mean.ssim);
+                    pair.ensemble = Some(figures);
                 }
                 made.push(pair);
             }
@@ -174,18 +176,18 @@ fn score_color(difference: &RgbGrid, touch: &PadTouch, pair: &mut Pair) -> anyho
 fn score(
     dataset: &Dataset,
     id: PairId,
-    (finger, sample): (PadId, &Sample),
+    OnPad { sample, pad }: OnPad<'_>,
     (imprint, drawn): (&DepthMap, Option<(&Prediction, ShiftMode)>),
     pair: &mut Pair,
 ) -> anyhow::Result<()> {
     let tile = compare::tile_of(dataset, id, sample)?;
-    if let Some(found) = compare::of_pad(imprint, drawn, sample, finger, tile.as_ref())? {
+    if let Some(found) = compare::of_pad(imprint, drawn, sample, pad, tile.as_ref())? {
         take(pair, &found);
     }
     if let Some(tile) = tile
         && let Some(vqvae) = compare::beside(dataset, id, sample)?
     {
-        let theirs = compare::tiles(&vqvae.tile, &tile, sample, finger)?;
+        let theirs = compare::tiles(&vqvae.tile, &tile, sample, pad)?;
         (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
         pair.vqvae = theirs.unstretched.map(Stored);
     }

@@ -9,6 +9,7 @@ use super::{Output, VerbResult, find_pair};
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::{Ground, Provenance};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
@@ -19,12 +20,13 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::{Felt, Touch, feel};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::job::JobCx;
+use touch2touch_work::label_edit::{self, Edited, LabelEdit, TakenUp};
 use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{
-    DrawnMask, ImprintOf, ImprintSource, Labels, MaskPlace, Operation, PairLabels, Review, note, system_person, take_in,
+    DrawnMask, ImprintOf, ImprintSource, Labels, MaskPlace, Operation, PairLabels, Review, system_person, take_in,
 };
 use touch2touch_work::models::Models;
-use touch2touch_work::propose::{self, Proposal, ProposeSetup, accepted};
+use touch2touch_work::propose::{self, Proposal, ProposeSetup};
 use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::load_tool;
 
@@ -53,14 +55,12 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
         let entry = &dataset.index.pairs[id.0 as usize];
         let mut stored = labels.load(&entry.name)?;
         labels.journal_problem(&entry.name).into_iter().for_each(|err| output.note(&format!("note: {err}")));
-        let before = stored.clone();
-        change(args, (&dataset, &labels, id), &mut stored)?;
-        if stored != before {
-            labels.save(
-                &entry.name,
-                &stored,
-                &Operation { person: args.person.clone(), ..Operation::named("label") },
-            )?;
+        // Nothing is written of what cannot be done to its end.
+        let mut changes = Changes { now: stored.clone(), made: Vec::new() };
+        change(args, &dataset, &labels, id, &mut changes)?;
+        for Edited { deed, change } in changes.made {
+            change.apply_to(&mut stored);
+            labels.save(&entry.name, &stored, &Operation { person: args.person.clone(), ..deed })?;
         }
         pairs.push(Stored::new(&entry.name, &stored, &dataset));
     } else {
@@ -102,7 +102,7 @@ impl<'a> Maker<'a> {
     fn load(args: &'a LabelArgs, dataset: &'a Dataset, pair: PairId) -> anyhow::Result<Self> {
         let entry = &dataset.index.pairs[pair.0 as usize];
         let tool = match &entry.tool {
-            Some(name) => load_tool(dataset, name).map(|(tool, _)| tool),
+            Some(name) => load_tool(dataset, name).map(|loaded| loaded.model),
             None => Err(TaskError::new("Label", format!("{}: no tool is named, so there is no CAD model", entry.name))),
         };
         let (recipe, models) = (recipe(args, dataset)?, args.model.models());
@@ -115,14 +115,70 @@ impl<'a> Maker<'a> {
 
     /// The masks of an imprint; with `hand`, those that were drawn where there are some.
     fn contact(&self, imprint: ImprintSource, hand: bool, labels: &PairLabels) -> anyhow::Result<Felt> {
-        let recipe = Recipe { hand, ..self.recipe.of(imprint) };
-        Ok(feel(self.touch(labels), &recipe, Stage::Mask, &self.models, &JobCx::unwatched())?)
+        self.felt(&Recipe { hand, ..self.recipe.of(imprint) }, Stage::Mask, labels)
+    }
+
+    fn felt(&self, recipe: &Recipe, stage: Stage, labels: &PairLabels) -> anyhow::Result<Felt> {
+        Ok(feel(self.touch(labels), recipe, stage, &self.models, &JobCx::unwatched())?)
     }
 
     fn pose(&self, imprint: ImprintSource, labels: &PairLabels) -> anyhow::Result<PlanarPose> {
-        let recipe = self.recipe.of(imprint);
-        let felt = feel(self.touch(labels), &recipe, Stage::Pose, &self.models, &JobCx::unwatched())?;
+        let felt = self.felt(&self.recipe.of(imprint), Stage::Pose, labels)?;
         Ok(felt.pose().map_err(Clone::clone)?.grasp_from_object)
+    }
+
+    /// Changes the masks of pads as the arguments say.
+    fn masks(&self, all: &Labels, pads: Vec<PadId>, labels: &mut Changes) -> anyhow::Result<()> {
+        let args = self.args;
+        let by = Provenance::hand(args.person.clone().or_else(system_person).unwrap_or_default());
+        let start = self.contact(args.from.unwrap_or(args.imprint), !args.adopt, &labels.now)?;
+        let imprints = match args.from {
+            Some(_) => self.felt(&self.recipe.of(args.imprint), Stage::Imprint, &labels.now)?.imprints,
+            None => start.imprints.clone(),
+        };
+        let pads: Vec<PadId> = pads.into_iter().filter(|pad| start.contact().masks[*pad].is_some()).collect();
+        let proposed = match args.propose {
+            Some(_) => self.proposals(all, &start, &pads, &labels.now)?,
+            None => PerPad::default(),
+        };
+        let mut drawn_on = vec![false; args.draw.len()];
+        for pad in pads {
+            let place = MaskPlace { pad, of: self.recipe.of(args.imprint).imprint_of() };
+            let Some(begun) = taken_up(&start, pad, &labels.now) else { continue };
+            if args.adopt {
+                labels.make(LabelEdit::Adopt(begun.clone()))?;
+            } else if args.from.is_some() {
+                let size = imprints[pad].as_ref().map(DepthMap::size);
+                labels.make(LabelEdit::TakeOver { from: begun.clone(), to: place.clone(), size })?;
+            } else if let Some(proposal) = &proposed[pad] {
+                let (place, over_drawn) = (place.clone(), args.over_drawn);
+                labels.make(LabelEdit::AcceptProposal { place, proposal, over_drawn })?;
+            }
+            let Some(imprint) = &imprints[pad] else { continue };
+            let on = |labels: &PairLabels| {
+                let mask = labels.drawn(&place, imprint).unwrap_or(&begun.mask).clone();
+                TakenUp { place: place.clone(), mask }
+            };
+            for (drawing, touches) in args.draw.iter().zip(&mut drawn_on) {
+                let sight = drawing.sight.as_deref();
+                let seen = sight.map(|sight| seen(&self.sample, &(*imprints).as_ref(), pad, sight)).transpose()?;
+                let on = on(&labels.now);
+                let mut mask = on.mask.clone();
+                *touches |= mask.draw(drawing, Ground { seen: seen.as_ref(), ..Ground::new(imprint) }, by.clone());
+                labels.make(LabelEdit::Draw { on, mask, drawing })?;
+            }
+            for &clean_up in &args.clean {
+                labels.make(LabelEdit::CleanUp { on: on(&labels.now), clean_up, rig: &self.dataset.rig })?;
+            }
+        }
+        if let Some(at) = drawn_on.iter().position(|touches| !touches) {
+            let drawing = serde_json::to_string(&args.draw[at])?;
+            anyhow::bail!(
+                "--draw {drawing} touches no pixel: points are pixels of the image (or of its sight), 0,0 is the center \
+                 of the upper left one"
+            );
+        }
+        Ok(())
     }
 
     /// Proposals that `--propose` asks for, for pads of the pair; `felt` are its imprints.
@@ -142,18 +198,30 @@ impl<'a> Maker<'a> {
             carry_from,
         };
         let mut out = PerPad::default();
-        for (pad, made) in propose::propose((self.touch(labels), all), felt, pads, &setup, &self.models)? {
+        for (pad, made) in propose::propose(self.touch(labels), all, felt, pads, &setup, &self.models)? {
             out[pad] = Some(made?);
         }
         Ok(out)
     }
 }
 
+/// The mask in force on a felt imprint, as a hand takes it up.
+fn taken_up(felt: &Felt, pad: PadId, labels: &PairLabels) -> Option<TakenUp> {
+    let (contact, place) = (felt.contact(), MaskPlace { pad, of: felt.recipe().imprint_of() });
+    let found = contact.masks[pad].as_ref()?;
+    let model = contact.model.as_deref().unwrap_or_default();
+    let mask = match labels.masks.get(&place).filter(|_| found.basis == MaskBasis::Hand) {
+        Some(drawn) => drawn.clone(),
+        None => DrawnMask::new(found.mask.clone(), contact.recipe.provenance(model, found.basis)),
+    };
+    Some(TakenUp { place, mask })
+}
+
 /// The recipe of the arguments; a generator is looked for where one of them is about a prediction.
 fn recipe(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<Recipe> {
     let imprints = [Some(args.imprint), args.from, args.accept, args.withdraw];
     let imprint = imprints.into_iter().flatten().max().unwrap_or_default();
-    args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)
+    args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)
 }
 
 /// The other imprints of a kind that poses were accepted of, as the end of a sentence.
@@ -162,97 +230,62 @@ fn elsewhere(labels: &PairLabels, imprint: ImprintSource) -> String {
     if of.is_empty() { String::new() } else { format!("; there is one of {}", of.join(", ")) }
 }
 
+/// Changes that are made to the labels of a pair, one after the other.
+struct Changes {
+    now: PairLabels,
+    made: Vec<Edited>,
+}
+
+impl Changes {
+    /// Does something to them; whether that changes anything.
+    fn make(&mut self, edit: LabelEdit<'_>) -> Result<bool, TaskError> {
+        let Some(edited) = label_edit::edit(&self.now, edit)? else { return Ok(false) };
+        edited.change.apply_to(&mut self.now);
+        self.made.push(edited);
+        Ok(true)
+    }
+}
+
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
-fn change(
-    args: &LabelArgs,
-    (dataset, all, id): (&Dataset, &Labels, PairId),
-    labels: &mut PairLabels,
-) -> anyhow::Result<()> {
-    let pads = args.finger.fingers(&dataset.rig)?;
-    let mut touch = None;
+fn change(args: &LabelArgs, dataset: &Dataset, all: &Labels, id: PairId, labels: &mut Changes) -> anyhow::Result<()> {
+    let mut maker = None;
     let makes = args.adopt || args.from.is_some() || args.propose.is_some();
     if args.remove_mask || makes || !(args.clean.is_empty() && args.draw.is_empty()) {
-        let touch = touch.insert(Maker::load(args, dataset, id)?);
-        let of = touch.recipe.of(args.imprint).imprint_of();
-        let place = |pad| MaskPlace { pad, of: of.clone() };
-        for &pad in pads.iter().filter(|_| args.remove_mask) {
-            labels.draw(&place(pad), None);
-        }
-        if !args.remove_mask {
-            let by = || Provenance::hand(args.person.clone().or_else(system_person).unwrap_or_default());
-            let felt_by = touch.contact(args.from.unwrap_or(args.imprint), !args.adopt, labels)?;
-            let found = felt_by.contact();
-            let felt: Vec<PadId> = pads.into_iter().filter(|pad| found.masks[*pad].is_some()).collect();
-            let proposed = match args.propose {
-                Some(_) => touch.proposals(all, &felt_by, &felt, labels)?,
-                None => PerPad::default(),
-            };
-            let mut drawn_on = vec![false; args.draw.len()];
-            for pad in felt {
-                let Some(one) = &found.masks[pad] else { continue };
-                let drawn = match args.from {
-                    Some(from) => labels.masks.get(&MaskPlace { pad, of: touch.recipe.of(from).imprint_of() }),
-                    None => labels.masks.get(&place(pad)),
-                };
-                let model = found.model.as_deref().unwrap_or_default();
-                let start = match drawn.filter(|_| one.basis == MaskBasis::Hand) {
-                    Some(hand) => hand.clone(),
-                    None => DrawnMask::new(one.mask.clone(), found.recipe.provenance(model, one.basis)),
-                };
-                let mut hand = args.from.map_or_else(|| start.clone(), |from| start.copied(from));
-                if let Some(proposal) = &proposed[pad] {
-                    let imprint = found.imprints[pad].as_ref();
-                    let drawn = imprint.and_then(|imprint| labels.drawn(&place(pad), imprint));
-                    hand = accepted(drawn, proposal, args.over_drawn);
-                }
-                if let Some(imprint) = &found.imprints[pad] {
-                    for (drawing, touches) in args.draw.iter().zip(&mut drawn_on) {
-                        let sight = drawing.sight.as_deref();
-                        let seen = sight.map(|sight| seen(&touch.sample, &found.imprints.as_ref(), pad, sight));
-                        let seen = seen.transpose()?;
-                        *touches |= hand.draw(drawing, Ground { seen: seen.as_ref(), ..Ground::new(imprint) }, by());
-                    }
-                }
-                for clean_up in &args.clean {
-                    hand.clean(*clean_up, &dataset.rig);
-                }
-                if makes || !hand.is_same(&start) {
-                    labels.draw(&place(pad), Some(hand));
-                }
+        let maker = maker.insert(Maker::load(args, dataset, id)?);
+        let pads = args.finger.fingers(&dataset.rig)?;
+        if args.remove_mask {
+            let of = maker.recipe.of(args.imprint).imprint_of();
+            for pad in pads {
+                labels.make(LabelEdit::Remove(MaskPlace { pad, of: of.clone() }))?;
             }
-            if let Some(at) = drawn_on.iter().position(|touches| !touches) {
-                let drawing = serde_json::to_string(&args.draw[at])?;
-                anyhow::bail!(
-                    "--draw {drawing} touches no pixel: points are pixels of the image (or of its sight), 0,0 is the center \
-                     of the upper left one"
-                );
-            }
+        } else {
+            maker.masks(all, pads, labels)?;
         }
     }
     if let Some(imprint) = args.withdraw {
         let of = recipe(args, dataset)?.of(imprint).imprint_of();
-        if labels.accepted(&of).is_none() {
-            anyhow::bail!("no pose was accepted of {}, so none is withdrawn{}", of.text(), elsewhere(labels, imprint));
+        if !labels.make(LabelEdit::WithdrawPose(of.clone()))? {
+            let elsewhere = elsewhere(&labels.now, imprint);
+            anyhow::bail!("no pose was accepted of {}, so none is withdrawn{elsewhere}", of.text());
         }
-        labels.accept(&of, None);
     }
     if let Some(imprint) = args.accept {
         let of = recipe(args, dataset)?.of(imprint).imprint_of();
         let pose = match args.pose {
             Some(planar) => AcceptedPose { pose: planar.into(), by_hand: true },
-            None => match &touch {
-                Some(touch) => touch.pose(imprint, labels)?.into(),
-                None => Maker::load(args, dataset, id)?.pose(imprint, labels)?.into(),
+            None => match &maker {
+                Some(maker) => maker.pose(imprint, &labels.now)?.into(),
+                None => Maker::load(args, dataset, id)?.pose(imprint, &labels.now)?.into(),
             },
         };
-        labels.accept(&of, Some(pose));
+        labels.make(LabelEdit::AcceptPose(of, pose))?;
     }
     if let Some(review) = args.review {
-        labels.review = review;
+        labels.make(LabelEdit::Review(review))?;
     }
     if let Some(text) = &args.note {
-        labels.note = note(text);
+        labels.make(LabelEdit::Note(text))?;
     }
     Ok(())
 }

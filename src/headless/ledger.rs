@@ -22,6 +22,7 @@ use touch2touch_work::io::images;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::ledger::{LedgerResult, of_prediction};
+use touch2touch_work::on_pad::OnPad;
 
 /// Arguments of `ledger`.
 #[derive(Debug, Args)]
@@ -134,11 +135,12 @@ pub(super) fn run(args: &LedgerArgs) -> VerbResult {
     if generating.picture(&sample, finger)?.is_none() {
         anyhow::bail!("{name}: {}", generating.no_input(&sample.rig).why);
     }
-    let made = generating.seeds(&models, (&sample, finger), &[config.seed], &JobCx::unwatched())?.pop();
+    let on = OnPad { sample: &sample, pad: finger };
+    let made = generating.seeds(&models, on, &[config.seed], &JobCx::unwatched())?.pop();
     let made = made.ok_or_else(|| anyhow::anyhow!("the generator gave no prediction"))?;
     let correct = matches!(args.mapping, Some(MappingArg::Correct));
     let shift_name = if correct { "Correct mapping" } else { shift.label() };
-    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, (&sample, finger))?;
+    let LedgerResult { ledger: found, readings } = of_prediction(&made, shift, correct, on)?;
     if let Some(out) = &args.out {
         std::fs::create_dir_all(out)
             .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;

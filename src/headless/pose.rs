@@ -28,8 +28,8 @@ use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::load_tool;
 
-pub(super) use args::{Engines, EnginesParser, PoseArgs, parse_start};
 use args::{Imprints, registration};
+pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
 use report::{Accepted, PoseRow, Report, summary, text};
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
@@ -74,9 +74,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             continue;
         };
         let tool = tools.entry(tool_name.clone()).or_insert_with(|| match load_tool(&dataset, &tool_name) {
-            Ok((tool, odd)) => {
-                notes.take(&output, &odd);
-                Some(tool)
+            Ok(loaded) => {
+                notes.take(&output, &loaded.notes);
+                Some(loaded.model)
             }
             Err(err) => {
                 output.note(&err.to_string());
@@ -124,7 +124,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     }
     complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let report = Report { summary: summary(&cases, imprints[0].key(), args.engine.0[0]), cases, notes };
+    let report = Report { summary: summary(&cases, imprints[0].key(), args.registration.0[0]), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
 }
@@ -156,28 +156,28 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         sample.rig.pads().map(left_open).collect()
     });
     let several = predicted && args.ensemble.seeds > 1;
-    let one = |&engine: &RegistrationChoice| {
+    let one = |&by: &RegistrationChoice| {
         let fan = several
             .then(|| {
-                let recipe = Recipe { registration: engine, ..recipe.clone() };
+                let recipe = Recipe { registration: by, ..recipe.clone() };
                 seeds::fan(touch, &recipe, args.ensemble.seeds, models)
             })
             .transpose()?;
         if let (Some(fan), Some(stem)) = (&fan, stem) {
-            fan.write(stem, name, engine)?;
+            fan.write(stem, name, by)?;
         }
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, ..Ask::default() };
-        let found = felt.pose_by(touch, &*registration(args, engine), ask);
+        let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
-        let influence = influence.zip(answer).map(|(stem, found)| {
-            influence::write(stem, (&contact.clouds(sample)?, sample, tool), (imprint, engine), found)
-        });
+        let influence = influence
+            .zip(answer)
+            .map(|(stem, found)| influence::write(stem, &contact.clouds(sample)?, sample, tool, (imprint, by), found));
         let influence = influence.transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),
-            engine: engine.to_string(),
+            registration: by.to_string(),
             imprint: imprint.key(),
             mask: contact.made_of(),
             mask_notes: contact.notes(&sample.rig),
@@ -196,5 +196,5 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             fan,
         })
     };
-    args.engine.0.iter().map(one).collect()
+    args.registration.0.iter().map(one).collect()
 }

@@ -44,18 +44,13 @@ pub(super) struct SeedFigures {
     /// Of the spread of the decoder's channels, meters.
     channels_mean_m: Option<f64>,
     /// Of the mean over the seeds, against the measurement.
-    mean_psnr_db: Option<f64>,
-    mean_ssim: Option<f64>,
+    pub(super) mean_psnr_db: Option<f64>,
+    pub(super) mean_ssim: Option<f64>,
 }
 
 /// Writes mean and spreads as `STEM_{mean,spread,channels}.npy` (meters) and pictures of the spreads (0.0001 mm steps)
-/// and of the mean (0.001 mm steps from -20 mm). PSNR and SSIM are of the mean.
-pub(super) fn write(
-    stem: &Path,
-    found: &FingerSeeds,
-    first: u64,
-    (mean_psnr_db, mean_ssim): (Option<f64>, Option<f64>),
-) -> anyhow::Result<SeedFigures> {
+/// and of the mean (0.001 mm steps from -20 mm). PSNR and SSIM are left to whoever knows the measurement.
+pub(super) fn write(stem: &Path, found: &FingerSeeds, first: u64) -> anyhow::Result<SeedFigures> {
     let file = |what: &str, ending: &str| names::with_ending(stem, &format!("_{what}.{ending}"));
     let maps = [
         ("mean", Some(&found.ensemble.spread.mean)),
@@ -75,8 +70,8 @@ pub(super) fn write(
         spread_mean_m: finite(found.ensemble.spread.mean_std()),
         spread_max_m: finite(found.ensemble.spread.max_std()),
         channels_mean_m: found.ensemble.channels.as_ref().and_then(mean_of),
-        mean_psnr_db,
-        mean_ssim,
+        mean_psnr_db: None,
+        mean_ssim: None,
     })
 }
 
@@ -110,8 +105,8 @@ pub(super) struct PoseFan {
 
 impl PoseFan {
     /// Writes `STEM_ENGINE_fan.png`; nothing where the angles have no mean. `name` is the pair's.
-    pub(super) fn write(&self, stem: &Path, name: &str, engine: RegistrationChoice) -> anyhow::Result<()> {
-        let file = names::with_ending(stem, &format!("_{}_fan.png", engine.to_string().replace([':', '='], "_")));
+    pub(super) fn write(&self, stem: &Path, name: &str, registration: RegistrationChoice) -> anyhow::Result<()> {
+        let file = names::with_ending(stem, &format!("_{}_fan.png", registration.to_string().replace([':', '='], "_")));
         let Some(fan) = &self.fan else { return Ok(()) };
         if let Some(picture) = fan::picture(name, fan, self.truth_rad)? {
             images::write_rgb8(&file, &picture)?;

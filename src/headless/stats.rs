@@ -68,7 +68,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     };
     let fingers = args.finger.fingers(&dataset.rig)?;
     let setup = StatisticsSetup { pairs: ids, fingers, recipe: recipe.clone(), dataset: dataset.title.clone() };
-    let (statistics, failed) = statistics(&setup, load, &predict, &output.job())?;
+    let (statistics, failed) = statistics(&setup, load, predict, &output.job())?;
     for failure in &failed {
         output.note(&failure.to_string());
     }

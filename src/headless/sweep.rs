@@ -36,8 +36,8 @@ pub(super) struct SweepArgs {
     #[arg(long)]
     measured_only: bool,
     /// The registration. Its key may be followed by what it leaves out, as with `pose`.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let output = Output::new(args.common, "turning the dial", pairs.len());
     let models = args.model.models();
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
-    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.engine)?.of(ImprintSource::Measured);
+    let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?.of(ImprintSource::Measured);
     // The dial may ask for the mask model where the choice does not.
     let model = || args.model.mask_model(false, &dataset.rig);
     let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };

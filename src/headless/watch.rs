@@ -16,23 +16,25 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::args::DatasetArgs;
-use super::contact_mask::{MaskArgs, labels_of};
+use super::contact_mask::{MaskArgs, readable};
 use super::guard::{Bug, guarded};
 use super::output::says;
-use super::pose::{Engines, EnginesParser};
+use super::pose::{Registrations, RegistrationsParser};
 use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult, report};
 use done::Done;
-use one::Worker;
+use one::{Arrived, Worker};
 use summary::Summary;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::DepthCamera;
+use touch2touch_work::feel::Touch;
+use touch2touch_work::follow::{FollowEvent, Following};
 use touch2touch_work::io::dataset::{Dataset, cameras_of, rig_of};
-use touch2touch_work::io::follow::{Arrival, FollowConfig, Follower, PERIOD, Ready, Stamp};
+use touch2touch_work::io::follow::{Arrival, FollowConfig, PERIOD, Ready, Stamp};
 use touch2touch_work::io::names::Outputs;
 use touch2touch_work::job::Cancel;
-use touch2touch_work::labels::{Labels, PairLabels};
+use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::MaskSource;
 use write::Save;
 
@@ -57,8 +59,8 @@ pub(super) struct WatchArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = EnginesParser)]
-    engine: Engines,
+    #[arg(long = "engine", value_name = "ENGINE", default_value = "default", value_parser = RegistrationsParser)]
+    registration: Registrations,
     /// Files that are written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001
     /// mm steps from -20 mm) as .png.
     #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Save::Npz, Save::Png])]
@@ -110,7 +112,7 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         tool_scale: args.unit.tool_scale,
         cameras: cameras(args.camera.as_deref())?,
     };
-    let mut follower = Follower::new(args.dataset.path(), config)?;
+    let mut following = Following::new(args.dataset.path(), config)?;
     // The models are chosen for the sensors before the first touch is there.
     let rig = rig_of(args.dataset.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
     let mut worker = Worker::new(args, &rig, stop.clone())?;
@@ -122,44 +124,30 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
         format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.dataset.path().display(), worker.warm_s)
     })?;
 
-    follower.dataset().into_iter().for_each(|dataset| super::notes::say_problems(dataset));
+    following.dataset().into_iter().for_each(|dataset| super::notes::say_problems(dataset));
     let mut summary = Summary::default();
-    let mut said = Vec::new();
-    while !stop.is_cancelled() {
-        let Some(ready) = follower.poll(Instant::now()) else {
-            say_troubles(follower.troubles(), &mut said, &output)?;
-            if args.once && follower.waiting() == 0 {
-                break;
+    while let Some(event) = following.wait(&stop, args.once) {
+        match event {
+            FollowEvent::Ready(ready) => {
+                touch(&mut outputs, &mut following, &mut worker, &ready, &output, &mut summary)?;
             }
-            std::thread::sleep(PERIOD);
-            continue;
-        };
-        touch(&mut outputs, &mut follower, &mut worker, &ready, &output, &mut summary)?;
+            FollowEvent::Trouble(Problem { file, what, hint }) => {
+                let event = json!({"event": "trouble", "file": file, "error": what, "hint": hint});
+                output.line(&event, || format!("{}: {what} ({hint})", file.display()))?;
+            }
+            FollowEvent::Recovered => {
+                output.line(&json!({"event": "recovered"}), || "the folder is in order again".to_owned())?;
+            }
+        }
     }
-    if args.once && follower.dataset().is_none() {
+    if args.once && following.dataset().is_none() {
         anyhow::bail!(
             "no touch was found ({}); see `touch2touch watch --help` for what counts as one",
             args.dataset.path().display()
         );
     }
     output.line(&summary.json(), || summary.text())?;
-    Ok(summary.failed() == 0 && said.is_empty())
-}
-
-/// Says what is wrong with the folder as a whole, each thing once for as long as it lasts, and that nothing is any more.
-fn say_troubles(now: &[Problem], said: &mut Vec<Problem>, output: &Output) -> anyhow::Result<()> {
-    if now == said.as_slice() {
-        return Ok(());
-    }
-    for trouble in now.iter().filter(|trouble| !said.contains(trouble)) {
-        let event = json!({"event": "trouble", "file": trouble.file, "error": trouble.what, "hint": trouble.hint});
-        output.line(&event, || format!("{}: {} ({})", trouble.file.display(), trouble.what, trouble.hint))?;
-    }
-    if now.is_empty() {
-        output.line(&json!({"event": "recovered"}), || "the folder is in order again".to_owned())?;
-    }
-    *said = now.to_vec();
-    Ok(())
+    Ok(summary.failed() == 0 && following.is_in_order())
 }
 
 /// From now on Ctrl-C sets `stop` instead of ending the program in the middle of a touch; a second one ends it.
@@ -198,7 +186,7 @@ fn cameras(named: Option<&Path>) -> anyhow::Result<Option<PerPad<DepthCamera>>> 
 /// Takes one touch as far as it goes now.
 fn touch(
     outputs: &mut Option<Outputs>,
-    follower: &mut Follower,
+    following: &mut Following,
     worker: &mut Worker<'_>,
     ready: &Ready,
     output: &Output,
@@ -217,9 +205,8 @@ fn touch(
         }
     };
     let source = Source::new(&ready.file, ready.stamp);
-    let tool = worker.tool_name(follower.dataset().and_then(|d| d.index.get(ready.id)?.tool.clone()));
-    let entry = follower.dataset().and_then(|dataset| Some((Labels::of(dataset), &dataset.index.get(ready.id)?.name)));
-    let labels = entry.map_or_else(PairLabels::default, |(labels, name)| labels_of(&labels, name, output));
+    let tool = worker.tool_name(following.entry(ready).and_then(|entry| entry.tool.clone()));
+    let labels = readable(following.labels(ready), output);
     let recipe = worker.recipe(tool.as_deref(), &labels)?;
     if write::is_done(&stem, &source, &recipe) {
         summary.skip();
@@ -229,17 +216,24 @@ fn touch(
     }
     let found = SystemTime::now();
     let start = Instant::now();
-    let problem = match follower.load(ready, start) {
+    let problem = match following.read(ready) {
         Arrival::Unfinished => return Ok(()),
         Arrival::Gone => {
             return output.line(&json!({"event": "gone", "name": ready.name}), || format!("{}: is gone", ready.name));
         }
         Arrival::Broken(problem) => problem,
         Arrival::Whole(loaded) => {
-            let Some(dataset) = follower.dataset().cloned() else { return Ok(()) };
-            let times = (ready, found, start);
-            let work =
-                || worker.work(&dataset, &loaded.sample, tool.as_deref(), &labels, &stem, &source, &recipe, times);
+            let Some(dataset) = following.dataset().cloned() else { return Ok(()) };
+            let (sample, read) = (&loaded.sample, Instant::now());
+            let work = || {
+                let tool = worker.tool_of(&dataset, sample, tool.as_deref());
+                let model = tool.as_ref().map(|tool| &*tool.model);
+                let touch = Touch { dataset: &dataset, pair: ready.id, sample, tool: model, labels: &labels };
+                let tool = tool.as_ref().map(|tool| &*tool.name).ok();
+                let arrived =
+                    Arrived { ready, tool, found, start, read, stem: &stem, source: &source, recipe: &recipe };
+                worker.work(touch, arrived)
+            };
             match guarded(vec![ready.file.clone()], work) {
                 Ok(Some(done)) => return report(output, &done, summary),
                 // Ctrl-C.

@@ -9,6 +9,7 @@ use super::theme::{SMALL, caption, section};
 use super::thumbnail;
 use super::widget::{curves, empty};
 use crate::app::action::Action;
+use crate::app::adapt;
 use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
 use crate::app::command::{AdaptCommand, Pane};
 use crate::app::tasks::TaskKind;
@@ -30,7 +31,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         choices(cx, ui);
         ui.separator();
         let adapted = cx.state.adapt.result.clone();
-        if adapted.is_none() && cx.state.tuning_curves().is_empty() {
+        if adapted.is_none() && adapt::tuning_curves(cx.state).is_empty() {
             return nothing_yet(cx, ui);
         }
         ScrollArea::vertical().auto_shrink(false).id_salt("fit").show(ui, |ui| {
@@ -49,7 +50,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (what, why) = match cx.state.running(TaskKind::Fit) {
+    let (what, why) = match cx.state.tasks.of_kind(TaskKind::Fit) {
         Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
         None => (
             "The model is as it was trained, on simulated touches",
@@ -74,7 +75,7 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     for reason in adapted.objections.iter().chain(&adapted.in_place_of) {
         ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
     }
-    if refused && cx.state.running(TaskKind::Fit).is_none() {
+    if refused && cx.state.tasks.of_kind(TaskKind::Fit).is_none() {
         let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
         if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
             cx.push(AdaptCommand::Keep);
@@ -85,7 +86,7 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
 
 /// Curves of the tuning, while it runs and afterwards.
 fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
-    let curves = cx.state.tuning_curves();
+    let curves = adapt::tuning_curves(cx.state);
     if curves.is_empty() {
         return;
     }
@@ -102,7 +103,7 @@ fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
 /// A touch that was left out: what was felt, and what the model draws before and after.
 fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
-    let Some(held) = state.held_back() else { return };
+    let Some(held) = adapt::held_back(state) else { return };
     ui.add_space(8.0);
     ui.label(section("A touch that was left out", cx.p));
     // A fit that was made again has other pictures.
@@ -142,7 +143,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
         response.response.accessible_name("Pairs to fit to").on_hover_text("Which pairs the model is fitted to");
-        let count = cx.state.adapt_pairs().count();
+        let count = adapt::pairs(cx.state).count();
         let text = RichText::new(format!("{count} pairs")).size(SMALL);
         let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
         ui.label(text).on_hover_text(format!(
@@ -162,7 +163,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.push(AdaptCommand::Steps(steps));
             }
         }
-        match cx.state.running(TaskKind::Fit) {
+        match cx.state.tasks.of_kind(TaskKind::Fit) {
             Some((ticket, task)) => {
                 let tip = "Stop; the same fit goes on from here when it is asked for again";
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
@@ -170,7 +171,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             None => {
                 cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
                 cx.action_button(ui, Action::UseFit, "Use the fitted model");
-                if cx.state.uses_fit() {
+                if adapt::uses_fit(cx.state) {
                     let tip = "The fitted model predicts now; another can be chosen in the Generate pane";
                     ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
                 }

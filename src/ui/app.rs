@@ -1,5 +1,6 @@
 //! The window: one frame from input to commands.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -28,10 +29,12 @@ use crate::app::evaluate::EvaluateCommand;
 use crate::app::export::Output;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
-use crate::app::pane::Kind;
+use crate::app::pane::{Kind, Workspace};
 use crate::app::runtime::Runtime;
 use crate::app::services::SharedServices;
-use crate::app::settings::{Last, MaskTool, Theme, Workspace};
+use crate::app::settings::Last;
+use crate::app::settings::MaskTool;
+use crate::app::settings::Theme;
 use crate::app::state::State;
 use crate::app::workbench::WorkbenchCommand;
 use touch2touch_core::rig::SensorKind;
@@ -271,9 +274,9 @@ impl StudioApp {
             self.first_prediction = !demo;
             return;
         }
-        if self.state.can_generate().is_ok() && self.state.sample().ready().is_some() {
+        if results::can_generate(&self.state).is_ok() && results::sample(&self.state).ready().is_some() {
             self.first_prediction = true;
-            if self.state.chosen(self.state.selection.finger).is_none() {
+            if results::chosen(&self.state, self.state.selection.finger).is_none() {
                 self.inbox.push(Command::Predict(PredictCommand::Generate));
             }
         }

@@ -1,6 +1,8 @@
 //! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
 
+use crate::app::pane::Workspace;
 use crate::app::settings::prefer;
+use crate::app::{export, results};
 use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
@@ -12,7 +14,7 @@ use super::widget::progress;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
-use crate::app::settings::{Theme, Workspace};
+use crate::app::settings::Theme;
 
 /// The bar at the top; whether it showed or hid a pane of `tree`.
 pub(super) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
@@ -143,7 +145,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
 
 /// A line below the top bar while a case is open that cannot be made again here.
 pub(super) fn case(cx: &Cx<'_>, ui: &mut Ui) {
-    let lacks = cx.state.case_lacks();
+    let lacks = export::case_lacks(cx.state);
     if lacks.is_empty() {
         return;
     }
@@ -246,7 +248,8 @@ fn engine(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
         ui.label(caption(format!("{:.1} ms", frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
         ui.add_space(8.0);
     }
-    let prediction = cx.state.chosen(cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
+    let prediction =
+        results::chosen(cx.state, cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
     let text = match prediction {
         Some(prediction) => prediction.engine.clone(),
         None => cx.state.settings.runtime.name().to_owned(),
@@ -267,7 +270,7 @@ pub(super) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.set_max_width(520.0);
             ui.horizontal(|ui| {
                 ui.vertical(|ui| {
-                    let predicted = cx.state.chosen(cx.state.selection.finger).is_some();
+                    let predicted = results::chosen(cx.state, cx.state.selection.finger).is_some();
                     let first = if predicted {
                         "Simulated touches are open, with a first prediction beside the measurement."
                     } else {

@@ -16,6 +16,7 @@ use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::inspect::{BasinColor, InspectCommand};
 use crate::app::keys::PoseBits;
+use crate::app::results;
 use crate::app::state::Lookup;
 use touch2touch_core::align::basin::{Arrival, Axis, Basin, Cell, Plane};
 use touch2touch_core::colormap::ColorMap;
@@ -51,7 +52,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.spacing_mut().item_spacing = vec2(4.0, 3.0);
         controls(cx, ui);
         let rest = ui.available_rect_before_wrap();
-        let lookup = cx.state.basin();
+        let lookup = results::basin(cx.state);
         match (lookup, lookup.shown()) {
             (Lookup::Failed(err), _) => {
                 let (what, why) = match err.is_cancelled() {
@@ -96,7 +97,7 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         for color in BasinColor::iter() {
             let text = RichText::new(color.name()).size(12.0);
-            let possible = color != BasinColor::Error || cx.state.truth().is_some();
+            let possible = color != BasinColor::Error || results::truth(cx.state).is_some();
             let button = ui.add_enabled(possible, egui::Button::selectable(inspect.color == color, text));
             let button = button.accessible_name(format!("Color by {}", color.name().to_lowercase()));
             let tip = match color {
@@ -199,7 +200,7 @@ struct Scale {
 
 impl Scale {
     fn of(cx: &Cx<'_>, basin: &Basin) -> Self {
-        let truth = cx.state.truth();
+        let truth = results::truth(cx.state);
         let color = match cx.state.inspect.color {
             BasinColor::Error if truth.is_none() => BasinColor::Cost,
             color => color,
@@ -343,7 +344,7 @@ fn marks(cx: &Cx<'_>, painter: &Painter, map: &Map<'_>, hovered: Option<&Cell>) 
         let share = end.starts as f32 / map.basin.cells.len().max(1) as f32;
         painter.circle(map.place_of(end.end), 2.5 + 3.0 * share, Color32::WHITE, Stroke::new(1.5, dark));
     }
-    if let Some(pose) = cx.state.pose(cx.state.inspect.source).shown() {
+    if let Some(pose) = results::pose(cx.state, cx.state.inspect.source).shown() {
         for run in &pose.report.runs {
             let (from, to) = (map.place_of(run.start), map.place_of(run.end));
             painter.line_segment([from, to], Stroke::new(2.5, dark));
@@ -357,10 +358,10 @@ fn marks(cx: &Cx<'_>, painter: &Painter, map: &Map<'_>, hovered: Option<&Cell>) 
             );
         }
     }
-    if let Some(truth) = cx.state.truth() {
+    if let Some(truth) = results::truth(cx.state) {
         cross(painter, map.place_of(truth), 6.0, cx.p.truth);
     }
-    if let Some(shown) = cx.state.inspected_in(cx.state.inspect.source) {
+    if let Some(shown) = results::inspected_in(cx.state, cx.state.inspect.source) {
         let place = map.place_of(shown.step.grasp_from_object);
         painter.circle_stroke(place, 6.0, Stroke::new(3.5, dark));
         painter.circle_stroke(place, 6.0, Stroke::new(2.0, cx.p.accent));
@@ -406,7 +407,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
             Some(a) => {
                 line(ui, format!("began {}", pose_text(a.applied)), p.text);
                 line(ui, format!("ended {}", pose_text(a.end)), p.text);
-                let error = cx.state.truth().map_or(String::new(), |t| {
+                let error = results::truth(cx.state).map_or(String::new(), |t| {
                     format!(", error {}", units::text_deg(units::angle_error(a.end.theta_rad, t.theta_rad)))
                 });
                 let cost = units::mm(a.cost_m2.max(0.0).sqrt());
@@ -449,7 +450,7 @@ fn legend(cx: &Cx<'_>, ui: &mut Ui) {
     entry("ends", &|center| {
         painter.circle_filled(center, 3.5, cx.p.strong);
     });
-    if cx.state.truth().is_some() {
+    if results::truth(cx.state).is_some() {
         entry("truth", &|center| cross(&painter, center, 3.5, cx.p.truth));
     }
     entry("prior", &|center| {

@@ -15,9 +15,11 @@ use super::widget::empty;
 use super::widget::texture::depth_image;
 use crate::app::action::Action;
 use crate::app::command::{Command, LibraryCommand, Pane};
-use crate::app::evaluate::{Grade, ScoreChoice, SourceScores};
+use crate::app::evaluate::ScoreChoice;
 use crate::app::labels::Review;
 use crate::app::library::{Place, Sort, short_name};
+use crate::app::results;
+use crate::app::scores::{Grade, SourceScores};
 use crate::app::tasks::TaskKind;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Metric;
@@ -232,7 +234,7 @@ fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
     let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
-    if cx.state.running(TaskKind::Evaluate).is_none() {
+    if cx.state.tasks.of_kind(TaskKind::Evaluate).is_none() {
         ui.horizontal_wrapped(|ui| {
             cx.action_button(ui, Action::RankMasks, "Rank");
             ui.label(caption(format!("{known} of {total} ranked"), cx.p));
@@ -331,7 +333,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
     let possible = Action::PredictAll.command(cx.state).is_some();
-    if (possible && scored < total) || cx.state.running(TaskKind::Evaluate).is_some() {
+    if (possible && scored < total) || cx.state.tasks.of_kind(TaskKind::Evaluate).is_some() {
         predict_all(cx, ui, scored);
     }
 }
@@ -339,7 +341,7 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// The button that scores all pairs, or how far that is.
 pub(super) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
-    ui.horizontal_wrapped(|ui| match cx.state.running(TaskKind::Evaluate) {
+    ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
         Some((ticket, task)) => {
             let text = format!("{} of {}", task.progress.done, task.progress.total);
             let what = (text.as_str(), "Stop; what was scored until then is kept");
@@ -475,7 +477,7 @@ fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
     let open = cx.state.library.open.as_ref()?;
     let key = open.key(id);
     // Without a measured imprint it is empty, and the device takes no empty picture: the whole window would stay black.
-    let depth = cx.state.thumbnail(id).filter(|depth| !depth.is_empty())?;
+    let depth = results::thumbnail(cx.state, id).filter(|depth| !depth.is_empty())?;
     let range = super::images::range_of(cx.state);
     let bits = (range.lo.to_bits(), range.hi.to_bits());
     let map = super::images::map_of(cx.state);

@@ -15,7 +15,7 @@ use crate::app::action::{Action, Bindings};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
-use crate::app::tasks::state::{Task, Ticket};
+use crate::app::state::tasks::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
 

@@ -10,6 +10,7 @@ use super::theme::{SMALL, caption};
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{DialCommand, Pane};
+use crate::app::dial;
 use crate::app::dial::DialPairs;
 use crate::app::keys::ImprintSource;
 use crate::app::tasks::TaskKind;
@@ -40,8 +41,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 }
 
 fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let refused = cx.state.sweep_setup().err();
-    let (what, why) = match (cx.state.running(TaskKind::Dial), refused) {
+    let refused = dial::setup(cx.state).err();
+    let (what, why) = match (cx.state.tasks.of_kind(TaskKind::Dial), refused) {
         (Some(_), _) => {
             ("The plots appear when all pairs are done".to_owned(), "Cancel keeps those done until then".to_owned())
         }
@@ -94,7 +95,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut predictions, "predictions").on_hover_text(tip).changed() {
             cx.push(DialCommand::Predictions(predictions));
         }
-        match cx.state.running(TaskKind::Dial) {
+        match cx.state.tasks.of_kind(TaskKind::Dial) {
             Some((ticket, task)) => {
                 let tip = "Stop, and show the pairs that were done until then";
                 cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));
@@ -105,7 +106,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     if cx.state.dial.result.is_some()
-        && let Err(why) = cx.state.sweep_setup()
+        && let Err(why) = dial::setup(cx.state)
     {
         ui.add(egui::Label::new(RichText::new(why).size(SMALL).color(cx.p.caution)).wrap());
     }
@@ -163,7 +164,7 @@ fn about<'a>(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, sweep: &'a Sweep) ->
         if !sweep.complete {
             ui.label(RichText::new("stopped early").size(SMALL).color(cx.p.caution));
         }
-        if cx.state.is_dial_outdated() {
+        if dial::is_outdated(cx.state) {
             let tip = "Another setting than the dial was changed since: run it again to see this with what is in force";
             ui.label(RichText::new("of earlier settings").size(SMALL).color(cx.p.caution)).on_hover_text(tip);
         }

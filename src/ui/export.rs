@@ -10,6 +10,7 @@ use super::cx::Cx;
 use super::theme::{SMALL, caption};
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
+use crate::app::export;
 use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
 use crate::app::keys::ImprintSource;
 use touch2touch_work::figure::{FigurePane, FigureTheme};
@@ -30,7 +31,7 @@ pub(super) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
         columns(cx, ui, &mut form);
         look(cx, ui, &mut form);
         ui.separator();
-        let setup = cx.state.figure_setup();
+        let setup = export::figure_setup(cx.state);
         let (count, rig) = (setup.pairs.len() * setup.fingers.len(), cx.state.rig());
         let fits = setup.look.check(count, &rig);
         preview(cx, ui, [setup.look.panes.len(), count], setup.look.size(count, &rig));
@@ -187,7 +188,7 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         ui.horizontal(|ui| {
             for scale in [Some(1), Some(2), Some(4), None] {
                 let text = scale.map_or_else(|| "SVG".to_owned(), |scale| format!("{scale}x"));
-                let button = ui.add_enabled(cx.state.can_draw(), egui::Button::new(&text));
+                let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(&text));
                 let button = button.accessible_name(format!("Save picture {text}"));
                 let tip = match scale {
                     Some(_) => "Save as PNG, drawn on white for papers: pixels for each pixel of an imprint",
@@ -230,7 +231,7 @@ pub(super) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         cx.push(ViewCommand::Ui(UiRequest::PictureOf(pane)));
         ui.close();
     }
-    if let Some(command) = cx.state.equivalent(pane, error_m) {
+    if let Some(command) = export::equivalent(cx.state, pane, error_m) {
         let copy = ui.button("Copy the command");
         let tip = format!("What does the same in a shell:\n{command}");
         if copy.on_hover_text(tip).clicked() {

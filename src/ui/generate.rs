@@ -1,6 +1,7 @@
 //! The generator: bundle, steps, seed, range mapping, run, and the results so far.
 
 use crate::app::settings::prefer;
+use crate::app::{recipe, results};
 use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
@@ -52,7 +53,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     row(ui, cx.p.weak, "Model", |ui| {
         let bundles: Vec<_> = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
-        let current = cx.state.bundle(BundleKind::Generator).map_or("none found", |b| b.name.as_str());
+        let current = recipe::bundle(cx.state, BundleKind::Generator).map_or("none found", |b| b.name.as_str());
         let combo =
             egui::ComboBox::from_id_salt("bundle").width(ui.available_width() - 8.0).selected_text(current).truncate();
         let response = combo.show_ui(ui, |ui| {
@@ -79,7 +80,7 @@ fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
 }
 
 fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let bundle = cx.state.bundle(BundleKind::Generator).ok();
+    let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
     let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
     let spelt_out = cx.state.settings.generate.spelt_out(bundle);
     let mut new = spelt_out.clone();
@@ -187,7 +188,7 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, (text, &tip)));
         }
         None => {
-            let can = cx.state.can_generate();
+            let can = results::can_generate(cx.state);
             let text = RichText::new("Generate").family(super::theme::medium()).color(cx.p.on_accent);
             let button = egui::Button::new(text).fill(cx.p.accent).min_size(vec2(width, 28.0));
             let response = ui.add_enabled(can.is_ok(), button).accessible_name("Generate");
@@ -264,7 +265,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(caption("None yet for this touch.", cx.p));
         return;
     }
-    let chosen = cx.state.chosen(finger).cloned();
+    let chosen = results::chosen(cx.state, finger).cloned();
     let shift = cx.state.settings.shift;
     for recipe in keys.iter().rev() {
         let selected = chosen.as_ref() == Some(recipe);
@@ -286,28 +287,28 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            let text = format!("seed {}", recipe.seed);
+            let text = format!("seed {}", recipe.config.seed);
             let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));
             if label.on_hover_text("Show this prediction").clicked() {
                 choose(cx, recipe);
             }
-            ui.label(caption(format!("{} steps", recipe.steps), cx.p));
+            ui.label(caption(format!("{} steps", recipe.config.steps), cx.p));
             ui.label(value(psnr, cx.p).size(SMALL));
             ui.label(caption(seconds, cx.p)).on_hover_text(took);
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
-            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.seed));
+            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.config.seed));
             if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
-                let recipe = recipe.clone();
+                let config = recipe.config;
                 cx.push(prefer(move |s| {
                     s.generate = GenerateSettings {
                         preset: None,
-                        steps: recipe.steps,
-                        seed: recipe.seed,
+                        steps: config.steps,
+                        seed: config.seed,
                         seed_locked: true,
-                        sampler: recipe.sampler,
-                        eta: recipe.eta.get(),
-                        spacing: recipe.spacing,
-                        guidance: recipe.guidance.get(),
+                        sampler: config.sampler,
+                        eta: config.eta,
+                        spacing: config.spacing,
+                        guidance: config.guidance,
                         ..s.generate.clone()
                     }
                 }));

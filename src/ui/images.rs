@@ -19,8 +19,9 @@ use super::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary,
 use super::widget::texture::{Histogram, Memo, depth_image, picture_image};
 use crate::app::action::Action;
 use crate::app::command::{Hover, LabelsCommand, LibraryCommand, Pane, TasksCommand, ViewCommand};
-use crate::app::keys::ImprintSource;
-use crate::app::results::Preview;
+use crate::app::keys::{ImprintSource, Preview};
+use crate::app::{recipe, results};
+
 use crate::app::settings::{ColorMap as MapChoice, MaskTool};
 use crate::app::state::{Absent, Lookup, State};
 use link::Link;
@@ -65,7 +66,7 @@ pub(super) fn map_of(state: &State) -> ColorMap {
 
 /// Remark at every millimeter of this sample; empty where lengths are measured.
 pub(super) fn scale_note(state: &State) -> &'static str {
-    match state.sample().ready().map(|s| s.scale) {
+    match results::sample(state).ready().map(|s| s.scale) {
         Some(Scale::Assumed) => "assumed scale",
         _ => "",
     }
@@ -73,7 +74,7 @@ pub(super) fn scale_note(state: &State) -> &'static str {
 
 /// [`scale_note`], and how the files' pictures lie if they had to be laid upright.
 fn source_note(state: &State) -> String {
-    let reading = state.sample().ready().and_then(|s| s.reading);
+    let reading = results::sample(state).ready().and_then(|s| s.reading);
     let laid = reading.filter(|read| read.turn != Turn::default() || !read.is_sure()).map(|read| {
         let sure = if read.is_sure() { "sure" } else { "NOT sure" };
         format!(
@@ -82,7 +83,9 @@ fn source_note(state: &State) -> String {
             100.0 * read.margin
         )
     });
-    let fitted = state.bundle(BundleKind::Generator).ok().and_then(|bundle| bundle.misgiving(state.sample().ready()?));
+    let fitted = recipe::bundle(state, BundleKind::Generator)
+        .ok()
+        .and_then(|bundle| bundle.misgiving(results::sample(state).ready()?));
     let fitted = fitted.map(|_| "the model was fitted to other data".to_owned());
     [scale_note(state).to_owned(), laid.unwrap_or_default(), fitted.unwrap_or_default()]
         .into_iter()
@@ -149,30 +152,34 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
     match pane {
         Pane::GelRaw | Pane::GelReference | Pane::GelDifference => {
             let image: Lookup<'_, RgbGrid> = match pane {
-                Pane::GelDifference => state.gelslim(finger).and_then(Absent::NoGelSlim, |g| Some(&g.difference)),
-                Pane::GelRaw => {
-                    state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw))
+                Pane::GelDifference => {
+                    results::gelslim(state, finger).and_then(Absent::NoGelSlim, |g| Some(&g.difference))
                 }
-                _ => {
-                    state.gelslim(finger).and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference))
-                }
+                Pane::GelRaw => results::gelslim(state, finger)
+                    .and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw)),
+                _ => results::gelslim(state, finger)
+                    .and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference)),
             };
             gel_image(cx, ui, pane, finger, image);
             None
         }
-        Pane::Measured => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Measured, finger)),
-        Pane::Predicted => match state.preview(finger) {
+        Pane::Measured => {
+            depth_pane(cx, ui, memory, pane, finger, results::imprint(state, ImprintSource::Measured, finger))
+        }
+        Pane::Predicted => match results::preview(state, finger) {
             Some(preview) => preview_image(cx, ui, finger, preview),
-            None => match state.predicted_color(finger) {
+            None => match results::predicted_color(state, finger) {
                 Some(picture) => {
                     gel_image(cx, ui, pane, finger, picture);
                     None
                 }
-                None => depth_pane(cx, ui, memory, pane, finger, state.imprint(ImprintSource::Predicted, finger)),
+                None => {
+                    depth_pane(cx, ui, memory, pane, finger, results::imprint(state, ImprintSource::Predicted, finger))
+                }
             },
         },
         _ => {
-            let error = state.comparison(finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
+            let error = results::comparison(state, finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
             depth_pane(cx, ui, memory, pane, finger, error)
         }
     }
@@ -261,7 +268,7 @@ pub(super) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
     let button = absent.action().filter(|a| a.command(cx.state).is_some());
     let (why, what) = match absent {
         Absent::NoPrediction if button.is_none() => (
-            match cx.state.can_generate() {
+            match results::can_generate(cx.state) {
                 Err(reason) => reason.text(),
                 Ok(()) => "",
             },
@@ -297,7 +304,7 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
     let output = canvas.show(ui, &mut view);
     cx.shared.views.gel = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let recipe = cx.state.chosen(finger).filter(|_| pane == Pane::Predicted);
+    let recipe = results::chosen(cx.state, finger).filter(|_| pane == Pane::Predicted);
     let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
         let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
             picture::difference(image)
@@ -379,8 +386,8 @@ fn depth_pane(
     let source = if pane == Pane::Predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
     // The recipe of what is shown: the picture is made again when it changes, and only then.
     let recipe = match pane {
-        Pane::Error => cx.state.imprint_key(ImprintSource::Predicted, finger).ok()?,
-        _ => cx.state.imprint_key(source, finger).ok()?,
+        Pane::Error => results::imprint_key(cx.state, ImprintSource::Predicted, finger).ok()?,
+        _ => results::imprint_key(cx.state, source, finger).ok()?,
     };
     let paintable = pane != Pane::Error
         && cx.state.selection.panes.contains(&Pane::Masks)
@@ -493,18 +500,21 @@ fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
     let state = cx.state;
     let right = match pane {
-        Pane::Error => state
-            .comparison(finger)
+        Pane::Error => results::comparison(state, finger)
             .ready()
             .map_or(String::new(), |c| format!("mean |error| {}", units::text_mm(c.mae_m))),
         _ => String::new(),
     };
-    if let Some(split) = state.comparison(finger).ready().and_then(|c| c.split).filter(|_| pane == Pane::Error) {
+    if let Some(split) =
+        results::comparison(state, finger).ready().and_then(|c| c.split).filter(|_| pane == Pane::Error)
+    {
         let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
         let text = format!("seen {} · invented {}", part(split.seen.mae), part(split.invented.mae));
         output.caption(Align2::RIGHT_BOTTOM, &text, cx.p.strong_on_image());
     }
-    if let Some(warning) = state.ambiguity(finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted) {
+    if let Some(warning) =
+        results::ambiguity(state, finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted)
+    {
         output.caption(Align2::RIGHT_BOTTOM, warning, super::theme::DARK.caution);
     }
     output.caption(Align2::RIGHT_TOP, &right, cx.p.strong_on_image());

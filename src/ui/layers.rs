@@ -13,6 +13,7 @@ use super::widget::line::Line;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::{Layer, WorkbenchCommand};
 use touch2touch_core::align::Observability;
@@ -61,7 +62,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             ui.spacing_mut().item_spacing.y = 2.0;
             let source = cx.state.workbench.side;
             choice(cx, ui, source);
-            match cx.state.layers(source) {
+            match results::layers(cx.state, source) {
                 Lookup::Ready(layers) | Lookup::Stale(layers) => {
                     histogram(cx, ui, layers);
                     reasons(cx, ui, layers);
@@ -77,7 +78,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                     ui.label(caption(absent.text(), cx.p));
                 }
             }
-            if let Some(pose) = cx.state.pose(source).shown()
+            if let Some(pose) = results::pose(cx.state, source).shown()
                 && let Some(o) = &pose.report.observability
             {
                 observability(cx, ui, o, pose.rms_m);

@@ -8,8 +8,7 @@ use std::collections::BTreeMap;
 use eframe::egui::Id;
 use egui_tiles::{Container, Linear, LinearDir, Tile, TileId, Tiles, Tree};
 
-use crate::app::pane::{Dock, Pane};
-use crate::app::settings::Workspace;
+use crate::app::pane::{Dock, Pane, Workspace};
 
 /// Part of the stored text: a layout of another version is not even tried.
 const FORMAT: &str = "touch2touch-layout-2";

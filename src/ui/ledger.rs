@@ -3,6 +3,7 @@
 
 mod plots;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Align2, FontId, Layout, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui, UiBuilder, WidgetInfo,
@@ -42,7 +43,7 @@ pub(super) type Memory = ();
 /// The pane.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let finger = cx.state.selection.finger;
-    let lookup = cx.state.ledger(finger);
+    let lookup = results::ledger(cx.state, finger);
     let Some(chain) = lookup.shown() else {
         return match lookup {
             Lookup::Failed(err) => images::failed(cx, ui, err),
@@ -115,7 +116,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
         });
         response.response.accessible_name("Shift of the depth chain").on_hover_text(shift_tooltip(current));
     });
-    match cx.state.running(TaskKind::Refit) {
+    match cx.state.tasks.of_kind(TaskKind::Refit) {
         Some((ticket, task)) => {
             let what = (task.progress.text.as_str(), "Stop computing shift statistics");
             ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, what));
@@ -202,7 +203,7 @@ fn stage(cx: &mut Cx<'_>, ui: &mut Ui, record: &StageRecord, finger: PadId) {
     });
 
     let thumb = Rect::from_min_size(rect.min + vec2(0.0, 2.0), THUMB);
-    let key = (cx.state.chosen(finger), cx.state.settings.shift, record.stage);
+    let key = (results::chosen(cx.state, finger), cx.state.settings.shift, record.stage);
     let range = Range { lo: s.min as f32, hi: s.max as f32 };
     let picture = cx.shared.textures.get(ui.ctx(), ("stage", record.stage), key, false, || {
         (depth_image(&record.image, ColorMap::Viridis, range), None)
@@ -272,7 +273,7 @@ fn against(cx: &mut Cx<'_>, ui: &mut Ui, chain: &LedgerResult, finger: PadId) {
                 None => "no slope: the truth is flat".to_owned(),
             };
             response.widget_info(|| WidgetInfo::labeled(Role::Image, true, format!("Joint histogram: {text}")));
-            let key = (cx.state.chosen(finger), cx.state.settings.shift, cx.p.canvas);
+            let key = (results::chosen(cx.state, finger), cx.state.settings.shift, cx.p.canvas);
             let canvas = cx.p.canvas;
             let picture = cx
                 .shared

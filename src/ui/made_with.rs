@@ -9,7 +9,9 @@ use super::widget::cut::cut_in_the_middle;
 use crate::app::action::Action;
 use crate::app::keys::{ImprintSource, ShiftMode};
 use crate::app::pane::{Kind, Pane};
-use crate::app::results::shown::Why;
+use crate::app::results;
+use crate::app::results::Why;
+
 use touch2touch_core::rig::PadId;
 use touch2touch_work::prediction::settings_text;
 
@@ -27,9 +29,10 @@ fn finger_of(cx: &Cx<'_>, pane: Pane) -> Option<PadId> {
         Kind::Form => pane == Pane::Ledger,
         Kind::Color | Kind::Versus => false,
     };
-    let mut fingers = cx.state.fingers().into_iter().filter(|finger| predicted && cx.state.chosen(*finger).is_some());
+    let mut fingers =
+        cx.state.fingers().into_iter().filter(|finger| predicted && results::chosen(cx.state, *finger).is_some());
     // One that is out of date is said first.
-    fingers.clone().find(|finger| cx.state.outdated(*finger).is_some()).or_else(|| fingers.next())
+    fingers.clone().find(|finger| results::outdated(cx.state, *finger).is_some()).or_else(|| fingers.next())
 }
 
 /// A pane's place, and that of the line below it, if it has one.
@@ -43,15 +46,17 @@ pub(super) fn split(cx: &Cx<'_>, full: Rect, pane: Pane) -> (Rect, Option<Rect>)
 
 /// The line; dims the pane above it where its prediction is not the one that is meant.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: Rect) {
-    let Some((finger, recipe)) = finger_of(cx, pane).and_then(|finger| Some((finger, cx.state.chosen(finger)?))) else {
+    let Some((finger, recipe)) =
+        finger_of(cx, pane).and_then(|finger| Some((finger, results::chosen(cx.state, finger)?)))
+    else {
         return;
     };
     let shift = cx.state.settings.shift;
-    let model = cx.state.model_name(recipe);
-    let why = cx.state.outdated(finger).map(|outdated| outdated.why);
+    let model = cx.state.library.model_name(&recipe.bundle);
+    let why = results::outdated(cx.state, finger).map(|outdated| outdated.why);
     let settings = match why {
-        None => format!(" · {} · {}", settings_text(&recipe.config()), shift.label().to_lowercase()),
-        Some(_) => format!(" · {}", settings_text(&recipe.config())),
+        None => format!(" · {} · {}", settings_text(&recipe.config), shift.label().to_lowercase()),
+        Some(_) => format!(" · {}", settings_text(&recipe.config)),
     };
     let (lead, tip) = match why {
         None => ("", "What is shown was predicted so"),
@@ -65,7 +70,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: 
         ui.painter().rect_filled(place, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
     ui.painter().rect_filled(line, 0.0, cx.p.frame);
-    let again = matches!(why, Some(Why::NotMade | Why::Picked)) && cx.state.can_generate().is_ok();
+    let again = matches!(why, Some(Why::NotMade | Why::Picked)) && results::can_generate(cx.state).is_ok();
     let room = line.with_max_x(line.right() - if again { BUTTON + 6.0 } else { 0.0 });
     let color = match (why, shift) {
         (None | Some(Why::Picked), ShiftMode::Raw) | (Some(Why::NotMade | Why::OnItsWay | Why::Held), _) => {

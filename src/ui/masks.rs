@@ -3,6 +3,7 @@
 mod proposal;
 mod stats;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{self, Align, Layout, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
@@ -113,7 +114,7 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
             (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore), IGNORED),
             (Paint::LetThrough, "proposal", cx.keys().help(Action::LetThrough), PROPOSED),
         ] {
-            if paint == Paint::LetThrough && now != paint && !cx.state.proposes() {
+            if paint == Paint::LetThrough && now != paint && !results::proposes(cx.state) {
                 continue;
             }
             let text = RichText::new(text).color(if now == paint { color } else { cx.p.text });
@@ -251,16 +252,16 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
         MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
         MaskSource::Truth => {}
     }
-    if let Err(absent) = cx.state.mask_recipe(finger) {
+    if let Err(absent) = results::mask_recipe(cx.state, finger) {
         ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
     }
     if new != *settings {
         cx.push(prefer(move |s| s.mask = new.clone()));
     }
     for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
-        let several = cx.state.imprint(ImprintSource::Predicted, finger).ready().is_some();
+        let several = results::imprint(cx.state, ImprintSource::Predicted, finger).ready().is_some();
         for source in ImprintSource::iter() {
-            if several || source == cx.state.worked_on(finger) {
+            if several || source == results::worked_on(cx.state, finger) {
                 in_force(cx, ui, source, finger);
             }
         }
@@ -269,13 +270,13 @@ fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Origin of the mask of one imprint.
 fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
-    let text = match cx.state.mask_in_force(source, finger) {
+    let text = match results::mask_in_force(cx.state, source, finger) {
         Ok(mask) => mask.label,
         Err(Lookup::Failed(err)) => err.why.clone(),
         Err(Lookup::Absent(absent)) => absent.text().to_owned(),
         Err(_) => "…".to_owned(),
     };
-    let color = if cx.state.drawn_mask(source, finger).is_some() { cx.p.strong } else { cx.p.weak };
+    let color = if results::drawn_mask(cx.state, source, finger).is_some() { cx.p.strong } else { cx.p.weak };
     let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
     let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
     ui.add(label).on_hover_text(format!("The mask in force. {text}"));
@@ -305,9 +306,9 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(section(&format!("Correct, {}", cx.state.finger_name(finger)), cx.p));
-        let worked_on = cx.state.worked_on(finger);
+        let worked_on = results::worked_on(cx.state, finger);
         for source in ImprintSource::iter() {
-            let there = cx.state.imprint(source, finger).ready().is_some();
+            let there = results::imprint(cx.state, source, finger).ready().is_some();
             let button = ui.add_enabled(there, egui::Button::selectable(worked_on == source, source.name()));
             let button = button.accessible_name(format!("Correct the {} imprint's mask", source.key()));
             let tip =
@@ -325,7 +326,7 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::ResetMask, "Remove");
-        let (name, shown) = (cx.state.pair_name(), cx.state.mask_places());
+        let (name, shown) = (cx.state.pair_name(), results::mask_places(cx.state));
         let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
         let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
         for (action, text, what) in [(Action::Undo, "Undo", undo), (Action::Redo, "Redo", redo)] {
@@ -343,8 +344,8 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
     let deg = |rad: f64| units::text_deg(rad);
     let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
-    let provisional = cx.state.provisional_pose(changed.source);
-    let now = provisional.map_or_else(|| cx.state.pose(changed.source), |pose| Lookup::Ready(&**pose));
+    let provisional = results::provisional_pose(cx.state, changed.source);
+    let now = provisional.map_or_else(|| results::pose(cx.state, changed.source), |pose| Lookup::Ready(&**pose));
     let (text, color) = match (now, before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);

@@ -1,5 +1,6 @@
 //! The figures of the selected pair: image metrics, the ledger of the prediction, the pose.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{Align, Color32, Layout, RichText, ScrollArea, Sense, Ui};
 
@@ -61,17 +62,19 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.label(section("Pose", cx.p));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let engine = cx.state.settings.pose_engine;
-            let combo =
-                eframe::egui::ComboBox::from_id_salt("engine").width(150.0).truncate().selected_text(engine.label());
+            let registration = cx.state.settings.registration;
+            let combo = eframe::egui::ComboBox::from_id_salt("engine")
+                .width(150.0)
+                .truncate()
+                .selected_text(registration.label());
             let response = combo.show_ui(ui, |ui| {
                 for e in Registration::iter() {
-                    if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                        cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
+                    if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
+                        cx.out.push(prefer(move |s| s.registration = e.into()).into());
                     }
                 }
             });
-            response.response.accessible_name("Registration").on_hover_text(engine.by.description());
+            response.response.accessible_name("Registration").on_hover_text(registration.by.description());
         });
     });
     for source in [ImprintSource::Measured, ImprintSource::Predicted] {
@@ -79,9 +82,9 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.spacing_mut().item_spacing.x = 6.0;
             images::side_mark(ui, cx.p, source);
             ui.label(source.name());
-            match cx.state.pose(source) {
+            match results::pose(cx.state, source) {
                 Lookup::Ready(pose) | Lookup::Stale(pose) => {
-                    let verdict = Verdict::of(pose, cx.state.truth());
+                    let verdict = Verdict::of(pose, results::truth(cx.state));
                     let text = RichText::new(scene::angle_text(pose)).color(grade_color(cx.p, verdict.grade));
                     let label = ui.label(text);
                     if !verdict.findings.is_empty() {
@@ -99,7 +102,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let units = match cx.state.pose(source) {
+        let units = match results::pose(cx.state, source) {
             Lookup::Failed(err) => err.units.clone(),
             _ => None,
         };
@@ -107,7 +110,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             let place = format!("{}, in the metrics", source.name().to_lowercase());
             ui.horizontal_wrapped(|ui| images::unit_buttons(cx, ui, &offer, &place));
         }
-        if let Some(pose) = cx.state.pose(source).shown() {
+        if let Some(pose) = results::pose(cx.state, source).shown() {
             let p = pose.grasp_from_object;
             let text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
             ui.horizontal(|ui| {
@@ -120,14 +123,14 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ImprintSource::Measured => Action::AcceptMeasuredPose,
                 ImprintSource::Predicted => Action::AcceptPredictedPose,
             };
-            let accepted = cx.state.accepted(source) == Some(p.into());
+            let accepted = results::accepted(cx.state, source) == Some(p.into());
             let text = if accepted { "Accepted (withdraw)" } else { "Accept this pose" };
-            if let Some(hand) = cx.state.by_hand(source) {
+            if let Some(hand) = results::by_hand(cx.state, source) {
                 by_hand(cx, ui, source, hand);
             } else {
                 cx.action_button(ui, action, text);
             }
-            let elsewhere = cx.state.accepted_elsewhere();
+            let elsewhere = results::accepted_elsewhere(cx.state);
             if source == ImprintSource::Predicted && !elsewhere.is_empty() {
                 let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
                 ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
@@ -140,7 +143,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: ManualPose) {
     let angle = hand.planar.inverse().theta_rad;
     let mut text = format!("Accepted by hand: {}", units::text_deg(angle));
-    if let Some(truth) = cx.state.truth() {
+    if let Some(truth) = results::truth(cx.state) {
         text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
     }
     ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
@@ -170,16 +173,16 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     );
     let fingers = cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f));
     for finger in fingers {
-        if let Some(recipe) = cx.state.chosen(finger) {
-            let outdated = cx.state.outdated(finger).is_some();
+        if let Some(recipe) = results::chosen(cx.state, finger) {
+            let outdated = results::outdated(cx.state, finger).is_some();
             let color = if outdated { cx.p.caution } else { cx.p.weak };
-            let text = RichText::new(cx.state.made_with(recipe)).size(SMALL).color(color);
+            let text = RichText::new(cx.state.library.made_with(recipe)).size(SMALL).color(color);
             let label = ui.add(eframe::egui::Label::new(text).wrap());
             if outdated {
                 label.on_hover_text("The settings in force would make another prediction");
             }
         }
-        match cx.state.comparison(finger) {
+        match results::comparison(cx.state, finger) {
             Lookup::Ready(c) | Lookup::Stale(c) => {
                 let number = |v: Option<f64>, decimals: usize, unit: &str| match v {
                     Some(v) => format!("{v:.decimals$}{unit}"),
@@ -200,7 +203,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                     line(0.0).show(ui, (name, cx.p.weak), &[(number, cx.p.strong)]);
                 }
                 parts(cx, ui, c);
-                if let Some(warning) = cx.state.ambiguity(finger).and_then(|a| a.warning()) {
+                if let Some(warning) = results::ambiguity(cx.state, finger).and_then(|a| a.warning()) {
                     ui.add(eframe::egui::Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
                 }
             }
@@ -252,8 +255,8 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     let finger = cx.state.selection.finger;
     let shift = cx.state.settings.shift;
     let mut rows: Vec<(&str, Option<Color32>, Stats, bool)> = Vec::new();
-    if let Some(recipe) = cx.state.chosen(finger).cloned() {
-        if let Some(chain) = cx.state.ledger(finger).shown() {
+    if let Some(recipe) = results::chosen(cx.state, finger).cloned() {
+        if let Some(chain) = results::ledger(cx.state, finger).shown() {
             // The channels are of the pane "Depth chain"; here it is the way to meters.
             let way = |stage| !matches!(stage, Stage::Channel(_) | Stage::Resized | Stage::Placed);
             for record in chain.ledger.stages.iter().filter(|r| way(r.stage)) {
@@ -267,13 +270,13 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
                 rows.push((name, color, record.stats, record.stage.is_meters()));
             }
         }
-        if let Lookup::Ready(c) = cx.state.comparison(finger) {
+        if let Lookup::Ready(c) = results::comparison(cx.state, finger) {
             let stats = *memory.stats.get("error", (&recipe, shift), || Stats::of(&c.error));
             rows.push(("Error", None, stats, true));
         }
     }
     if let (Lookup::Ready(imprint), Some(touch)) =
-        (cx.state.imprint(ImprintSource::Measured, finger), cx.state.touch_key(finger))
+        (results::imprint(cx.state, ImprintSource::Measured, finger), cx.state.touch_key(finger))
     {
         let stats = *memory.stats.get("measured", touch, || Stats::of(imprint));
         let row = rows.len().saturating_sub(usize::from(rows.last().is_some_and(|r| r.0 == "Error")));
@@ -285,7 +288,7 @@ fn ledger(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     ui.add_space(4.0);
     ui.label(section(&format!("Ledger, {} finger", cx.state.finger_name(finger)), cx.p))
         .on_hover_text("What each stage of the depth chain left behind: smallest, mean, deviation, largest");
-    if let Some(chain) = cx.state.ledger(finger).shown() {
+    if let Some(chain) = results::ledger(cx.state, finger).shown() {
         let serious = chain.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();
         if let Some(first) = chain.ledger.flags.first().filter(|_| serious > 0) {
             let color = if first.severity == Severity::Wrong { cx.p.wrong } else { cx.p.caution };

@@ -7,6 +7,7 @@ use super::cx::{Cx, side_color};
 use super::theme::{SMALL, caption, grade_color};
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::PoseOf;
 use touch2touch_core::frames::PlanarPose;
@@ -40,7 +41,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                 row(ui, (name.as_str(), cx.p.text), &cells, ROW);
             }
             ui.add_space(6.0);
-            let text = match cx.state.truth() {
+            let text = match results::truth(cx.state) {
                 Some(_) => "Angle and place of the tool's origin. Apart: measured against predicted.",
                 None => "The true pose of this pair is not known: only the distance between the two poses is shown.",
             };
@@ -57,9 +58,9 @@ fn text(difference: PoseDifference) -> [String; 2] {
 /// Measured and predicted against the truth, and against each other.
 fn cells(cx: &Cx<'_>, of: PoseOf) -> [([String; 2], Color32); 3] {
     let p = cx.p;
-    let pose = |source| cx.state.pose_of(source, of);
+    let pose = |source| results::pose_of(cx.state, source, of);
     let planar = |source| -> Option<PlanarPose> { Some(pose(source).ready()?.grasp_from_object) };
-    let against = |source: ImprintSource| match (pose(source), cx.state.truth()) {
+    let against = |source: ImprintSource| match (pose(source), results::truth(cx.state)) {
         (Lookup::Ready(pose), Some(truth)) => {
             let difference = PoseDifference::between(pose.grasp_from_object, truth);
             (text(difference), grade_color(p, Verdict::of(pose, Some(truth)).grade))

@@ -10,6 +10,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane};
 use crate::app::evaluate::{EvaluateCommand, GRASPS};
+use crate::app::results;
 use crate::app::tasks::TaskKind;
 use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
 
@@ -31,9 +32,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         choices(cx, ui);
         ui.separator();
-        let rows = cx.state.table_rows();
+        let rows = cx.state.table.rows();
         if rows.is_empty() {
-            let (what, why) = match cx.state.running(TaskKind::Evaluate) {
+            let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
                 Some(_) => ("The table appears when all grasps are scored", "Cancel keeps what was scored until then"),
                 None => (
                     "No results yet",
@@ -55,7 +56,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        let bundles: Vec<_> = cx.state.evaluated().map(|(b, chosen)| (b.clone(), chosen)).collect();
+        let bundles: Vec<_> = results::evaluated(cx.state).map(|(b, chosen)| (b.clone(), chosen)).collect();
         if bundles.is_empty() {
             ui.label(RichText::new("No generator was found").color(cx.p.caution));
         }
@@ -90,7 +91,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
-        match cx.state.running(TaskKind::Evaluate) {
+        match cx.state.tasks.of_kind(TaskKind::Evaluate) {
             Some((ticket, task)) => {
                 let now = &task.progress;
                 let text = match now.fraction() {

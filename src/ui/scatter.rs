@@ -15,7 +15,8 @@ use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
-use crate::app::evaluate::{ScoreTable, SourceScores};
+use crate::app::scores::{ScoreTable, SourceScores};
+
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Metric, mean};
 

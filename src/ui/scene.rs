@@ -30,6 +30,7 @@ use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
+use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
@@ -154,7 +155,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         }
     };
     let state = cx.state;
-    let lookup = state.cloud(source);
+    let lookup = results::cloud(state, source);
     match (lookup, lookup.shown().is_some()) {
         (Lookup::Failed(err), _) => return images::failed(cx, ui, err),
         (Lookup::Absent(absent), _) => return images::absent_text(cx, ui, absent),
@@ -198,7 +199,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
     }
     let seconds = ui.input(|i| i.time);
-    if state.workbench.animate_weakest && state.pose(source).shown().is_some_and(|p| p.report.observability.is_some()) {
+    if state.workbench.animate_weakest
+        && results::pose(state, source).shown().is_some_and(|p| p.report.observability.is_some())
+    {
         // The only thing that moves by itself, and only while a person asked for it.
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
@@ -257,7 +260,7 @@ fn place_camera(
             cx.act(Action::Parallel);
         }
     }
-    let aimed = match (output.fit, output.pointer, cx.state.cloud(source)) {
+    let aimed = match (output.fit, output.pointer, results::cloud(cx.state, source)) {
         (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, output, pointer, clouds),
         _ => false,
     };
@@ -278,12 +281,13 @@ fn place_camera(
 /// Brings what the view draws up to date.
 fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let state = cx.state;
-    if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(source), state.cloud_key(source)) {
+    if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, source), results::cloud_key(state, source)) {
         build::update_cloud(cx, memory, source, key, clouds);
     }
     if state.workbench.both_clouds {
         let other = other_side(source);
-        if let (Lookup::Ready(clouds), Ok(Some(key))) = (state.cloud(other), state.cloud_key(other)) {
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, other), results::cloud_key(state, other))
+        {
             build::update_cloud(cx, memory, other, key, clouds);
         }
     }
@@ -401,7 +405,8 @@ fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clou
 
 /// Distance of a point from the registered model where distances are shown, meters; `None` of one outside the contact.
 fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
-    let deviation = cx.state.deviation(source).ready().filter(|_| cx.state.shows_deviation(source))?;
+    let deviation =
+        results::deviation(cx.state, source).ready().filter(|_| results::shows_deviation(cx.state, source))?;
     let contact = &clouds.finger(finger)?.contact;
     // Distances are of the contact points alone, in their order.
     let contact_index = contact.get(..index)?.iter().filter(|contact| **contact).count();

@@ -12,6 +12,7 @@ use super::widget::colorbar::gradient;
 use crate::app::action::Action;
 use crate::app::command::{Command, Pane, PredictCommand};
 use crate::app::keys::{EnsembleKey, ImprintSource, PredictionKey};
+use crate::app::results;
 use crate::app::seeds::{COUNT, SeedsCommand};
 use crate::app::state::Lookup;
 use touch2touch_core::colormap::{ColorMap, Range};
@@ -35,18 +36,18 @@ pub(super) type Memory = ();
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     let state = cx.state;
     let finger = state.selection.finger;
-    let recipes = match state.seed_recipes(finger) {
+    let recipes = match results::seed_recipes(state, finger) {
         Ok(recipes) => recipes,
         Err(absent) => return absent_text(cx, ui, absent),
     };
     super::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ui.spacing_mut().item_spacing.y = GAP;
-        let poses = state.seed_poses();
+        let poses = results::seed_poses(state);
         controls(cx, ui, &recipes);
         ScrollArea::vertical().id_salt("seeds").show(ui, |ui| {
             grid(cx, ui, &recipes, &poses);
-            match state.ensemble(finger) {
+            match results::ensemble(state, finger) {
                 Lookup::Failed(err) => failed(cx, ui, err),
                 lookup => {
                     if let Some(ensemble) = lookup.shown() {
@@ -60,7 +61,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 }
 
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
-    let (count, every, running) = (cx.state.seeds.count, cx.state.seeds.every, cx.state.seeds_running());
+    let (count, every, running) = (cx.state.seeds.count, cx.state.seeds.every, results::seeds_running(cx.state));
     let there = recipes.iter().filter(|r| cx.state.results.predictions.contains(r)).count();
     ui.horizontal_wrapped(|ui| {
         let mut count = count;
@@ -83,7 +84,9 @@ fn controls(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey]) {
             cx.push(Command::Seeds(SeedsCommand::EveryPair(every)));
         }
         let text = match running && there < recipes.len() {
-            true => format!("{there} of {}, seed {}…", recipes.len(), recipes[0].seed.wrapping_add(there as u64)),
+            true => {
+                format!("{there} of {}, seed {}…", recipes.len(), recipes[0].config.seed.wrapping_add(there as u64))
+            }
             false => format!("{there} of {}", recipes.len()),
         };
         ui.label(caption(text, cx.p));
@@ -103,28 +106,28 @@ fn grid(cx: &mut Cx<'_>, ui: &mut Ui, recipes: &[PredictionKey], poses: &[Option
         let offset = vec2((i % columns) as f32, (i / columns) as f32) * (size + vec2(GAP, GAP));
         let rect = Rect::from_min_size(area.min + offset, size);
         let response = ui.interact(rect, ui.scope_id().with(("seed", i)), Sense::click());
-        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Seed {}", recipe.seed)));
+        response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Seed {}", recipe.config.seed)));
         let painter = ui.painter_at(rect);
         painter.rect_filled(rect, 2.0, cx.p.canvas);
         let angle = poses.get(i).copied().flatten().map(|pose| units::text_deg(pose.angle_rad));
-        match state.seed_imprint(recipe) {
+        match results::seed_imprint(state, recipe) {
             Some(imprint) => {
                 let shown = (recipe, state.settings.shift);
                 thumbnail::depth(cx, &painter, rect, ("seed", i), shown, (imprint, map, range));
-                shade(&painter, rect, Align2::LEFT_TOP, &recipe.seed.to_string());
+                shade(&painter, rect, Align2::LEFT_TOP, &recipe.config.seed.to_string());
                 shade(&painter, rect, Align2::RIGHT_BOTTOM, angle.as_deref().unwrap_or(""));
-                if state.chosen(recipe.touch.finger) == Some(recipe) {
+                if results::chosen(state, recipe.touch.finger) == Some(recipe) {
                     painter.rect_stroke(rect, 2.0, Stroke::new(2.0, cx.p.accent), egui::StrokeKind::Inside);
                 }
                 if response
-                    .on_hover_text(format!("Seed {}: click to show it in the other panes", recipe.seed))
+                    .on_hover_text(format!("Seed {}: click to show it in the other panes", recipe.config.seed))
                     .clicked()
                 {
                     cx.push(PredictCommand::Choose(recipe.clone()));
                 }
             }
             None => {
-                let text = if state.seeds_running() { "…" } else { "–" };
+                let text = if results::seeds_running(state) { "…" } else { "–" };
                 painter.text(rect.center(), Align2::CENTER_CENTER, text, FontId::proportional(SMALL), cx.p.weak);
             }
         }
@@ -219,7 +222,7 @@ fn bar(cx: &Cx<'_>, painter: &Painter, corner: Pos2, width: f32, colors: ColorMa
 fn fan(cx: &mut Cx<'_>, ui: &mut Ui, poses: &[Option<&PoseResult>]) {
     let state = cx.state;
     ui.label(section("Poses of the seeds", cx.p));
-    if let Some(absent) = state.seed_pose_absent() {
+    if let Some(absent) = results::seed_pose_absent(state) {
         ui.label(caption(absent.text(), cx.p));
         return;
     }
@@ -229,7 +232,7 @@ fn fan(cx: &mut Cx<'_>, ui: &mut Ui, poses: &[Option<&PoseResult>]) {
         return;
     };
     let truth = poses.iter().flatten().find_map(|pose| pose.truth_rad);
-    let measured = state.pose(ImprintSource::Measured).ready().map(|pose| pose.angle_rad);
+    let measured = results::pose(state, ImprintSource::Measured).ready().map(|pose| pose.angle_rad);
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), DIAL), Sense::hover());
     response.widget_info(|| WidgetInfo::labeled(Role::Image, true, "Fan of poses"));
     let others: Vec<f64> = truth.into_iter().chain(measured).collect();

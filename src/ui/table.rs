@@ -11,8 +11,9 @@ use super::widget::cut::cut_in_the_middle;
 use super::widget::empty;
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
-use crate::app::evaluate::{ScoreChoice, SourceScores};
+use crate::app::evaluate::ScoreChoice;
 use crate::app::library::{Sort, short_name};
+use crate::app::scores::SourceScores;
 use crate::app::tasks::TaskKind;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::dataset::PairId;
@@ -39,12 +40,12 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         let table = &cx.state.table;
         let total = cx.state.library.pairs().len();
         let scored = table.scores.sources.iter().map(|source| source.scored).min().unwrap_or(0);
-        let empty = table.scores.sources.is_empty() && cx.state.running(TaskKind::Evaluate).is_none();
-        if !empty && (scored < total || cx.state.running(TaskKind::Evaluate).is_some()) {
+        let empty = table.scores.sources.is_empty() && cx.state.tasks.of_kind(TaskKind::Evaluate).is_none();
+        if !empty && (scored < total || cx.state.tasks.of_kind(TaskKind::Evaluate).is_some()) {
             predict_all(cx, ui, scored);
         }
         if table.scores.sources.is_empty() {
-            if cx.state.running(TaskKind::Evaluate).is_none() {
+            if cx.state.tasks.of_kind(TaskKind::Evaluate).is_none() {
                 let action = Action::PredictAll.command(cx.state);
                 let action = action.map(|_| ("Predict all", Action::PredictAll.tooltip()));
                 let why = "Every pair by every source appears here: measured imprints and the chosen generators";

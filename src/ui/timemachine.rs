@@ -3,6 +3,7 @@
 mod plot;
 mod table;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{
     self, Align, Color32, ComboBox, Layout, Pos2, Rect, RichText, Shape, Slider, Stroke, Ui, UiBuilder, pos2, vec2,
@@ -43,8 +44,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         ui.set_min_size(full.size());
         row(ui, Rect::from_min_size(full.min, vec2(full.width(), ROW)), |ui| header(cx, ui));
         let body = Rect::from_min_max(pos2(full.left(), full.top() + ROW + 2.0), full.max);
-        let lookup = cx.state.inspection();
-        match (lookup, cx.state.inspected()) {
+        let lookup = results::inspection(cx.state);
+        match (lookup, results::inspected(cx.state)) {
             (Lookup::Failed(err), _) => {
                 let (why, own) = (err.why.clone(), cx.state.inspect.start.is_some());
                 let action = own.then(|| (Action::OwnStarts.name(), Action::OwnStarts.tooltip()));
@@ -130,16 +131,16 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     }
     ui.add_space(4.0);
-    let engine = cx.state.settings.pose_engine;
-    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(engine.label());
+    let registration = cx.state.settings.registration;
+    let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(registration.label());
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
-            if ui.selectable_label(e == engine.by, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(prefer(move |s| s.pose_engine = e.into()).into());
+            if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
+                cx.out.push(prefer(move |s| s.registration = e.into()).into());
             }
         }
     });
-    combo.response.accessible_name("Registration of the steps").on_hover_text(engine.by.description());
+    combo.response.accessible_name("Registration of the steps").on_hover_text(registration.by.description());
     ui.add_space(4.0);
     match inspect.start.map(PoseBits::get) {
         Some(start) => {
@@ -161,7 +162,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// One button per start; the winner is marked.
 fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let Some(shown) = cx.state.inspected() else { return };
+    let Some(shown) = results::inspected(cx.state) else { return };
     ui.label(caption("start", cx.p));
     let inspection = shown.inspection.clone();
     /// More do not fit beside each other: they are chosen in the curves.

@@ -10,7 +10,8 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
-use crate::app::train::{MINUTES, STEPS, TrainForm, state::MOST_HELD_OUT};
+use crate::app::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainForm};
+use crate::app::{recipe, results, train};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::train::{MaskScore, Trained};
@@ -40,7 +41,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     let before = cx.state.train.form;
     let mut form = before;
-    let begins = match cx.state.bundle(BundleKind::Mask) {
+    let begins = match recipe::bundle(cx.state, BundleKind::Mask) {
         Ok(bundle) => format!("begins from {}", bundle.name),
         Err(_) => "there is no mask model to begin from".to_owned(),
     };
@@ -89,10 +90,10 @@ fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
 
 /// Plan of the training.
 fn plan(cx: &Cx<'_>, ui: &mut Ui) {
-    if cx.state.running(TaskKind::Train).is_some() {
+    if cx.state.tasks.of_kind(TaskKind::Train).is_some() {
         return;
     }
-    let Some(key) = cx.state.train_plan_key() else { return };
+    let Some(key) = results::train_plan_key(cx.state) else { return };
     let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
     match cx.state.look(key) {
         Lookup::Ready(plan) | Lookup::Stale(plan) => {
@@ -120,17 +121,17 @@ fn plan(cx: &Cx<'_>, ui: &mut Ui) {
 fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        match cx.state.running(TaskKind::Train) {
+        match cx.state.tasks.of_kind(TaskKind::Train) {
             Some((ticket, task)) => {
                 let tip = "Stop; the same training goes on from here when it is asked for again";
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
                 cx.action_button(ui, Action::StartTraining, "Start training");
-                if cx.state.uses_trained() {
+                if train::uses_trained(cx.state) {
                     let tip = "The trained model makes the automatic masks now";
                     ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
-                } else if cx.state.trained().is_some() {
+                } else if train::trained(cx.state).is_some() {
                     cx.action_button(ui, Action::UseTrained, "Use the trained model");
                 }
             }
@@ -139,7 +140,7 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
 }
 
 fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui) {
-    let all = cx.state.training_curves();
+    let all = train::curves(cx.state);
     if all.is_empty() {
         return;
     }

@@ -4,6 +4,7 @@ mod choose;
 mod figures;
 mod space;
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
 use strum::IntoEnumIterator as _;
@@ -77,7 +78,7 @@ fn flickers(ui: &Ui) -> bool {
 }
 
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
-    let versus = cx.state.versus();
+    let versus = cx.state.settings.compared();
     let held = egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
         let held = header(cx, ui, &versus);
         figures::show(cx, ui, &versus);
@@ -189,7 +190,7 @@ fn picture(
 ) -> Option<Histogram> {
     let letter = if flipped { Letter::B } else { letter };
     let subject = letter.of(versus);
-    let lookup = cx.state.subject(subject, finger);
+    let lookup = results::subject(cx.state, subject, finger);
     let Some(depth) = lookup.shown() else {
         instead(cx, ui, lookup);
         return None;
@@ -222,7 +223,7 @@ fn paint(
     finger: PadId,
     depth: &DepthMap,
 ) -> Option<Histogram> {
-    let recipe = cx.state.subject_key(subject, finger).ok()?;
+    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let (map, range) = (map_of(cx.state), range_of(cx.state));
     let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
@@ -251,7 +252,7 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
         memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
     }
     let right = clip.with_min_x(x);
-    if let Some(depth) = cx.state.subject(&versus.b, finger).shown() {
+    if let Some(depth) = results::subject(cx.state, &versus.b, finger).shown() {
         let painter = output.painter.with_clip_rect(right);
         let part = CanvasOutput {
             response: output.response.clone(),
@@ -272,13 +273,13 @@ fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput
 /// A minus B.
 fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> Option<Histogram> {
     for subject in [&versus.a, &versus.b] {
-        let lookup = cx.state.subject(subject, finger);
+        let lookup = results::subject(cx.state, subject, finger);
         if lookup.shown().is_none() {
             instead(cx, ui, lookup);
             return None;
         }
     }
-    let lookup = cx.state.subjects_compared(&versus.a, &versus.b, finger);
+    let lookup = results::subjects_compared(cx.state, &versus.a, &versus.b, finger);
     let Some(compared) = lookup.shown() else {
         instead(cx, ui, lookup.map(|compared| &compared.error));
         return None;
@@ -286,7 +287,7 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     let label = format!("A minus B {}", cx.state.finger_name(finger));
     let output = canvas(cx, ui, &label, compared.error.size());
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let keys = [&versus.a, &versus.b].map(|subject| cx.state.subject_key(subject, finger));
+    let keys = [&versus.a, &versus.b].map(|subject| results::subject_key(cx.state, subject, finger));
     let [Ok(a), Ok(b)] = keys else { return None };
     let range = Range::symmetric(cx.shared.views.error_m());
     let key = (VersusKey { a, b }, range.hi.to_bits());
@@ -321,7 +322,7 @@ fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) 
 fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId, px: [f32; 2]) {
     let Some((x, y)) = output.map.pixel(px) else { return };
     let value = |subject: &Subject| {
-        let depth = cx.state.subject(subject, finger).shown()?;
+        let depth = results::subject(cx.state, subject, finger).shown()?;
         depth.get(x, y).copied().filter(|v| v.is_finite()).map(f64::from)
     };
     let (a, b) = (value(&versus.a), value(&versus.b));

@@ -1,12 +1,13 @@
 //! Masks that are exported and imported: in the studio as by the verb, and undo takes an import back.
 
 use touch2touch::app::labels::Review;
+use touch2touch::app::results;
 use touch2touch_work::io::exchange::Format;
 
 use super::*;
 
 #[test]
-fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
+pub(super) fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
     let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
     let names: Vec<String> = Dataset::open(&folder).unwrap().index.pairs.iter().map(|pair| pair.name.clone()).collect();
@@ -39,10 +40,11 @@ fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back() {
     }
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
     studio.send(LibraryCommand::Select(PairId(0)).into());
-    let hand = |studio: &Studio| studio.state.drawn_mask(ImprintSource::Measured, lab::RIGHT).cloned().unwrap();
+    let hand =
+        |studio: &Studio| results::drawn_mask(&studio.state, ImprintSource::Measured, lab::RIGHT).cloned().unwrap();
     let before = hand(&studio);
     studio.send(ExportCommand::AskImport(Some(exported.clone())).into());
-    let key = studio.state.import_plan_key().expect("the form is open");
+    let key = results::import_plan_key(&studio.state).expect("the form is open");
     let Some(plan) = studio.state.results.import_plans.get(&key).cloned() else {
         panic!("{:?}", studio.state.tasks.failed)
     };

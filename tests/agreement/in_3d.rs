@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Mat4, Vec4};
 use touch2touch::app::labels::StrokeIn3d;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch_core::label::{Layers, Sight};
 use touch2touch_work::io::masks::MaskStore;
@@ -41,17 +42,17 @@ fn a_drawing_in_3d_is_the_same_by_hand_from_the_journal_and_by_verb() {
     studio.send(prefer(move |s| s.mask = mask.clone()).into());
     // The left finger lies behind the right one: only a drawing through all layers reaches it.
     stroke(&mut studio, lab::LEFT, Layers::Front, &[[290.0, 300.0], [310.0, 320.0]], false);
-    assert!(studio.state.drawn_mask(MEASURED, lab::LEFT).is_none(), "hidden");
+    assert!(results::drawn_mask(&studio.state, MEASURED, lab::LEFT).is_none(), "hidden");
     stroke(&mut studio, lab::LEFT, Layers::All, &[[290.0, 300.0], [310.0, 320.0]], false);
-    assert!(studio.state.drawn_mask(MEASURED, lab::LEFT).is_some());
+    assert!(results::drawn_mask(&studio.state, MEASURED, lab::LEFT).is_some());
     studio.send(LabelsCommand::Undo.into());
-    assert!(studio.state.drawn_mask(MEASURED, lab::LEFT).is_none(), "one gesture, one undo");
+    assert!(results::drawn_mask(&studio.state, MEASURED, lab::LEFT).is_none(), "one gesture, one undo");
     stroke(&mut studio, lab::RIGHT, Layers::Front, &[[250.0, 240.0], [270.0, 250.0]], false);
     studio.send(prefer(|s| s.mask.tool = MaskTool::Lasso).into());
     stroke(&mut studio, lab::RIGHT, Layers::Front, &[[290.0, 290.0], [320.0, 290.0], [310.0, 330.0]], true);
     let names: Vec<_> = studio.state.history.done().iter().map(|gesture| gesture.name.to_string()).collect();
     assert_eq!(names, ["brush stroke in 3D", "lasso in 3D"]);
-    let drawn = studio.state.drawn_mask(MEASURED, lab::RIGHT).unwrap().mask.clone();
+    let drawn = results::drawn_mask(&studio.state, MEASURED, lab::RIGHT).unwrap().mask.clone();
     drop(studio);
     assert_eq!(stored(lab::RIGHT), Some(drawn.clone()), "on the disk");
     // What the journal says of each of them is what the verb takes.

@@ -1,6 +1,7 @@
 //! What an angle hangs on is the same on the screen and by verb.
 
 use touch2touch::app::command::ViewCommand;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch_work::io::npz;
 use touch2touch_work::io::pt::Values;
@@ -10,7 +11,7 @@ use super::*;
 const MEASURED: ImprintSource = ImprintSource::Measured;
 
 #[test]
-fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
+pub(super) fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
     let path = folder.to_str().unwrap();
@@ -20,7 +21,7 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
     studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
-    assert!(studio.state.influence(MEASURED).ready().is_none(), "nobody looks at it");
+    assert!(results::influence(&studio.state, MEASURED).ready().is_none(), "nobody looks at it");
     studio.send(ViewCommand::ShowInfluence(true).into());
     let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
     for pair in 0..pairs {
@@ -28,7 +29,9 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
         let state = &studio.state;
         let name = state.pair_name();
         let case = report["cases"].as_array().unwrap().iter().find(|case| case["name"] == name).unwrap();
-        let Lookup::Ready(found) = state.influence(MEASURED) else { panic!("{name}: {:?}", state.tasks.failed) };
+        let Lookup::Ready(found) = results::influence(state, MEASURED) else {
+            panic!("{name}: {:?}", state.tasks.failed)
+        };
         let arrays = npz::read(Path::new(case["influence"]["file"].as_str().unwrap())).unwrap();
         for (finger, values) in found.pixels.entries() {
             let written = &arrays[&state.finger_name(finger).to_lowercase()];
@@ -50,8 +53,10 @@ fn what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb() {
     let verb = ["pose", path, "--influence", out.to_str().unwrap(), "--mask", "threshold", "--engine", "gicp"];
     let why = json(&verb, home.path())["cases"][0]["no_influence"].as_str().unwrap().to_owned();
     let engine = touch2touch_core::pose::Registration::Gicp.into();
-    studio.send(prefer(move |s| s.pose_engine = engine).into());
-    let Lookup::Failed(said) = studio.state.influence(MEASURED) else { panic!("{:?}", studio.state.tasks.failed) };
+    studio.send(prefer(move |s| s.registration = engine).into());
+    let Lookup::Failed(said) = results::influence(&studio.state, MEASURED) else {
+        panic!("{:?}", studio.state.tasks.failed)
+    };
     assert!(why.contains(&said.why), "{why}: {}", said.why);
     studio.send(ViewCommand::ShowInfluence(false).into());
 }

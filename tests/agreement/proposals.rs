@@ -2,6 +2,7 @@
 
 use touch2touch::app::command::ViewCommand;
 use touch2touch::app::labels::{DrawnMask, Review};
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
@@ -37,17 +38,17 @@ fn why(studio: &Studio) -> String {
     let finger = state.selection.finger;
     format!(
         "proposing {}, finger {finger:?}, imprint {:?}, {:?}; {:?}; failed: {:?}; log: {:?}",
-        state.proposes(),
-        state.worked_on(finger),
-        state.proposal_key(MEASURED, finger),
-        matches!(state.proposal(MEASURED, finger), Lookup::Waiting),
+        results::proposes(state),
+        results::worked_on(state, finger),
+        results::proposal_key(state, MEASURED, finger),
+        matches!(results::proposal(state, MEASURED, finger), Lookup::Waiting),
         state.tasks.failed,
         state.log.entries,
     )
 }
 
 fn hand(studio: &Studio) -> Option<DrawnMask> {
-    studio.state.drawn_mask(MEASURED, lab::RIGHT).cloned()
+    results::drawn_mask(&studio.state, MEASURED, lab::RIGHT).cloned()
 }
 
 #[test]
@@ -83,7 +84,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         }
         let before = hand(&studio);
         studio.send(ViewCommand::Propose(true).into());
-        let proposal = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
+        let proposal = results::shown_proposal(&studio.state, MEASURED, lab::RIGHT).cloned();
         let proposal = proposal.unwrap_or_else(|| panic!("{source:?}: {}", why(&studio)));
         assert!(proposal.mask.as_slice().contains(&true), "{source:?}");
         assert_eq!(hand(&studio), before, "{source:?}: looking changes nothing");
@@ -93,7 +94,7 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
         assert_eq!(hand(&studio), before, "{source:?}: navigation accepts nothing");
         studio.send(LabelsCommand::AcceptProposal.into());
         let made = hand(&studio).unwrap();
-        assert!(!studio.state.proposes());
+        assert!(!results::proposes(&studio.state));
         if source != ProposalSource::Automatic {
             assert!(made.marks.layers().iter().any(|(by, px)| **by == proposal.provenance && *px > 0), "{source:?}");
         }
@@ -129,7 +130,7 @@ fn hand_work_stays_until_it_is_asked_for_and_what_is_let_through_is_hand_work() 
     let checked = painted.marks.manual_checked();
     let accept = |studio: &mut Studio| {
         studio.send(ViewCommand::Propose(true).into());
-        let proposed = studio.state.shown_proposal(MEASURED, lab::RIGHT).cloned();
+        let proposed = results::shown_proposal(&studio.state, MEASURED, lab::RIGHT).cloned();
         let proposed = proposed.unwrap_or_else(|| panic!("{}", why(studio))).mask.clone();
         studio.send(LabelsCommand::AcceptProposal.into());
         proposed
@@ -221,7 +222,7 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
 }
 
 #[test]
-fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
+pub(super) fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
     let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
     let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
     let name =
@@ -236,7 +237,7 @@ fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_
     strokes(&mut studio);
     let painted = hand(&studio).unwrap();
     studio.send(LabelsCommand::ProposeAll.into());
-    assert!(studio.state.running(TaskKind::Propose).is_none());
+    assert!(studio.state.tasks.of_kind(TaskKind::Propose).is_none());
     let said = &studio.state.log.entries.back().unwrap().text;
     assert!(said.contains("proposed in") && said.contains("1 pair judged before"), "{said}");
 

@@ -2,8 +2,6 @@
 //! else, and a random one gives the same numbers in the studio and by the verbs.
 
 use std::path::Path;
-use touch2touch::app::evaluate::EvaluateCommand;
-use touch2touch::app::settings::prefer;
 
 use proptest::prelude::*;
 use proptest::strategy::ValueTree as _;
@@ -11,9 +9,12 @@ use proptest::test_runner::TestRunner;
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::Pane;
+use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Lookup, State};
+use touch2touch::app::{export, recipe, results};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::{Registration, RegistrationChoice, Rejection};
@@ -75,7 +76,7 @@ fn registration() -> impl Strategy<Value = RegistrationChoice> {
     (by, rejection).prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or(by.into()))
 }
 
-fn recipe() -> impl Strategy<Value = Recipe> {
+pub(super) fn recipe() -> impl Strategy<Value = Recipe> {
     let imprint = proptest::sample::select(ImprintSource::iter().collect::<Vec<_>>());
     let engine = proptest::sample::select(vec![EngineChoice::Auto, EngineChoice::Rten, EngineChoice::Ort]);
     let (generator, unet) = (model("generator"), model("mask"));
@@ -117,7 +118,7 @@ proptest! {
 }
 
 /// Puts a recipe in force in the studio.
-fn put(studio: &mut Studio, recipe: &Recipe) {
+pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
     let GenerateConfig { steps, eta, seed, sampler, spacing, guidance } = recipe.generator.as_ref().unwrap().1;
     let before = studio.state.settings.clone();
     let generate = GenerateSettings { preset: None, steps, eta, seed, sampler, spacing, guidance, ..before.generate };
@@ -125,7 +126,7 @@ fn put(studio: &mut Studio, recipe: &Recipe) {
     let change = prefer(move |s| {
         s.runtime = EngineChoice::Rten;
         s.generate = generate.clone();
-        (s.shift, s.mask.choice, s.pose_engine) = (shift, mask, registration);
+        (s.shift, s.mask.choice, s.registration) = (shift, mask, registration);
     });
     studio.send(change.into());
 }
@@ -135,7 +136,7 @@ fn put(studio: &mut Studio, recipe: &Recipe) {
 fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     let (state, mut compared) = (&studio.state, 0);
     let said = |pane| {
-        let words = state.equivalent_words(pane, 0.004).unwrap();
+        let words = export::equivalent_words(state, pane, 0.004).unwrap();
         // What it writes goes where the test's files are.
         let out = home.join("predictions").display().to_string();
         let words = words[1..].iter().map(|word| if word == "predictions" { &out } else { word });
@@ -143,7 +144,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     };
     let (poses, name) = (said(Pane::Metrics), state.pair_name());
     let made = {
-        let words = state.in_force(ImprintSource::Predicted).words(Stage::Pose).list();
+        let words = recipe::in_force(state, ImprintSource::Predicted).words(Stage::Pose).list();
         let case = home.join(format!("{}.t2tcase", file_name(state)));
         let begin = ["case", "make", path, "--pair", name, "--out", case.to_str().unwrap(), "--json"];
         let done = run(&begin.into_iter().chain(words.iter().map(String::as_str)).collect::<Vec<_>>(), home);
@@ -154,7 +155,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     for source in ImprintSource::iter() {
         let case = cases.iter().find(|case| case["imprint"] == source.key());
         let angle = case.map_or(&Value::Null, |case| &case["angle_deg"]);
-        let shown = state.pose(source).ready();
+        let shown = results::pose(state, source).ready();
         assert_eq!(*angle, optional(shown.map(|pose| pose.angle_rad.to_degrees())), "{name} {source:?}: {case:?}");
         let in_case = made.as_ref().map_or(&[][..], |made| made["angles_deg"].as_array().unwrap());
         let in_case = in_case.iter().find(|of| of[0] == source.key());
@@ -168,7 +169,7 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     }
     let generated = said(Pane::Generate);
     for finger in state.rig().pads() {
-        let Lookup::Ready(found) = state.comparison(finger) else { continue };
+        let Lookup::Ready(found) = results::comparison(state, finger) else { continue };
         let key = state.finger_name(finger).to_string();
         let rows = generated["pairs"].as_array().unwrap();
         let row = rows.iter().find(|row| row["finger"] == key.as_str()).unwrap();
@@ -184,7 +185,7 @@ fn file_name(state: &State) -> String {
 }
 
 #[test]
-fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
+pub(super) fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
     let mut runner = TestRunner::deterministic();
     let mut draw = || {
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
@@ -228,7 +229,7 @@ fn timeless(mut value: Value) -> Value {
 }
 
 #[test]
-fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() {
+pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() {
     let mut runner = TestRunner::deterministic();
     // Kept scores of the one are not to be found by the other.
     let [home, other] = [0; 2].map(|_| tempfile::tempdir().unwrap());
@@ -241,7 +242,7 @@ fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() 
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
         recipe.generator.get_or_insert_with(|| (model("generator"), GenerateConfig::default()));
         put(&mut studio, &recipe);
-        let words = studio.state.equivalent_words(Pane::Results, 0.004).unwrap();
+        let words = export::equivalent_words(&studio.state, Pane::Results, 0.004).unwrap();
         studio.send(EvaluateCommand::Start.into());
         let shown = studio.state.table.result.clone().expect("the table was made");
         let said = json(&words[1..].iter().map(String::as_str).collect::<Vec<_>>(), other.path());

@@ -37,6 +37,7 @@ use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{Operation, Recovered, Unsaved};
 use touch2touch_work::models::GenerateInput;
 use touch2touch_work::prediction::Prediction;
+use touch2touch_work::repeats::Repeater;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -207,7 +208,7 @@ impl DataSource for Source {
         Ok(())
     }
 
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: (&str, f64)) -> Result<LabelStats, TaskError> {
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: Repeater<'_>) -> Result<LabelStats, TaskError> {
         let mut stats = LabelStats::of_reviews(self.index(), reviews);
         stats.repeats.due.clone_from(&self.due.lock().unwrap());
         Ok(stats)

@@ -2,17 +2,18 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use touch2touch::app::settings::prefer;
 
 use touch2touch::app::command::{Answer, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::effect::Ended;
 use touch2touch::app::jobs::Lane;
+use touch2touch::app::keys::Preview;
 use touch2touch::app::keys::{ImprintSource, PredictionKey, Preset, Sampler, Spacing};
 use touch2touch::app::predict::Generate;
-use touch2touch::app::results::Preview;
-use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
+use touch2touch::app::settings::{GenerateSettings, ProposalSource};
 use touch2touch::app::state::{Absent, Lookup};
 use touch2touch::app::tasks::Ticket;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
@@ -21,7 +22,7 @@ use touch2touch_work::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
-use touch2touch::app::results::preview::Onlooker;
+use touch2touch::app::results::Onlooker;
 use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
 use touch2touch_work::job::{JobCx, PreviewPicture};
 use touch2touch_work::prediction::Prediction;
@@ -30,8 +31,22 @@ const RIGHT: PadId = lab::RIGHT;
 const LEFT: PadId = lab::LEFT;
 
 fn preview(recipe: &PredictionKey, step: u32) -> Arc<Preview> {
-    let picture = PreviewPicture { step, of: recipe.steps, depth: DepthMap::filled(4, 3, 0.001) };
+    let picture = PreviewPicture { step, of: recipe.config.steps, depth: DepthMap::filled(4, 3, 0.001) };
     Arc::new(Preview { recipe: recipe.clone(), picture })
+}
+
+#[test]
+fn a_proposal_at_the_registered_pose_of_a_prediction_that_nobody_made_ends() {
+    let mut bench = Bench::open_simulated();
+    bench.send(panes(&[Pane::Masks, Pane::Predicted]));
+    bench.send(prefer(|s| s.mask.proposal = ProposalSource::CadRegistered));
+    bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
+    bench.send(ViewCommand::Propose(true));
+    bench.settle();
+    // Which imprint is worked on, and so which pose is needed, must not hang on what is predicted for that pose.
+    assert!(results::proposes(&bench.state) && results::chosen(&bench.state, RIGHT).is_none());
+    assert_eq!(results::worked_on(&bench.state, RIGHT), ImprintSource::Measured);
+    assert!(results::imprint(&bench.state, ImprintSource::Predicted, RIGHT).ready().is_none());
 }
 
 #[test]
@@ -45,15 +60,15 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     bench.send(by_itself(true));
     bench.settle();
     assert_eq!(bench.services.generated(), 1);
-    let key = bench.state.chosen(RIGHT).expect("it is shown").clone();
-    assert_eq!(bench.state.cost_of(&key), bench.state.results.predictions.get(&key).map(|made| made.seconds));
+    let key = results::chosen(&bench.state, RIGHT).expect("it is shown").clone();
+    assert_eq!(bench.state.results.cost_of(&key), bench.state.results.predictions.get(&key).map(|made| made.seconds));
     // Of pairs that were left before their turn none is made.
     for pair in [2, 3, 4, 5] {
         bench.send(LibraryCommand::Select(PairId(pair)));
     }
     bench.settle();
     assert_eq!(bench.services.generated(), 2);
-    assert!(bench.state.chosen(RIGHT).is_some());
+    assert!(results::chosen(&bench.state, RIGHT).is_some());
     // A pane that shows no prediction asks for none.
     bench.send(panes(&[Pane::Measured]));
     bench.send(LibraryCommand::Select(PairId(6)));
@@ -67,7 +82,10 @@ fn the_pair_that_stays_on_screen_is_predicted_by_itself_where_that_costs_little(
     bench.send(panes(&[Pane::Predicted]));
     bench.settle();
     assert_eq!(bench.services.generated(), 2);
-    assert!(matches!(bench.state.imprint(ImprintSource::Predicted, RIGHT), Lookup::Absent(Absent::NoPrediction)));
+    assert!(matches!(
+        results::imprint(&bench.state, ImprintSource::Predicted, RIGHT),
+        Lookup::Absent(Absent::NoPrediction)
+    ));
 }
 
 #[test]
@@ -78,16 +96,17 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     bench.settle();
     bench.send(PredictCommand::Generate);
     bench.settle();
-    assert!(bench.state.chosen(RIGHT).is_some() && bench.state.chosen(LEFT).is_none());
+    assert!(results::chosen(&bench.state, RIGHT).is_some() && results::chosen(&bench.state, LEFT).is_none());
     assert_eq!(bench.services.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
     bench.send(prefer(move |s| s.generate.seed = 5));
     bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
     bench.settle();
-    let (right, left) = (bench.state.chosen(RIGHT).unwrap().clone(), bench.state.chosen(LEFT).unwrap().clone());
+    let (right, left) =
+        (results::chosen(&bench.state, RIGHT).unwrap().clone(), results::chosen(&bench.state, LEFT).unwrap().clone());
     assert_eq!(PredictionKey { touch: left.touch, ..right }, left);
     assert_eq!(bench.services.generated(), 2);
-    assert!(bench.state.cloud(ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
+    assert!(results::cloud(&bench.state, ImprintSource::Predicted).ready().unwrap().finger(LEFT).is_some());
     // Both on screen are made together, in one call.
     bench.send(panes(&[Pane::Predicted]));
     bench.send(ViewCommand::ShowBothFingers(true));
@@ -108,21 +127,21 @@ fn previews_are_wanted_where_somebody_looks_and_end_with_the_result() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured]));
     bench.settle();
-    assert!(bench.state.preview_wish().touches.is_empty(), "no predicted imprint is on screen");
+    assert!(results::preview_wish(&bench.state).touches.is_empty(), "no predicted imprint is on screen");
     bench.send(panes(&[Pane::Predicted]));
     let touch = bench.state.touch_key(RIGHT).unwrap();
-    let wish = Arc::new(Mutex::new(bench.state.preview_wish()));
+    let wish = Arc::new(Mutex::new(results::preview_wish(&bench.state)));
     let shown: Arc<Mutex<Vec<u32>>> = Arc::default();
     let seen = shown.clone();
     let sink = Arc::new(move |p: Preview| seen.lock().unwrap().push(p.picture.step));
-    let recipe = bench.state.recipe(touch).unwrap();
+    let recipe = recipe::prediction(&bench.state, touch).unwrap();
     let onlooker = Onlooker { wish: wish.clone(), sink };
     let cx = JobCx::unwatched().with_previews(onlooker.of(vec![recipe.clone()]));
     let previews = cx.previews().unwrap();
     assert!(previews.wants(0, 1).is_some() && previews.wants(0, 2).is_none() && previews.wants(1, 1).is_none());
     previews.show(0, preview(&recipe, 1).picture.clone());
     bench.send(panes(&[Pane::Log]));
-    *wish.lock().unwrap() = bench.state.preview_wish();
+    *wish.lock().unwrap() = results::preview_wish(&bench.state);
     assert!(previews.wants(0, 4).is_none());
     assert_eq!(*shown.lock().unwrap(), [1]);
     assert!(JobCx::unwatched().previews().is_none());
@@ -135,7 +154,7 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     bench.settle();
     bench.send(PredictCommand::Generate);
     bench.settle();
-    let first = bench.state.chosen(RIGHT).unwrap().clone();
+    let first = results::chosen(&bench.state, RIGHT).unwrap().clone();
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
     let made: Vec<(PredictionKey, Prediction)> = bench.state.results.made[&first.touch]
@@ -152,8 +171,8 @@ fn what_was_made_before_the_start_is_found_when_its_pair_is_looked_at() {
     let touch = again.state.touch_key(RIGHT).unwrap();
     assert_eq!(again.state.results.made[&touch].len(), 2);
     // Shown is the one that the settings would make (seed 42), not simply the last.
-    assert_eq!(again.state.chosen(RIGHT).unwrap().seed, 42);
-    assert!(again.state.imprint(ImprintSource::Predicted, RIGHT).ready().is_some());
+    assert_eq!(results::chosen(&again.state, RIGHT).unwrap().config.seed, 42);
+    assert!(results::imprint(&again.state, ImprintSource::Predicted, RIGHT).ready().is_some());
     assert_eq!(again.services.generated(), 0);
     let looked = again.services.looked_up.load(Ordering::Relaxed);
     again.send(LibraryCommand::Step(1));
@@ -171,14 +190,14 @@ fn presets_follow_the_bundle_and_own_numbers_leave_them() {
     bench.settle();
     let touch = bench.state.touch_key(RIGHT).unwrap();
     assert_eq!(bench.state.settings.generate.preset, Some(Preset::Default));
-    assert_eq!(bench.state.recipe(touch).unwrap().steps, 20, "what the bundle recommends");
+    assert_eq!(recipe::prediction(&bench.state, touch).unwrap().config.steps, 20, "what the bundle recommends");
     let fast = GenerateSettings { preset: Some(Preset::Fast), ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = fast.clone()));
-    assert!(bench.state.recipe(touch).unwrap().steps <= 4);
+    assert!(recipe::prediction(&bench.state, touch).unwrap().config.steps <= 4);
     let own = GenerateSettings { steps: 33, ..bench.state.settings.generate.clone() };
     bench.send(prefer(move |s| s.generate = own.clone()));
     assert_eq!(bench.state.settings.generate.preset, None);
-    assert_eq!(bench.state.recipe(touch).unwrap().steps, 33);
+    assert_eq!(recipe::prediction(&bench.state, touch).unwrap().config.steps, 33);
 }
 
 #[test]

@@ -4,10 +4,12 @@ use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, TasksCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::jobs::Lane;
-use touch2touch::app::keys::{ImprintSource, Registration, Request};
+use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
+use touch2touch::app::state::results::Request;
+use touch2touch::app::{demand, results};
 use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -34,7 +36,7 @@ fn send(bench: &mut Bench, command: InspectCommand) {
 #[test]
 fn nothing_is_recorded_unless_it_is_looked_at() {
     let mut bench = bench(&[Pane::SceneMeasured, Pane::ScenePredicted, Pane::Metrics]);
-    let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
+    let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
     assert!(bench.state.results.inspections.is_empty() && bench.state.results.basins.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
@@ -44,36 +46,36 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     bench.settle();
     assert_eq!(bench.state.results.inspections.len(), 1);
     assert!(bench.state.results.poses.is_empty() && bench.state.results.basins.is_empty());
-    let inspection = bench.state.inspection().ready().unwrap().clone();
+    let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!(inspection.report().grasp_from_object, pose.grasp_from_object, "looking changes nothing");
     // The map alone records nothing else.
     bench.state.results.inspections.clear();
     bench.send(panes(&[Pane::BasinMap]));
     bench.settle();
     assert_eq!((bench.state.results.inspections.len(), bench.state.results.basins.len()), (0, 1));
-    let map = bench.state.basin().ready().unwrap();
+    let map = results::basin(&bench.state).ready().unwrap();
     assert_eq!(map.cells.len(), 31 * 21);
     // A closed pane asks for nothing.
     bench.send(panes(&[Pane::Log]));
     send(&mut bench, InspectCommand::Plane(Plane::YZ));
-    assert!(bench.state.demands().is_empty());
+    assert!(demand::demands(&bench.state).is_empty());
     // Back at a plane that was there, nothing is computed again.
     send(&mut bench, InspectCommand::Plane(Plane::AngleY));
     bench.send(panes(&[Pane::BasinMap]));
-    assert!(bench.state.basin().ready().is_some() && bench.state.tasks.is_idle());
+    assert!(results::basin(&bench.state).ready().is_some() && bench.state.tasks.is_idle());
 }
 
 #[test]
 fn stepping_goes_both_ways_and_stops_at_the_ends() {
     let mut bench = bench(&[Pane::TimeMachine]);
     let (run, last) = {
-        let shown = bench.state.inspected().unwrap();
+        let shown = results::inspected(&bench.state).unwrap();
         assert!(shown.is_last() && shown.run == shown.inspection.report().winner);
         assert_eq!(shown.step.grasp_from_object, shown.inspection.report().grasp_from_object);
         (shown.run, shown.at)
     };
     assert!(last > 3, "{last} steps are too few for this test");
-    let at = |bench: &Bench| bench.state.inspected().unwrap().at;
+    let at = |bench: &Bench| results::inspected(&bench.state).unwrap().at;
     let act = |bench: &mut Bench, action: Action| {
         let command = action.command(&bench.state).unwrap();
         bench.send(command);
@@ -85,7 +87,7 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
     act(&mut bench, Action::FirstStep);
     assert_eq!(at(&bench), 0);
     {
-        let shown = bench.state.inspected().unwrap();
+        let shown = results::inspected(&bench.state).unwrap();
         let first = shown.inspection.applied(run).unwrap();
         assert_eq!(shown.step.grasp_from_object, first, "step 0 is the applied start");
         assert_eq!(shown.step.iteration, 0);
@@ -105,15 +107,15 @@ fn stepping_goes_both_ways_and_stops_at_the_ends() {
         assert!(bench.state.inspect.playing);
         send(&mut bench, InspectCommand::By(1));
     }
-    assert!(!bench.state.inspect.playing && bench.state.inspected().unwrap().is_last());
+    assert!(!bench.state.inspect.playing && results::inspected(&bench.state).unwrap().is_last());
     // Scrubbing computed nothing.
     assert_eq!(bench.state.results.inspections.len(), 1);
     // Another start; one that does not exist shows the last.
     send(&mut bench, InspectCommand::Run(usize::MAX));
-    let shown = bench.state.inspected().unwrap();
+    let shown = results::inspected(&bench.state).unwrap();
     assert_eq!(shown.run, shown.inspection.num_runs() - 1);
     send(&mut bench, InspectCommand::Go { run: 0, at: 1 });
-    assert_eq!((bench.state.inspected().unwrap().run, at(&bench)), (0, 1));
+    assert_eq!((results::inspected(&bench.state).unwrap().run, at(&bench)), (0, 1));
 }
 
 #[test]
@@ -123,26 +125,29 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     send(&mut bench, InspectCommand::Start(Some(PlanarPose { y_m: f64::NAN, ..start })));
     assert_eq!(bench.state.inspect.start, None);
     send(&mut bench, InspectCommand::Start(Some(start)));
-    assert!(matches!(bench.state.inspection(), Lookup::Stale(_)), "the run before stays until the new one is there");
+    assert!(
+        matches!(results::inspection(&bench.state), Lookup::Stale(_)),
+        "the run before stays until the new one is there"
+    );
     bench.settle();
-    let inspection = bench.state.inspection().ready().unwrap().clone();
+    let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
     let applied = inspection.applied(0).unwrap();
     assert!((applied.theta_rad - start.theta_rad).abs() < 1e-9 && (applied.y_m - start.y_m).abs() < 1e-9);
-    assert_eq!(bench.state.inspected().unwrap().at, 0, "it is watched from where it began");
+    assert_eq!(results::inspected(&bench.state).unwrap().at, 0, "it is watched from where it began");
     // A start far from everything is a failure of this run alone.
     send(&mut bench, InspectCommand::Start(Some(PlanarPose { y_m: 0.5, ..start })));
     bench.settle();
-    assert!(matches!(bench.state.inspection(), Lookup::Failed(err) if err.why.contains("outline")));
+    assert!(matches!(results::inspection(&bench.state), Lookup::Failed(err) if err.why.contains("outline")));
     assert_eq!(bench.errors(), 0, "the pane says it; the log does not repeat it");
     let back = Action::OwnStarts.command(&bench.state).unwrap();
     bench.send(back);
-    assert!(bench.state.inspection().ready().is_some_and(|i| i.requested(0) != Some(start)));
+    assert!(results::inspection(&bench.state).ready().is_some_and(|i| i.requested(0) != Some(start)));
     send(&mut bench, InspectCommand::Start(Some(start)));
     bench.send(LibraryCommand::Select(PairId(0)));
     bench.settle();
     assert_eq!(bench.state.inspect.start, None);
-    assert!(bench.state.inspected().is_none(), "this pair has no camera");
+    assert!(results::inspected(&bench.state).is_none(), "this pair has no camera");
 }
 
 #[test]
@@ -150,43 +155,48 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
     bench.settle();
-    assert_eq!(bench.state.inspection().ready().unwrap().num_runs(), 1);
+    assert_eq!(results::inspection(&bench.state).ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);
     send(&mut bench, InspectCommand::Pin);
-    let [Some(a), Some(b)] = bench.state.pins() else { panic!("{:?}", bench.state.pins()) };
-    assert_eq!((a.engine, b.engine), (Registration::DistanceField.into(), Registration::LabIcp.into()));
+    let [Some(a), Some(b)] = bench.state.inspect.pins_of(bench.state.pair_key()) else {
+        panic!("{:?}", bench.state.inspect.pins_of(bench.state.pair_key()))
+    };
+    assert_eq!((a.registration, b.registration), (Registration::DistanceField.into(), Registration::LabIcp.into()));
     assert_ne!(a.grasp_from_object, b.grasp_from_object);
     // A third takes the place of the older one.
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    assert_eq!(bench.state.pins()[0], Some(b));
+    assert_eq!(bench.state.inspect.pins_of(bench.state.pair_key())[0], Some(b));
     send(&mut bench, InspectCommand::Unpin(0));
     send(&mut bench, InspectCommand::Unpin(7));
-    assert!(bench.state.pins()[0].is_none() && bench.state.pins()[1].is_some());
+    assert!(
+        bench.state.inspect.pins_of(bench.state.pair_key())[0].is_none()
+            && bench.state.inspect.pins_of(bench.state.pair_key())[1].is_some()
+    );
     bench.send(LibraryCommand::Select(PairId(0)));
-    assert_eq!(bench.state.pins(), [None, None], "they belong to their pair");
+    assert_eq!(bench.state.inspect.pins_of(bench.state.pair_key()), [None, None], "they belong to their pair");
     bench.send(LibraryCommand::Select(SIMULATED));
-    assert!(bench.state.pins()[1].is_some());
+    assert!(bench.state.inspect.pins_of(bench.state.pair_key())[1].is_some());
 }
 
 #[test]
 fn a_map_that_is_given_up_is_not_computed_until_asked_for() {
     let mut bench = bench(&[Pane::SceneMeasured]);
     bench.send(panes(&[Pane::BasinMap]));
-    let wants_map = |bench: &Bench| bench.state.demands().iter().any(|r| matches!(r, Request::Basin(_)));
+    let wants_map = |bench: &Bench| demand::demands(&bench.state).iter().any(|r| matches!(r, Request::Basin(_)));
     assert!(wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 1);
     let stop = Action::CancelJobs.command(&bench.state).unwrap();
     bench.send(stop);
     assert!(!wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 0);
-    assert!(matches!(bench.state.basin(), Lookup::Failed(err) if err.is_cancelled()));
+    assert!(matches!(results::basin(&bench.state), Lookup::Failed(err) if err.is_cancelled()));
     bench.settle();
     assert!(bench.state.results.basins.is_empty() && bench.errors() == 0);
     bench.send(TasksCommand::Retry);
     bench.settle();
-    let map = bench.state.basin().ready().unwrap();
-    let truth = bench.state.truth().unwrap();
+    let map = results::basin(&bench.state).ready().unwrap();
+    let truth = results::truth(&bench.state).unwrap();
     let best = map.basins[0].end;
     assert!((best.theta_rad - truth.theta_rad).abs() < 5f64.to_radians(), "{best:?} {truth:?}");
 }

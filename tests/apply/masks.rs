@@ -1,12 +1,13 @@
 //! Correcting masks: strokes, clean-ups, undo, saving.
 
 use std::sync::atomic::Ordering;
-use touch2touch::app::settings::prefer;
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, MaskVersion, Revision};
 use touch2touch::app::labels::{MaskPlace, Review};
+use touch2touch::app::results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, MaskTool};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Mask;
@@ -36,7 +37,7 @@ pub(super) fn stroke(bench: &mut Bench, finger: PadId, from: [f32; 2], to: [f32;
 }
 
 fn mask(bench: &Bench, finger: PadId) -> Mask {
-    (**bench.state.mask_in_force(MEASURED, finger).unwrap().mask).clone()
+    (**results::mask_in_force(&bench.state, MEASURED, finger).unwrap().mask).clone()
 }
 
 fn count(mask: &Mask) -> usize {
@@ -57,7 +58,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     bench.send(LabelsCommand::EndStroke);
     let drawn = mask(&bench, lab::RIGHT);
     assert!(drawn[(12, 2)] && drawn[(14, 2)] && drawn[(4, 4)]);
-    let in_force = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
+    let in_force = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
     assert_eq!(in_force.label, "By hand, from Threshold 5.00 mm");
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
@@ -71,7 +72,10 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     assert_eq!(mask(&bench, lab::RIGHT), drawn);
     bench.send(LabelsCommand::ResetMask);
     bench.settle();
-    assert!(matches!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().version, MaskVersion::Auto(_)));
+    assert!(matches!(
+        results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().version,
+        MaskVersion::Auto(_)
+    ));
     // Undo changes the file too.
     bench.send(LabelsCommand::Undo);
     bench.settle();
@@ -306,7 +310,7 @@ fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Masks]));
     bench.send(PredictCommand::Generate);
     bench.settle();
-    let label = |bench: &Bench, source| bench.state.mask_in_force(source, lab::RIGHT).unwrap().label;
+    let label = |bench: &Bench, source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().label;
     stroke(&mut bench, lab::RIGHT, [12.0, 2.0], [14.0, 2.0]);
     bench.settle();
     assert!(label(&bench, MEASURED).starts_with("By hand"));
@@ -318,13 +322,13 @@ fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
     let taken = label(&bench, ImprintSource::Predicted);
     assert!(taken.contains("the measured imprint's mask"), "{taken}");
     let masks = [MEASURED, ImprintSource::Predicted]
-        .map(|source| bench.state.mask_in_force(source, lab::RIGHT).unwrap().mask.clone());
+        .map(|source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().mask.clone());
     assert_eq!(masks[0], masks[1]);
     // From now on each goes its own way.
     bench.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()));
-    let changed = bench.state.mask_in_force(ImprintSource::Predicted, lab::RIGHT).unwrap().mask.clone();
+    let changed = results::mask_in_force(&bench.state, ImprintSource::Predicted, lab::RIGHT).unwrap().mask.clone();
     assert_ne!(changed, masks[0]);
-    assert_eq!(*bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask, masks[0]);
+    assert_eq!(*results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().mask, masks[0]);
     // Another prediction has none, and undo does not reach the one that is not on screen.
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
@@ -359,7 +363,10 @@ fn every_tool_draws_and_undo_takes_it_back() {
         }
         bench.send(LabelsCommand::EndStroke);
         assert_ne!(mask(&bench, lab::RIGHT), before, "{name}");
-        assert_eq!(bench.state.history.next_undo("tool_a/data_0", &bench.state.mask_places()).unwrap().name, name);
+        assert_eq!(
+            bench.state.history.next_undo("tool_a/data_0", &results::mask_places(&bench.state)).unwrap().name,
+            name
+        );
         bench.send(LabelsCommand::Undo);
         assert_eq!(mask(&bench, lab::RIGHT), before, "{name}");
     }
@@ -376,7 +383,7 @@ fn a_gate_keeps_tools_to_a_depth() {
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
     let before = mask(&bench, lab::RIGHT);
-    let imprint = bench.state.imprint(MEASURED, lab::RIGHT).ready().unwrap().clone();
+    let imprint = results::imprint(&bench.state, MEASURED, lab::RIGHT).ready().unwrap().clone();
     let deep = |depth: f32| depth >= 0.002;
     assert!(imprint.as_slice().iter().any(|d| deep(*d)) && imprint.as_slice().iter().any(|d| !deep(*d)));
     let mut settings = bench.state.settings.mask.clone();
@@ -418,7 +425,7 @@ fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
     bench.settle();
     assert_eq!(bench.state.pair_name(), first);
     assert_eq!(bench.state.document.review(&first), Review::Todo);
-    assert!(bench.state.drawn_mask(MEASURED, lab::RIGHT).is_none(), "it looks as if nobody had drawn on it");
+    assert!(results::drawn_mask(&bench.state, MEASURED, lab::RIGHT).is_none(), "it looks as if nobody had drawn on it");
     assert!(Action::Undo.command(&bench.state).is_none());
     stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [2.0, 14.0]);
     bench.settle();
@@ -438,7 +445,10 @@ fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
     bench.send(LibraryCommand::First);
     bench.settle();
     assert_eq!(bench.state.pair_name(), first);
-    assert_eq!(*bench.state.drawn_mask(MEASURED, lab::RIGHT).unwrap().mask, *stored.measured(lab::RIGHT).unwrap().mask);
+    assert_eq!(
+        *results::drawn_mask(&bench.state, MEASURED, lab::RIGHT).unwrap().mask,
+        *stored.measured(lab::RIGHT).unwrap().mask
+    );
     assert_eq!(bench.services.source.labels.lock().unwrap()[&first], stored);
     assert_eq!(bench.errors(), 0, "{:?}", bench.log());
 }

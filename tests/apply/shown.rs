@@ -1,14 +1,15 @@
 //! A prediction on screen is that of the settings in force, or says that it is not.
 
 use std::sync::Arc;
-use touch2touch::app::settings::prefer;
 
 use proptest::prelude::*;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::{ImprintSource, Preset, Sampler};
-use touch2touch::app::results::shown::Why;
+use touch2touch::app::results::Why;
 use touch2touch::app::settings::GenerateSettings;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_work::infer::engine::EngineChoice;
@@ -82,13 +83,13 @@ impl Move {
 fn holds(state: &State, after: &str) {
     for finger in state.fingers() {
         let touch = state.touch_key(finger).expect("a pair is on screen");
-        let named = state.recipe(touch).expect("there is a generator");
-        let Some(shown) = state.chosen(finger) else {
+        let named = recipe::prediction(state, touch).expect("there is a generator");
+        let Some(shown) = results::chosen(state, finger) else {
             assert!(!state.settings.generate.by_itself, "nothing is shown after {after}");
             continue;
         };
         assert_eq!(shown.touch, touch, "of another pair after {after}");
-        match state.outdated(finger) {
+        match results::outdated(state, finger) {
             None => assert_eq!(shown, &named, "it is not what the settings make, and nothing says so, after {after}"),
             Some(outdated) => {
                 assert_ne!(shown, &named, "{outdated:?} after {after}");
@@ -97,14 +98,14 @@ fn holds(state: &State, after: &str) {
                     "{outdated:?} after {after}"
                 );
                 let model = &state.library.bundle(&shown.bundle).expect("it is there").name;
-                let (steps, seed) = (format!(" {} step", shown.steps), format!("seed {}", shown.seed));
+                let (steps, seed) = (format!(" {} step", shown.config.steps), format!("seed {}", shown.config.seed));
                 for word in [model.as_str(), &steps, &seed] {
                     assert!(outdated.made_with.contains(word), "{word:?} is not in {:?}", outdated.made_with);
                 }
             }
         }
         // What is derived from it is of the same prediction.
-        let imprint = state.imprint_key(ImprintSource::Predicted, finger).expect("it was made");
+        let imprint = results::imprint_key(state, ImprintSource::Predicted, finger).expect("it was made");
         assert!(format!("{imprint:?}").contains(&format!("{shown:?}")), "after {after}");
     }
 }
@@ -144,16 +145,16 @@ fn another_model_is_predicted_with_at_once_on_this_pair_and_on_those_seen_before
         bench.send(LibraryCommand::Select(PairId(pair)));
         bench.settle();
     }
-    let model = |bench: &Bench| bench.state.chosen(RIGHT).expect("a prediction").bundle.clone();
+    let model = |bench: &Bench| results::chosen(&bench.state, RIGHT).expect("a prediction").bundle.clone();
     assert_eq!((&*model(&bench), bench.services.generated()), ("gen", 3));
     bench.send(Move::Model(1).command(&bench.state).unwrap());
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::OnItsWay));
+    assert!(results::outdated(&bench.state, RIGHT).is_some_and(|outdated| outdated.why == Why::OnItsWay));
     bench.settle();
-    assert_eq!((&*model(&bench), bench.state.outdated(RIGHT)), ("fitted", None));
+    assert_eq!((&*model(&bench), results::outdated(&bench.state, RIGHT)), ("fitted", None));
     // The next pair was predicted with the first model before.
     bench.send(LibraryCommand::Step(1));
     bench.settle();
-    assert_eq!((&*model(&bench), bench.state.outdated(RIGHT)), ("fitted", None));
+    assert_eq!((&*model(&bench), results::outdated(&bench.state, RIGHT)), ("fitted", None));
     // Back: both are there, and nothing is made again.
     let made = bench.services.generated();
     bench.send(Move::Model(0).command(&bench.state).unwrap());
@@ -176,12 +177,12 @@ fn a_start_with_another_model_selected_does_not_open_on_the_picture_of_the_first
     again.state.results.looked_up.clear();
     again.settle();
     // Nothing is predicted by itself here: the picture from before is shown, and says whose it is.
-    let outdated = again.state.outdated(RIGHT).expect("it is of another model");
+    let outdated = results::outdated(&again.state, RIGHT).expect("it is of another model");
     assert!(outdated.made_with.starts_with("gen ") && outdated.why == Why::NotMade, "{outdated:?}");
     again.send(with(|g| g.by_itself = true));
     again.settle();
-    assert_eq!(again.state.outdated(RIGHT), None);
-    assert_eq!(&*again.state.chosen(RIGHT).unwrap().bundle, "fitted");
+    assert_eq!(results::outdated(&again.state, RIGHT), None);
+    assert_eq!(&*results::chosen(&again.state, RIGHT).unwrap().bundle, "fitted");
 }
 
 #[test]
@@ -196,14 +197,17 @@ fn what_a_person_picks_stays_until_the_settings_change_and_comes_back_with_them(
     let touch = bench.state.touch_key(RIGHT).unwrap();
     let first = Arc::new(bench.state.results.made[&touch][0].clone());
     bench.send(PredictCommand::Choose((*first).clone()));
-    assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::Picked));
+    assert_eq!(results::chosen(&bench.state, RIGHT), Some(&*first));
+    assert!(results::outdated(&bench.state, RIGHT).is_some_and(|outdated| outdated.why == Why::Picked));
     bench.send(Move::Steps(3).command(&bench.state).unwrap());
-    assert!(bench.state.outdated(RIGHT).is_some_and(|outdated| outdated.why == Why::NotMade));
+    assert!(results::outdated(&bench.state, RIGHT).is_some_and(|outdated| outdated.why == Why::NotMade));
     bench.send(with(|g| g.preset = Some(Preset::Default)));
-    assert_eq!(bench.state.chosen(RIGHT), Some(&*first));
+    assert_eq!(results::chosen(&bench.state, RIGHT), Some(&*first));
     // Generating asks for what the settings say.
     bench.send(PredictCommand::Generate);
-    assert_eq!((bench.state.chosen(RIGHT).unwrap().seed, bench.state.outdated(RIGHT)), (41, None));
+    assert_eq!(
+        (results::chosen(&bench.state, RIGHT).unwrap().config.seed, results::outdated(&bench.state, RIGHT)),
+        (41, None)
+    );
     assert_eq!(bench.state.settings.generate.sampler, Sampler::default());
 }

@@ -2,17 +2,18 @@
 
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Condvar, Mutex};
-use touch2touch::app::settings::prefer;
 
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand};
-use touch2touch::app::keys::{ImprintSource, PoseKey, Registration, Request};
+use touch2touch::app::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, Registration};
 use touch2touch::app::library::Place;
-use touch2touch::app::results::pose::ProvisionalPoseKey;
 use touch2touch::app::runtime::Runtime;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
+use touch2touch::app::state::results::Request;
 use touch2touch::app::state::{Absent, Lookup, State};
 use touch2touch::app::tasks::Entry;
+use touch2touch::app::{demand, results};
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::lab;
 
@@ -28,40 +29,43 @@ fn the_pose_follows_the_mask() {
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
-    let pose = bench.state.pose(MEASURED).ready().unwrap().clone();
+    let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     // The true contact of both fingers: better than the lab's tightest success limit of 5 degrees.
     assert!(pose.error_rad.unwrap() < 5f64.to_radians(), "{:?}", pose.error_rad);
     assert!(pose.report.iterations > 0 && !pose.stop.is_empty() && pose.num_points > 100);
-    let cloud = bench.state.cloud(MEASURED).ready().unwrap();
+    let cloud = results::cloud(&bench.state, MEASURED).ready().unwrap();
     assert_eq!(cloud.contact_points().len(), pose.num_points);
     // Rubbing out a part: while the pen is down nothing is computed, then cloud and pose are new.
     bench.send(prefer(|s| s.mask.tool = MaskTool::Eraser));
     let at_px = {
-        let mask = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
+        let mask = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().mask.clone();
         let at = mask.as_slice().iter().position(|v| *v).unwrap();
         [(at % mask.width()) as f32, (at / mask.width()) as f32]
     };
     bench.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source: MEASURED, at_px, erase: false });
     bench.send(LabelsCommand::StrokeTo([at_px[0] + 10.0, at_px[1] + 10.0]));
-    assert!(bench.state.demands().is_empty());
-    assert!(matches!(bench.state.pose(MEASURED), Lookup::Stale(_)), "the old pose stays until the new one is there");
+    assert!(demand::demands(&bench.state).is_empty());
+    assert!(
+        matches!(results::pose(&bench.state, MEASURED), Lookup::Stale(_)),
+        "the old pose stays until the new one is there"
+    );
     bench.send(LabelsCommand::EndStroke);
     bench.settle();
-    let after = bench.state.pose(MEASURED).ready().unwrap();
+    let after = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(prefer(|s| s.pose_engine = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
     bench.settle();
-    let lab = bench.state.pose(MEASURED).ready().unwrap();
+    let lab = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(prefer(|s| s.pose_engine = Registration::DistanceField.into()));
-    assert!(bench.state.pose(MEASURED).ready().is_some());
+    bench.send(prefer(|s| s.registration = Registration::DistanceField.into()));
+    assert!(results::pose(&bench.state, MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
     bench.send(accept);
-    assert!(bench.state.accepted(MEASURED).is_some());
+    assert!(results::accepted(&bench.state, MEASURED).is_some());
     bench.send(LabelsCommand::Undo);
-    assert!(bench.state.accepted(MEASURED).is_none());
+    assert!(results::accepted(&bench.state, MEASURED).is_none());
 }
 
 #[test]
@@ -71,7 +75,7 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
-    let key = |bench: &Bench| bench.state.pose_key(MEASURED).unwrap().unwrap();
+    let key = |bench: &Bench| results::pose_key(&bench.state, MEASURED).unwrap().unwrap();
     let settled = key(&bench);
     let both = |bench: &Bench, key: &PoseKey| {
         let results = &bench.state.results;
@@ -80,7 +84,7 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     };
     let (provisional, pose) = both(&bench, &settled);
     assert!(Arc::ptr_eq(&provisional, &pose), "a good mask is registered once");
-    assert!(bench.state.provisional_pose(MEASURED).is_none());
+    assert!(results::provisional_pose(&bench.state, MEASURED).is_none());
     // All that is deeper than a threshold: no cheap search settles it.
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
@@ -88,11 +92,11 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     assert!(pose.report.certificate.is_some() && provisional.report.certificate.is_none());
     // As it was between the two: the provisional one is shown and may not be accepted, the other one is wanted.
     bench.state.results.poses.clear();
-    let shown = bench.state.pose(MEASURED);
+    let shown = results::pose(&bench.state, MEASURED);
     assert!(matches!(shown, Lookup::Stale(_)) && shown.shown().unwrap().angle_rad == provisional.angle_rad);
-    assert!(bench.state.provisional_pose(MEASURED).is_some());
+    assert!(results::provisional_pose(&bench.state, MEASURED).is_some());
     assert!(Action::AcceptMeasuredPose.command(&bench.state).is_none());
-    assert_eq!(bench.state.demands().first(), Some(&Request::Pose(key(&bench))));
+    assert_eq!(demand::demands(&bench.state).first(), Some(&Request::Pose(key(&bench))));
 }
 
 #[test]
@@ -100,19 +104,19 @@ fn a_source_without_camera_says_why_there_is_no_pose() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::SceneMeasured, Pane::ScenePredicted, Pane::Measured]));
     bench.settle();
-    assert!(matches!(bench.state.cloud(MEASURED), Lookup::Absent(Absent::NoCamera)));
+    assert!(matches!(results::cloud(&bench.state, MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
     for (source, absent) in [(MaskSource::Truth, Absent::NotSimulated), (MaskSource::Cad, Absent::NoTruth)] {
         bench.send(prefer(move |s| s.mask.choice.source = source));
         bench.settle();
-        match bench.state.mask_in_force(MEASURED, lab::RIGHT) {
+        match results::mask_in_force(&bench.state, MEASURED, lab::RIGHT) {
             Err(Lookup::Absent(found)) => assert_eq!(found, absent),
             other => panic!("{other:?}"),
         }
     }
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     bench.settle();
-    assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
+    assert!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).is_ok());
 }
 
 #[test]
@@ -122,7 +126,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     bench.send(panes(&[Pane::Measured]));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Unet));
     bench.settle();
-    let shown = bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap();
+    let shown = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
     assert!(shown.label.starts_with("Depth ") && shown.label.contains("found no contact"), "{}", shown.label);
     assert_eq!(shown.mask.as_slice().iter().filter(|m| **m).count(), 35 + 4, "the ring and the spot");
     let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.text.contains("found no contact")).count();
@@ -130,7 +134,7 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     // The other finger says so when it is looked at, and a source that finds contact says nothing.
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
     bench.settle();
-    assert_eq!(bench.state.mask_in_force(MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
+    assert_eq!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
 }
 
@@ -160,7 +164,7 @@ fn without_models_the_rest_works_and_a_notice_says_what_to_do() {
     assert!(Action::Generate.command(&bench.state).is_none());
     bench.send(PredictCommand::Generate);
     assert_eq!(bench.errors(), 1);
-    assert!(bench.state.mask_in_force(MEASURED, lab::RIGHT).is_ok());
+    assert!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).is_ok());
 }
 
 #[test]
@@ -177,8 +181,8 @@ fn threads_give_the_same_and_wake_the_window() {
     runtime.start(&mut state, Some(Place::Demo));
     runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Error])]);
     let mut asked = false;
-    while state.comparison(lab::RIGHT).ready().is_none() {
-        if !asked && state.can_generate().is_ok() && state.sample().ready().is_some() {
+    while results::comparison(&state, lab::RIGHT).ready().is_none() {
+        if !asked && results::can_generate(&state).is_ok() && results::sample(&state).ready().is_some() {
             asked = true;
             runtime.tick(&mut state, vec![Command::Predict(PredictCommand::Generate)]);
         } else {
@@ -193,7 +197,7 @@ fn threads_give_the_same_and_wake_the_window() {
         }
     }
     assert_eq!(services.source.loads_of(0), 1);
-    assert_eq!(state.chosen(lab::RIGHT).unwrap().seed, 42);
+    assert_eq!(results::chosen(&state, lab::RIGHT).unwrap().config.seed, 42);
 }
 
 #[test]

@@ -6,6 +6,7 @@ use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
+use touch2touch::app::{adapt, recipe};
 use touch2touch_work::bundles::BundleKind;
 
 use super::rig::{Rig, write_dataset};
@@ -20,8 +21,8 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
     rig.shoot("fit-before");
-    let shipped = rig.harness.state().state().bundle(BundleKind::Generator).unwrap().clone();
-    assert!(!shipped.is_fitted() && rig.harness.state().state().fitted().is_none());
+    let shipped = recipe::bundle(rig.harness.state().state(), BundleKind::Generator).unwrap().clone();
+    assert!(!shipped.is_fitted() && adapt::fitted(rig.harness.state().state()).is_none());
 
     rig.harness.get_all_by_label("Fit to my pairs").next().unwrap().click();
     rig.harness.step();
@@ -35,23 +36,25 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     // What was simulated lies where the model expects it.
     rig.harness.get_by_label_contains("need no fit");
     // A touch that was left out, before and after.
-    let held = rig.harness.state().state().held_back().cloned().unwrap();
+    let held = adapt::held_back(rig.harness.state().state()).cloned().unwrap();
     assert!(held.before.size() == held.measured.size() && held.before != held.after, "{}", held.name);
     rig.harness.get_by_label("Fitted to the others");
     rig.shoot("fit-after");
     // Fitted, but not taken yet.
-    assert_eq!(rig.harness.state().state().bundle(BundleKind::Generator).unwrap().id, shipped.id);
+    assert_eq!(recipe::bundle(rig.harness.state().state(), BundleKind::Generator).unwrap().id, shipped.id);
     rig.harness.get_by_label("Use the fitted model").click();
     rig.harness.step();
     rig.settle();
     let state = rig.harness.state().state();
-    let now = state.bundle(BundleKind::Generator).unwrap();
+    let now = recipe::bundle(state, BundleKind::Generator).unwrap();
     assert!(
-        now.is_fitted() && now.name.contains("fitted to") && Some(now.id.as_ref()) == state.fitted().map(|f| &*f.id)
+        now.is_fitted()
+            && now.name.contains("fitted to")
+            && Some(now.id.as_ref()) == adapt::fitted(state).map(|f| &*f.id)
     );
     rig.shoot("fit-used");
     // It is made again from what it was made from.
-    let setup = rig.harness.state().state().adapt_setup().unwrap();
+    let setup = adapt::setup(rig.harness.state().state()).unwrap();
     assert_eq!((setup.recipe.generating().unwrap().bundle.id.clone(), setup.pairs.len()), (shipped.id, 6));
 }
 
@@ -70,7 +73,7 @@ fn pictures_of_tuning() {
         rig.send(AdaptCommand::Tune(true));
         rig.send(AdaptCommand::Steps(30));
         rig.send(AdaptCommand::Start);
-        while rig.harness.state().state().running(TaskKind::Fit).is_some() {
+        while rig.harness.state().state().tasks.of_kind(TaskKind::Fit).is_some() {
             std::thread::sleep(std::time::Duration::from_millis(100));
             rig.harness.step();
         }

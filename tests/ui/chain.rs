@@ -4,6 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_core::ambiguity::TouchKind;
@@ -49,7 +50,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     let state = rig.harness.state().state();
     assert_eq!(state.settings.workspace, Workspace::Inspect);
     assert!(state.selection.panes.contains(&Pane::Ledger));
-    let found = state.ledger(lab::RIGHT).ready().expect("the chain of the finger shown");
+    let found = results::ledger(state, lab::RIGHT).ready().expect("the chain of the finger shown");
     assert_eq!(found.ledger.flags[0].kind, FlagKind::DoubledMapping);
     for stage in &found.ledger.stages {
         let name = format!("Stage {}:", stage.stage.name());
@@ -64,12 +65,12 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     rig.take("Reading Exact inverse");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::ExactInverse);
-    let found = state.ledger(lab::RIGHT).ready().unwrap();
+    let found = results::ledger(state, lab::RIGHT).ready().unwrap();
     assert!(found.ledger.flags.iter().all(|f| f.kind != FlagKind::DoubledMapping), "{:?}", found.ledger.flags);
     rig.take("Depth chain of the left finger");
     rig.shoot("test-depth-chain-maximized");
     assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
-    assert!(rig.harness.state().state().ledger(lab::LEFT).ready().is_some());
+    assert!(results::ledger(rig.harness.state().state(), lab::LEFT).ready().is_some());
 }
 
 #[test]
@@ -82,7 +83,7 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     let state = rig.harness.state().state();
     let ShiftMode::Refit(refit) = state.settings.shift else { panic!("{:?}", state.settings.shift) };
     assert!(state.log.entries.iter().any(|e| e.text.contains("Shift statistics of 8 touches")), "{:?}", state.log);
-    assert!(state.ledger(lab::RIGHT).ready().is_some());
+    assert!(results::ledger(state, lab::RIGHT).ready().is_some());
     let kept = std::fs::read_dir(rig.config.join("statistics")).unwrap().count();
     assert_eq!(kept, 1);
     // The mean of what is predicted is that of what is measured, over the data set.
@@ -109,8 +110,8 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
     rig.send(LibraryCommand::Open(Place::Path(folder.path().to_owned())));
     rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
-    assert_eq!(state.ambiguity(lab::RIGHT).unwrap().kind, TouchKind::BareShaft);
-    let split = state.comparison(lab::RIGHT).ready().unwrap().split.unwrap();
+    assert_eq!(results::ambiguity(state, lab::RIGHT).unwrap().kind, TouchKind::BareShaft);
+    let split = results::comparison(state, lab::RIGHT).ready().unwrap().split.unwrap();
     assert!(split.seen.pixels > 1000 && split.invented.pixels > 10 * split.seen.pixels);
     for label in ["Seen ", "Invented ", "The gel shows a bare shaft"] {
         assert!(rig.harness.query_all_by_label_contains(label).next().is_some(), "{label}");

@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Pane, PredictCommand};
 use touch2touch::app::keys::{ImprintKey, ImprintSource, ShiftMode};
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode, Workspace};
 use touch2touch::app::state::State;
@@ -57,27 +58,27 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
     assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
     assert_eq!(made(&rig), 2, "one for each finger");
-    let chosen = state(&rig).chosen(lab::RIGHT).cloned();
+    let chosen = results::chosen(state(&rig), lab::RIGHT).cloned();
 
     click(&mut rig, "Compare");
     let (a, b) = (subject("prediction:seed=7"), Subject::Measured);
     assert_eq!(made(&rig), 4, "the wished ones, of both fingers: they make one pose");
-    assert_eq!(state(&rig).chosen(lab::RIGHT).cloned(), chosen, "what the other panes show stays");
-    let found = state(&rig).subjects_compared(&a, &b, lab::RIGHT).ready().expect("the figures");
-    let key = state(&rig).subject_key(&a, lab::RIGHT).unwrap();
+    assert_eq!(results::chosen(state(&rig), lab::RIGHT).cloned(), chosen, "what the other panes show stays");
+    let found = results::subjects_compared(state(&rig), &a, &b, lab::RIGHT).ready().expect("the figures");
+    let key = results::subject_key(state(&rig), &a, lab::RIGHT).unwrap();
     let ImprintKey::Predicted(recipe, ShiftMode::ExactInverse) = &key else { panic!("{key:?}") };
-    assert_eq!(recipe.seed, 7);
-    let measured = state(&rig).imprint(ImprintSource::Measured, lab::RIGHT).ready().unwrap();
-    let predicted = state(&rig).subject(&a, lab::RIGHT).ready().unwrap();
+    assert_eq!(recipe.config.seed, 7);
+    let measured = results::imprint(state(&rig), ImprintSource::Measured, lab::RIGHT).ready().unwrap();
+    let predicted = results::subject(state(&rig), &a, lab::RIGHT).ready().unwrap();
     assert_eq!(found.error[(60, 70)], predicted[(60, 70)] - measured[(60, 70)]);
-    assert!(state(&rig).subject_pose(&a).is_some() && state(&rig).subject_pose(&b).is_some());
+    assert!(results::subject_pose(state(&rig), &a).is_some() && results::subject_pose(state(&rig), &b).is_some());
     rig.shoot("compare-side");
 
     // The prediction on screen against the measurement is what the error pane says.
     set(&mut rig, "prediction", "measured", VersusMode::Difference);
     let state_now = state(&rig);
-    let versus = state_now.subjects_compared(&Subject::shown(), &b, lab::RIGHT).ready().unwrap();
-    let error = state_now.comparison(lab::RIGHT).ready().unwrap();
+    let versus = results::subjects_compared(state_now, &Subject::shown(), &b, lab::RIGHT).ready().unwrap();
+    let error = results::comparison(state_now, lab::RIGHT).ready().unwrap();
     assert_eq!((versus.psnr_db, versus.ssim, versus.mae_m), (error.psnr_db, error.ssim, error.mae_m));
     let at = (60, 70);
     let before = versus.error[at];
@@ -85,9 +86,9 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
 
     // Swapped, the sign changes and nothing else.
     press(&mut rig, Modifiers::SHIFT, Key::R);
-    let after = state(&rig).subjects_compared(&b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
+    let after = results::subjects_compared(state(&rig), &b, &Subject::shown(), lab::RIGHT).ready().unwrap().error[at];
     assert_eq!(after, -before);
-    assert_eq!(state(&rig).versus().b, Subject::shown());
+    assert_eq!(state(&rig).settings.compared().b, Subject::shown());
 }
 
 #[test]
@@ -124,7 +125,7 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
     assert!(read > 0, "both values and their difference");
 
     press(&mut rig, Modifiers::SHIFT, Key::F);
-    assert_eq!(state(&rig).versus().mode, VersusMode::Wipe);
+    assert_eq!(state(&rig).settings.compared().mode, VersusMode::Wipe);
     let line = rig.harness.get_by_label("Line between A and B, right").rect();
     let right = Rect::from_center_size(line.center() + vec2(30.0, 0.0), vec2(30.0, 60.0));
     let before = pixels(&mut rig, right);
@@ -161,15 +162,15 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     set(&mut rig, "mean:seeds=2", "measured", VersusMode::Clouds);
     assert!(rig.harness.query_by_label("3D view, A and B").is_some());
     let (mean, measured) = (subject("mean:seeds=2"), Subject::Measured);
-    assert!(state(&rig).subjects_apart(&mean, &measured).is_none(), "no view colors by it");
+    assert!(results::subjects_apart(state(&rig), &mean, &measured).is_none(), "no view colors by it");
     rig.shoot("compare-clouds");
     set(&mut rig, "mean:seeds=2", "measured", VersusMode::Apart);
-    let (key, apart) = state(&rig).subjects_apart(&mean, &measured).expect("the view shows it");
+    let (key, apart) = results::subjects_apart(state(&rig), &mean, &measured).expect("the view shows it");
     let cloud = state(&rig).results.clouds.get(&key.a).unwrap().finger(lab::RIGHT).unwrap();
     let other = state(&rig).results.clouds.get(&key.b).unwrap().finger(lab::RIGHT).unwrap();
     let distances = apart.points[lab::RIGHT].as_ref().unwrap();
     assert_eq!(distances.len(), cloud.points.len());
-    let imprint = |subject: &Subject| state(&rig).subject(subject, lab::RIGHT).ready().unwrap();
+    let imprint = |subject: &Subject| results::subject(state(&rig), subject, lab::RIGHT).ready().unwrap();
     let (a, b) = (imprint(&mean), imprint(&measured));
     for i in (0..distances.len()).step_by(997) {
         let nearest = other.points.iter().map(|p| p.distance(cloud.points[i])).fold(f64::INFINITY, f64::min);
@@ -179,10 +180,10 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     }
     rig.shoot("compare-apart");
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    assert_eq!(state(&rig).versus(), Versus::default());
+    assert_eq!(state(&rig).settings.compared(), Versus::default());
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart([1280.0, 800.0]);
-    assert_eq!(state(&rig).versus().a, mean, "kept in the preferences");
+    assert_eq!(state(&rig).settings.compared().a, mean, "kept in the preferences");
     assert!(Action::SwapCompared.command(state(&rig)).is_some());
     // What is not there says so.
     click(&mut rig, "Compare");

@@ -4,6 +4,7 @@ use eframe::egui::vec2;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
@@ -85,13 +86,17 @@ fn a_mask_without_contact_offers_the_threshold() {
     mask.choice.top_percent = 0.0;
     rig.send(prefer(move |s| s.mask = mask.clone()));
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    assert!(matches!(state(&rig).pose(MEASURED), Lookup::Failed(_)), "{:?}", state(&rig).pose(MEASURED));
+    assert!(
+        matches!(results::pose(state(&rig), MEASURED), Lookup::Failed(_)),
+        "{:?}",
+        results::pose(state(&rig), MEASURED)
+    );
     rig.shoot("daily-no-contact");
     rig.harness.get_all_by_label("Use threshold").next().unwrap().click();
     rig.harness.step();
     rig.settle();
     assert_eq!(state(&rig).settings.mask.choice.source, MaskSource::Threshold);
-    assert!(state(&rig).pose(MEASURED).ready().is_some(), "{:?}", state(&rig).pose(MEASURED));
+    assert!(results::pose(state(&rig), MEASURED).ready().is_some(), "{:?}", results::pose(state(&rig), MEASURED));
     assert!(rig.harness.query_by_label("Use threshold").is_none());
 }
 

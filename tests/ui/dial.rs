@@ -77,12 +77,12 @@ fn a_dial_is_turned_a_dot_opens_its_pair_and_a_value_is_put_in_force() {
     click(&mut rig, "Dial over measured imprints");
     rig.shoot("dial-measured");
     // What was seen was with another registration.
-    rig.send(prefer(|s| s.pose_engine = Registration::PlanarPointToPoint.into()));
+    rig.send(prefer(|s| s.registration = Registration::PlanarPointToPoint.into()));
     rig.harness.get_by_label("of earlier settings");
     rig.send(DialCommand::Choose(Dial::Trim));
     click(&mut rig, "Turn the dial");
     click(&mut rig, "Use 0.2");
-    assert_eq!(rig.harness.state().state().settings.pose_engine.trim(), Some(0.2));
+    assert_eq!(rig.harness.state().state().settings.registration.trim(), Some(0.2));
     rig.shoot("dial-trim");
     // A turn is over one data set.
     rig.send(LibraryCommand::Open(Place::Demo));

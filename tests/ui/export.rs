@@ -1,7 +1,6 @@
 //! What is taken away: figures and pictures, each in few clicks.
 
 use std::path::Path;
-use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
@@ -11,8 +10,10 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, Theme, Workspace};
 use touch2touch::app::state::State;
+use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::images;
@@ -117,12 +118,12 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     rig.harness.step();
     let copied = rig.copied().expect("the command is on the clipboard");
     let state = rig.harness.state().state();
-    assert_eq!(Some(&copied), state.equivalent(Pane::SceneMeasured, 0.004).as_ref());
+    assert_eq!(Some(&copied), export::equivalent(state, Pane::SceneMeasured, 0.004).as_ref());
     assert!(copied.starts_with("touch2touch export ") && copied.contains("--imprint measured"), "{copied}");
     rig.settle();
     // What a mask is made of is said, also of one drawn by hand.
     rig.send(LabelsCommand::AdoptAutomatic);
-    let exported = rig.harness.state().state().pair_export(Default::default()).unwrap();
+    let exported = export::pair_export(rig.harness.state().state(), Default::default()).unwrap();
     let files = exported.write(&folder).unwrap();
     let text = std::fs::read_to_string(files.iter().find(|f| f.ends_with(&names[2])).unwrap()).unwrap();
     assert!(text.contains("\"mask\": \"hand"), "{text}");
@@ -163,11 +164,11 @@ fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
     assert!(!masks(here).is_empty() && masks(here) == masks(there));
     for source in ImprintSource::iter() {
         for pad in lab::PADS {
-            let depth = |state: &State| state.imprint(source, pad).ready().cloned();
+            let depth = |state: &State| results::imprint(state, source, pad).ready().cloned();
             let bits = |state: &State| depth(state).map(|d| d.map(|v| v.to_bits()));
             assert!(bits(here).is_some() && bits(here) == bits(there), "{source:?} {pad:?}");
         }
-        let pose = |state: &State| state.pose(source).ready().map(|found| found.grasp_from_object);
+        let pose = |state: &State| results::pose(state, source).ready().map(|found| found.grasp_from_object);
         assert_eq!(pose(here), pose(there), "{source:?}");
     }
 

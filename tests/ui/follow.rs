@@ -3,6 +3,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::{Absent, Lookup};
@@ -38,9 +39,13 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     let state = rig.harness.state().state();
     assert_eq!(names(&rig)[..before.len()], before, "the pairs before keep their places");
     assert!(state.pair_name().ends_with("data_40"), "{}", state.pair_name());
-    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
-    assert!(state.imprint(ImprintSource::Measured, lab::RIGHT).ready().is_some());
-    assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "{:?}", state.pose(ImprintSource::Predicted));
+    assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
+    assert!(results::imprint(state, ImprintSource::Measured, lab::RIGHT).ready().is_some());
+    assert!(
+        results::pose(state, ImprintSource::Predicted).ready().is_some(),
+        "{:?}",
+        results::pose(state, ImprintSource::Predicted)
+    );
     rig.shoot("follow-1280");
 
     // A GelSlim touch alone: predicted, and posed with the cameras of the others.
@@ -52,10 +57,14 @@ fn what_arrives_in_a_followed_folder_is_shown_predicted_and_posed() {
     rig.settle();
     let state = rig.harness.state().state();
     assert!(state.pair_name().ends_with("data_41"), "{}", state.pair_name());
-    let measured = state.imprint(ImprintSource::Measured, lab::RIGHT);
+    let measured = results::imprint(state, ImprintSource::Measured, lab::RIGHT);
     assert!(matches!(measured, Lookup::Absent(Absent::NoBubble)), "{measured:?}");
-    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
-    assert!(state.pose(ImprintSource::Predicted).ready().is_some(), "{:?}", state.pose(ImprintSource::Predicted));
+    assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
+    assert!(
+        results::pose(state, ImprintSource::Predicted).ready().is_some(),
+        "{:?}",
+        results::pose(state, ImprintSource::Predicted)
+    );
     assert_eq!(state.library.follow.as_ref().unwrap().arrived, 2);
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.shoot("follow-gelslim-only-1280");

@@ -4,10 +4,11 @@ use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::LibraryCommand;
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::results::Results;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch::app::state::State;
+use touch2touch::app::state::results::Results;
 
 use super::rig::Rig;
 
@@ -163,7 +164,8 @@ fn paging_shows_no_blank_frame_and_keeps_its_budget() {
     let Some(mut rig) = Rig::paging(SIZE, 200) else { return };
     rig.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
     rig.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
-    let felt = |state: &State| state.imprint(ImprintSource::Measured, state.selection.finger).ready().is_some();
+    let felt =
+        |state: &State| results::imprint(state, ImprintSource::Measured, state.selection.finger).ready().is_some();
     rig.until("the imprint", felt);
     rig.harness.run_steps(5);
     let state = rig.harness.state().state();

@@ -4,6 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::{ImprintSource, Preset};
 use touch2touch::app::settings::prefer;
+use touch2touch::app::{recipe, results};
 use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
@@ -15,7 +16,7 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     let Some((mut rig, gate)) = Rig::gated(SIZE) else { return };
     rig.harness.state_mut().push(prefer(|s| s.hint_dismissed = true));
     rig.harness.state_mut().push(PredictCommand::Generate);
-    rig.until("a preview", |state| state.preview(lab::RIGHT).is_some());
+    rig.until("a preview", |state| results::preview(state, lab::RIGHT).is_some());
     for _ in 0..3 {
         rig.harness.step();
     }
@@ -23,16 +24,16 @@ fn the_picture_on_the_way_is_shown_until_the_result_lands() {
     assert!(rig.harness.query_by_label("Predicted imprint right").is_none(), "it is not taken for the result");
     rig.shoot("generate-preview");
     let state = rig.harness.state().state();
-    assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_none());
-    assert_eq!(state.preview(lab::RIGHT).unwrap().picture.step, 4);
+    assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_none());
+    assert_eq!(results::preview(state, lab::RIGHT).unwrap().picture.step, 4);
     gate.open();
-    rig.until("the result", |state| state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
+    rig.until("the result", |state| results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     for _ in 0..3 {
         rig.harness.step();
     }
     assert!(rig.harness.query_by_label("Predicted imprint right, preview").is_none());
     assert!(rig.harness.query_by_label("Predicted imprint right").is_some());
-    assert!(rig.harness.state().state().preview(lab::RIGHT).is_none());
+    assert!(results::preview(rig.harness.state().state(), lab::RIGHT).is_none());
 }
 
 #[test]
@@ -41,7 +42,8 @@ fn a_color_sensor_is_predicted_in_the_same_pane() {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     let state = rig.harness.state().state();
-    let picture = state.predicted_color(lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();
+    let picture =
+        results::predicted_color(state, lab::RIGHT).expect("the model predicts a color picture").ready().unwrap();
     assert_eq!(picture.size(), lab::GELSLIM.size());
     assert!(rig.harness.query_by_label("Predicted imprint right").is_some(), "the picture, not a sentence");
     rig.shoot("generate-color");
@@ -52,7 +54,7 @@ fn presets_are_one_click_and_show_their_numbers() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     let steps = |rig: &Rig| {
         let state = rig.harness.state().state();
-        state.recipe(state.touch_key(lab::RIGHT).unwrap()).unwrap().steps
+        recipe::prediction(state, state.touch_key(lab::RIGHT).unwrap()).unwrap().config.steps
     };
     assert_eq!(steps(&rig), 4, "what the bundle recommends");
     for (label, preset) in [("Fast", Preset::Fast), ("Sharp", Preset::Sharp), ("Default", Preset::Default)] {

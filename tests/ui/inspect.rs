@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, Pane};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch_core::align::basin::is_same_place;
@@ -34,7 +35,7 @@ impl Rig {
     }
 
     fn at(&self) -> [usize; 2] {
-        let shown = self.harness.state().state().inspected().expect("a step is shown");
+        let shown = results::inspected(self.harness.state().state()).expect("a step is shown");
         [shown.run, shown.at]
     }
 
@@ -54,12 +55,12 @@ fn scrub_by_keys_pin_two_and_compare() {
     let Some(mut rig) = Rig::align() else { return };
     let state = rig.harness.state().state();
     assert!(state.selection.panes.contains(&Pane::TimeMachine) && state.selection.panes.contains(&Pane::BasinMap));
-    let shown = state.inspected().expect("the winner's last step");
+    let shown = results::inspected(state).expect("the winner's last step");
     let (run, last) = (shown.run, shown.at);
     assert!(shown.is_last() && last > 3);
     assert_eq!(
         shown.step.grasp_from_object,
-        state.pose(ImprintSource::Measured).ready().unwrap().grasp_from_object,
+        results::pose(state, ImprintSource::Measured).ready().unwrap().grasp_from_object,
         "at its end it shows the registered pose"
     );
     rig.tap(Modifiers::NONE, Key::J);
@@ -72,14 +73,16 @@ fn scrub_by_keys_pin_two_and_compare() {
     assert_eq!(rig.at(), [run, 0]);
     rig.tap(Modifiers::NONE, Key::J);
     rig.shoot("test-time-machine-pins");
-    let [Some(a), Some(b)] = rig.harness.state().state().pins() else { panic!("two pins") };
+    let [Some(a), Some(b)] = rig.harness.state().state().inspect.pins_of(rig.harness.state().state().pair_key()) else {
+        panic!("two pins")
+    };
     assert_eq!((a.at, b.at), (last, 0));
     // Both columns and their difference are on screen.
     assert!(rig.harness.get_all_by_label_contains("Angle °").next().is_some());
     rig.harness.get_by_label("Let pin A go").click();
     rig.harness.step();
     rig.settle();
-    assert!(rig.harness.state().state().pins()[0].is_none());
+    assert!(rig.harness.state().state().inspect.pins_of(rig.harness.state().state().pair_key())[0].is_none());
     // The slider, the buttons and the curves do the same.
     rig.harness.get_by_label("Last step").click();
     rig.harness.step();
@@ -133,16 +136,16 @@ fn space_plays_where_the_pointer_is_over_the_steps() {
 #[test]
 fn a_click_on_the_map_loads_that_run() {
     let Some(mut rig) = Rig::align() else { return };
-    let own = rig.harness.state().state().inspection().ready().unwrap().num_runs();
+    let own = results::inspection(rig.harness.state().state()).ready().unwrap().num_runs();
     rig.click_in("Map of starts", [0.9, 0.2]);
     rig.shoot("test-basin-clicked");
     let state = rig.harness.state().state();
     let start = state.inspect.start.expect("a start was chosen").get();
-    let basin = state.basin().ready().unwrap();
+    let basin = results::basin(state).ready().unwrap();
     let cell = basin.cells.iter().find(|c| c.requested == start).expect("it is a start of the grid");
     // Right of the middle the angle grows; above it y does.
     assert!(start.inverse().theta_rad > 0.4 && start.y_m > 0.004, "{start:?}");
-    let inspection = state.inspection().ready().expect("the run is there").clone();
+    let inspection = results::inspection(state).ready().expect("the run is there").clone();
     assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
     let arrival = cell.arrival.expect("the start leads somewhere");
     let applied = inspection.applied(0).unwrap();
@@ -152,7 +155,7 @@ fn a_click_on_the_map_loads_that_run() {
     rig.harness.get_by_label("All own starts").click();
     rig.harness.step();
     rig.settle();
-    assert_eq!(rig.harness.state().state().inspection().ready().unwrap().num_runs(), own);
+    assert_eq!(results::inspection(rig.harness.state().state()).ready().unwrap().num_runs(), own);
     // Out of sight the map is not computed, even when what it is made from changes.
     rig.harness.get_by_label("Maximize Time machine").click();
     rig.harness.step();

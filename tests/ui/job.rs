@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use touch2touch::app::settings::prefer;
 
 use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -11,6 +10,8 @@ use touch2touch::app::action::Action;
 use touch2touch::app::command::{Pane, PredictCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
+use touch2touch::app::results;
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, lab};
@@ -89,8 +90,8 @@ fn browse_generate_shift_paint_undo() {
     rig.click("Generate (Ctrl+G)");
     let state = rig.harness.state().state();
     for finger in lab::PADS {
-        assert!(state.chosen(finger).is_some(), "{finger:?}");
-        assert!(state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().is_some());
+        assert!(results::chosen(state, finger).is_some(), "{finger:?}");
+        assert!(results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().is_some());
     }
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::G);
     let state = rig.harness.state().state();
@@ -98,11 +99,11 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(state.results.made[&touch].len(), 2, "the first result is kept");
 
     // Another range mapping, by its button.
-    let exact = state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
+    let exact = results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
     rig.click("Paper shift");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);
-    assert_ne!(*state.imprint(ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);
+    assert_ne!(*results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);
 
     // Another image in the same place.
     assert!(!state.selection.panes.contains(&Pane::GelRaw));
@@ -115,9 +116,9 @@ fn browse_generate_shift_paint_undo() {
     assert_eq!(state.settings.workspace, Workspace::Label);
     assert!(state.selection.panes.contains(&Pane::Masks) && state.selection.both_fingers);
     let pair = state.pair_name().to_owned();
-    let before = state.pose(ImprintSource::Measured).ready().expect("a pose before the stroke").clone();
+    let before = results::pose(state, ImprintSource::Measured).ready().expect("a pose before the stroke").clone();
     let area = |rig: &Rig| {
-        let mask = rig.harness.state().state().mask_in_force(ImprintSource::Measured, lab::RIGHT).unwrap();
+        let mask = results::mask_in_force(rig.harness.state().state(), ImprintSource::Measured, lab::RIGHT).unwrap();
         mask.mask.as_slice().iter().filter(|on| **on).count()
     };
     let automatic = area(&rig);
@@ -128,7 +129,7 @@ fn browse_generate_shift_paint_undo() {
     assert!(state.document.drawn_mask(&pair, &MaskPlace::measured(lab::LEFT)).is_none(), "only the finger painted on");
     let painted = area(&rig);
     assert!(painted > automatic, "{painted} > {automatic}");
-    let after = state.pose(ImprintSource::Measured).ready().expect("a pose after the stroke").clone();
+    let after = results::pose(state, ImprintSource::Measured).ready().expect("a pose after the stroke").clone();
     assert!(after.num_points > before.num_points, "{} > {}", after.num_points, before.num_points);
     assert_eq!(rig.stored(&pair, lab::RIGHT), Some(painted), "saved by itself");
 
@@ -142,7 +143,7 @@ fn browse_generate_shift_paint_undo() {
     rig.key(Modifiers::CTRL, Key::Z);
     assert_eq!(area(&rig), automatic);
     assert_eq!(
-        rig.harness.state().state().pose(ImprintSource::Measured).ready().unwrap().num_points,
+        results::pose(rig.harness.state().state(), ImprintSource::Measured).ready().unwrap().num_points,
         before.num_points
     );
     rig.key(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);

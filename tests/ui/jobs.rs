@@ -4,6 +4,7 @@ use eframe::egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
@@ -54,17 +55,18 @@ impl Person {
 fn two_models_are_compared_on_the_pair_on_screen() {
     let Some(rig) = Rig::with_bundle([1280.0, 800.0], "Tiny generator of the tests") else { return };
     let mut person = Person::at(rig);
-    let models: Vec<String> = person.state().evaluated().map(|(bundle, _)| bundle.name.clone()).collect();
-    let shown = person.state().chosen(lab::RIGHT).expect("a prediction").bundle.clone();
+    let models: Vec<String> = results::evaluated(person.state()).map(|(bundle, _)| bundle.name.clone()).collect();
+    let shown = results::chosen(person.state(), lab::RIGHT).expect("a prediction").bundle.clone();
     let shown = person.state().library.bundle(&shown).unwrap().name.clone();
     let other = models.into_iter().find(|name| *name != shown).expect("a second generator");
     person.click("Compare");
     person.click("B: Measured");
     person.click(&other);
-    let versus = person.state().versus();
+    let versus = person.state().settings.compared();
     assert_eq!(versus.a, Subject::shown());
     assert_eq!(versus.b.wish().and_then(|wish| wish.bundle.clone()), Some(other));
-    let found = person.state().subjects_compared(&versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
+    let found =
+        results::subjects_compared(person.state(), &versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
     assert!(found.mae_m > 0.0);
     assert!(person.actions <= MOST, "{} actions", person.actions);
     person.rig.shoot("job-two-models");
@@ -79,8 +81,8 @@ fn the_distance_between_the_model_and_the_tip_is_read() {
     }
     let state = person.state();
     let source = ImprintSource::Measured;
-    let found = state.deviation(source).ready().expect("the distances are shown");
-    let cloud = state.cloud(source).ready().unwrap().finger(lab::RIGHT).unwrap();
+    let found = results::deviation(state, source).ready().expect("the distances are shown");
+    let cloud = results::cloud(state, source).ready().unwrap().finger(lab::RIGHT).unwrap();
     // The contact points farthest from the hand: the tip.
     let contact: Vec<usize> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();
     let distances = found.points[lab::RIGHT].as_ref().unwrap();

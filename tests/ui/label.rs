@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskChoice, MaskSource, MaskTool, Workspace};
 use touch2touch::app::workbench::SceneTool;
@@ -23,12 +24,12 @@ impl Rig {
     /// What the last plan of an export says.
     fn plan(&self) -> Vec<String> {
         let state = self.harness.state().state();
-        state.results.mask_plans.get(&state.mask_plan_key().unwrap()).unwrap().lines()
+        state.results.mask_plans.get(&results::mask_plan_key(state).unwrap()).unwrap().lines()
     }
 
     /// The mask of a finger that is in force on the measured imprint.
     fn mask(&self, finger: PadId) -> Mask {
-        (**self.harness.state().state().mask_in_force(ImprintSource::Measured, finger).unwrap().mask).clone()
+        (**results::mask_in_force(self.harness.state().state(), ImprintSource::Measured, finger).unwrap().mask).clone()
     }
 
     fn button(&mut self, at: Pos2, pressed: bool) {
@@ -177,7 +178,11 @@ fn masks_are_drawn_on_the_points_of_the_3d_view() {
     look(&mut rig, CameraPreset::Right);
     // Where the point of a finger's pixel is on the screen.
     let place = |rig: &Rig, finger: PadId, [x, y]: [usize; 2]| {
-        let cloud = rig.harness.state().state().cloud(ImprintSource::Measured).ready().unwrap().finger(finger).unwrap();
+        let cloud = results::cloud(rig.harness.state().state(), ImprintSource::Measured)
+            .ready()
+            .unwrap()
+            .finger(finger)
+            .unwrap();
         let point = cloud.points[cloud.at_pixel(x, y).unwrap()];
         rig.harness.state().on_screen(ImprintSource::Measured, point.to_array()).unwrap()
     };

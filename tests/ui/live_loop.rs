@@ -8,6 +8,7 @@ use touch2touch::app::library::Place;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{SceneLayer, Workspace};
 use touch2touch::app::state::State;
+use touch2touch::app::{labels, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 
@@ -43,8 +44,8 @@ fn what_the_angle_hangs_on_is_computed_while_it_is_shown_and_follows_the_mask() 
     assert!(there(&rig) > 0);
     let key = |rig: &Rig| {
         let now = state(rig);
-        assert!(now.influence(MEASURED).ready().is_some(), "{:?}", now.tasks.failed);
-        now.shown_influence(MEASURED).unwrap().0
+        assert!(results::influence(now, MEASURED).ready().is_some(), "{:?}", now.tasks.failed);
+        results::shown_influence(now, MEASURED).unwrap().0
     };
     let before = key(&rig);
     // The status bar says what hangs on the pixel under the pointer.
@@ -68,14 +69,14 @@ fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
-    let mask = |rig: &Rig| state(rig).mask_in_force(MEASURED, lab::RIGHT).unwrap().mask.clone();
-    let angle = |rig: &Rig| state(rig).pose(MEASURED).ready().unwrap().angle_rad;
-    assert!(state(&rig).ghost(MEASURED).is_none());
+    let mask = |rig: &Rig| results::mask_in_force(state(rig), MEASURED, lab::RIGHT).unwrap().mask.clone();
+    let angle = |rig: &Rig| results::pose(state(rig), MEASURED).ready().unwrap().angle_rad;
+    assert!(labels::ghost(state(&rig), MEASURED).is_none());
     let (first, first_angle) = (mask(&rig), angle(&rig));
     rig.dab([60.0, 40.0], [110.0, 60.0]);
     let (second, second_angle) = (mask(&rig), angle(&rig));
     assert!(first != second && first_angle != second_angle);
-    let ghost = state(&rig).ghost(MEASURED).unwrap();
+    let ghost = labels::ghost(state(&rig), MEASURED).unwrap();
     assert_eq!((ghost.finger, ghost.mask), (lab::RIGHT, &first));
     assert_eq!(ghost.pose.unwrap().angle_rad, first_angle);
     assert!(ghost.clouds.is_some());
@@ -85,21 +86,21 @@ fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
     assert!(rig.harness.query_all_by_label_contains("CAD, before").next().is_some());
     // The next stroke has its own.
     rig.dab([60.0, 80.0], [110.0, 90.0]);
-    assert_eq!(state(&rig).ghost(MEASURED).unwrap().mask, &second);
+    assert_eq!(labels::ghost(state(&rig), MEASURED).unwrap().mask, &second);
     // A key switches them off and on; undo and going elsewhere end them.
     for shown in [false, true] {
         rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::H);
         rig.harness.step();
         rig.settle();
-        assert_eq!(state(&rig).ghost(MEASURED).is_some(), shown);
+        assert_eq!(labels::ghost(state(&rig), MEASURED).is_some(), shown);
     }
     rig.send(LabelsCommand::Undo);
-    assert!(state(&rig).ghost(MEASURED).is_none(), "it may be what was taken back");
+    assert!(labels::ghost(state(&rig), MEASURED).is_none(), "it may be what was taken back");
     rig.dab([60.0, 80.0], [110.0, 90.0]);
-    assert!(state(&rig).ghost(MEASURED).is_some());
+    assert!(labels::ghost(state(&rig), MEASURED).is_some());
     rig.send(LibraryCommand::Step(1));
     rig.send(LibraryCommand::Step(-1));
-    assert!(state(&rig).ghost(MEASURED).is_none());
+    assert!(labels::ghost(state(&rig), MEASURED).is_none());
 }
 
 #[test]
@@ -133,7 +134,7 @@ fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
         rig.harness.step();
     }
     rig.settle();
-    assert!(state(&rig).drawn_mask(MEASURED, lab::RIGHT).is_some());
+    assert!(results::drawn_mask(state(&rig), MEASURED, lab::RIGHT).is_some());
 }
 
 #[test]

@@ -6,6 +6,7 @@ use touch2touch::app::command::{LabelsCommand, LibraryCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
@@ -109,7 +110,7 @@ fn the_most_uncertain_come_first_by_key_and_say_why() {
 }
 
 fn drawn(rig: &Rig) -> Option<Mask> {
-    let hand = state(rig).drawn_mask(ImprintSource::Measured, lab::RIGHT)?;
+    let hand = results::drawn_mask(state(rig), ImprintSource::Measured, lab::RIGHT)?;
     Some((*hand.mask).clone())
 }
 

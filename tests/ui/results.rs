@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::{Place, Sort};
+use touch2touch::app::results;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch_core::dataset::PairId;
@@ -28,7 +29,7 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     rig.settle();
     let table = rig.harness.state().state().table.result.clone().expect("the table is there");
     assert!(table.complete && table.skipped.is_empty(), "{:?}", table.skipped);
-    let generators = rig.harness.state().state().evaluated().count();
+    let generators = results::evaluated(rig.harness.state().state()).count();
     assert_eq!((table.rows.len(), table.groups.len()), (1 + generators, 1), "the upper bound and every generator");
     let figures = &table.rows[1].groups[0];
     assert_eq!((figures.grasps, figures.images), (4, 8));

@@ -7,6 +7,7 @@ use std::sync::{Arc, Condvar, Mutex};
 use egui_kittest::Harness;
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::library::Place;
+use touch2touch::app::results;
 use touch2touch::app::services::Services;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
@@ -242,7 +243,7 @@ impl Rig {
         let services = Arc::new(QuickGenerator { live, gate: None });
         let mut rig =
             Self { harness: Self::build(size, services, Some(data.clone()), false), data, config, _folder: folder };
-        rig.until("the first pair", |state| state.library.open.is_some() && state.sample().ready().is_some());
+        rig.until("the first pair", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
         Some(rig)
     }
 
@@ -253,7 +254,7 @@ impl Rig {
         let live = LiveServices::with_config_folder(Some(rig.config.clone()));
         let services = Arc::new(QuickGenerator { live, gate: Some(gate.clone()) });
         rig.harness = Self::build(size, services, Some(rig.data.clone()), false);
-        rig.until("the data set", |state| state.library.open.is_some() && state.sample().ready().is_some());
+        rig.until("the data set", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
         Some((rig, gate))
     }
 

@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{LayerLook, SceneLayer};
 use touch2touch::app::state::State;
@@ -41,14 +42,14 @@ fn colors(rig: &mut Rig) -> std::collections::BTreeSet<[u8; 4]> {
 #[test]
 fn distances_are_those_of_the_contact_points_and_colors_show_them() {
     let Some(mut rig) = Rig::aligned() else { return };
-    assert!(state(&rig).deviation(MEASURED).ready().is_none(), "nothing is computed that no view shows");
+    assert!(results::deviation(state(&rig), MEASURED).ready().is_none(), "nothing is computed that no view shows");
     let before = colors(&mut rig);
     rig.send(WorkbenchCommand::SetLayer(Layer::Distance));
     rig.settle();
-    let found = state(&rig).deviation(MEASURED).ready().expect("the view shows it");
-    let clouds = state(&rig).cloud(MEASURED).ready().unwrap();
-    let tool = &state(&rig).tool().ready().unwrap().model;
-    let pose = state(&rig).pose(MEASURED).ready().unwrap().grasp_from_object;
+    let found = results::deviation(state(&rig), MEASURED).ready().expect("the view shows it");
+    let clouds = results::cloud(state(&rig), MEASURED).ready().unwrap();
+    let tool = &results::tool(state(&rig)).ready().unwrap().model;
+    let pose = results::pose(state(&rig), MEASURED).ready().unwrap().grasp_from_object;
     assert_eq!(found.grasp_from_object, pose);
     let cloud = clouds.finger(lab::RIGHT).unwrap();
     let contact: Vec<_> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();

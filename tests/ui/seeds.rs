@@ -2,6 +2,7 @@
 
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand};
+use touch2touch::app::results;
 use touch2touch::app::seeds::SeedsCommand;
 use touch2touch::app::settings::prefer;
 use touch2touch_core::ensemble::AngleFan;
@@ -19,7 +20,7 @@ fn click(rig: &mut Rig, label: &str) {
 /// Predictions of the ensemble of the active finger that are there.
 fn there(rig: &Rig) -> usize {
     let state = rig.harness.state().state();
-    let recipes = state.seed_recipes(lab::RIGHT).unwrap();
+    let recipes = results::seed_recipes(state, lab::RIGHT).unwrap();
     recipes.iter().filter(|r| state.results.predictions.contains(r)).count()
 }
 
@@ -35,17 +36,17 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
     assert_eq!(there(&rig), 8);
 
     let state = rig.harness.state().state();
-    let ensemble = state.ensemble(lab::RIGHT).ready().expect("mean and spread");
+    let ensemble = results::ensemble(state, lab::RIGHT).ready().expect("mean and spread");
     assert_eq!(ensemble.spread.count, 8);
-    let recipes = state.seed_recipes(lab::RIGHT).unwrap();
-    let imprints: Vec<_> = recipes.iter().map(|r| state.seed_imprint(r).unwrap()).collect();
+    let recipes = results::seed_recipes(state, lab::RIGHT).unwrap();
+    let imprints: Vec<_> = recipes.iter().map(|r| results::seed_imprint(state, r).unwrap()).collect();
     let at = (90, 70);
     let mean = imprints.iter().map(|i| f64::from(i[at])).sum::<f64>() / 8.0;
     let square = imprints.iter().map(|i| (f64::from(i[at]) - mean).powi(2)).sum::<f64>() / 7.0;
     assert!((f64::from(ensemble.spread.mean[at]) - mean).abs() < 1e-8);
     assert!((f64::from(ensemble.spread.std[at]) - square.sqrt()).abs() < 1e-8 && square > 0.0);
     assert!(ensemble.channels.as_ref().unwrap()[at] > 0.0);
-    let angles: Vec<f64> = state.seed_poses().iter().flatten().map(|p| p.angle_rad).collect();
+    let angles: Vec<f64> = results::seed_poses(state).iter().flatten().map(|p| p.angle_rad).collect();
     assert!(!angles.is_empty() && AngleFan::of(&angles).is_some());
     for label in ["Fan of poses", "Mean", "Seed spread", "Channel spread"] {
         assert!(rig.harness.query_by_label(label).is_some(), "{label}");
@@ -54,14 +55,14 @@ fn seeds_run_in_sight_only_and_show_where_they_disagree() {
 
     // A click on one shows it everywhere; the ones made meanwhile do not.
     let third = recipes[2].clone();
-    click(&mut rig, &format!("Seed {}", third.seed));
-    assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
+    click(&mut rig, &format!("Seed {}", third.config.seed));
+    assert_eq!(results::chosen(rig.harness.state().state(), lab::RIGHT), Some(&third));
     rig.send(Command::Seeds(SeedsCommand::Count(12)));
     assert_eq!(there(&rig), 12);
-    assert_eq!(rig.harness.state().state().chosen(lab::RIGHT), Some(&third));
+    assert_eq!(results::chosen(rig.harness.state().state(), lab::RIGHT), Some(&third));
 
     // Run means this pair: another one gets none until told so, and the switch tells it for all.
-    assert!(!rig.harness.state().state().seeds_running(), "all are there");
+    assert!(!results::seeds_running(rig.harness.state().state()), "all are there");
     rig.send(LibraryCommand::Step(1));
     assert_eq!(there(&rig), 0);
     rig.send(Command::Seeds(SeedsCommand::Count(1)));

@@ -7,6 +7,7 @@ use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::train::TrainForm;
+use touch2touch::app::{recipe, train};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::train::TrainChoice;
 
@@ -31,11 +32,11 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     rig.harness.get_by_label_contains("left out for the score: 4 masks of 2 pairs");
     rig.harness.get_by_label_contains("8 masks are few");
     rig.shoot("train-before");
-    let shipped = rig.harness.state().state().bundle(BundleKind::Mask).unwrap().clone();
+    let shipped = recipe::bundle(rig.harness.state().state(), BundleKind::Mask).unwrap().clone();
 
     rig.harness.get_by_label("Start training").click();
     rig.harness.step();
-    while rig.harness.state().state().running(TaskKind::Train).is_some() {
+    while rig.harness.state().state().tasks.of_kind(TaskKind::Train).is_some() {
         std::thread::sleep(std::time::Duration::from_millis(50));
         rig.harness.step();
     }
@@ -44,10 +45,10 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     let found = state.train.result.clone().expect("the training is there");
     assert_eq!((found.masks, found.pairs, found.steps, found.held_out.len()), (8, 4, 12, 4), "{found:?}");
     assert!(found.curves.iter().any(|curve| curve.unit == "Dice") && found.before.is_some());
-    let trained = state.trained().expect("its bundle is among the others").clone();
+    let trained = train::trained(state).expect("its bundle is among the others").clone();
     assert!(trained.trained && trained.id != shipped.id && trained.name == found.name);
     // In use at once, unless it is worse on what was left out.
-    let now = state.bundle(BundleKind::Mask).unwrap().id.clone();
+    let now = recipe::bundle(state, BundleKind::Mask).unwrap().id.clone();
     assert_eq!(now, if found.is_worse() { shipped.id.clone() } else { trained.id.clone() });
     assert!(state.log.entries.iter().any(|entry| entry.text.starts_with("Trained: ")));
     rig.harness.get_by_label_contains("mean of 4");
@@ -57,7 +58,7 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
         rig.harness.step();
         rig.settle();
     }
-    assert!(rig.harness.state().state().uses_trained());
+    assert!(train::uses_trained(rig.harness.state().state()));
     rig.harness.get_by_label("in use");
 
     // The verb makes the same bundle to the last bit.

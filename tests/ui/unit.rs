@@ -3,6 +3,7 @@
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
@@ -34,9 +35,9 @@ fn a_click_reads_the_model_in_the_unit_that_fits() {
             rig.shoot(&format!("unit-{}-{}", workspace.name(), size[0]).to_lowercase());
         }
     }
-    let state = |rig: &Rig| rig.harness.state().state().pose(MEASURED).ready().is_some();
+    let state = |rig: &Rig| results::pose(rig.harness.state().state(), MEASURED).ready().is_some();
     assert!(!state(&rig));
-    let tool = rig.harness.state().state().tool_name().unwrap().to_owned();
+    let tool = results::tool_name(rig.harness.state().state()).unwrap().to_owned();
     // Both where the pose would stand in 3D and under Metrics.
     rig.harness.get_by_label(&format!("Read {tool} as millimeters, measured, in the metrics"));
     let unit = folder.join("unit.txt");
@@ -45,7 +46,7 @@ fn a_click_reads_the_model_in_the_unit_that_fits() {
     rig.harness.step();
     rig.settle();
     assert_eq!(std::fs::read_to_string(&unit).unwrap(), "mm\n");
-    assert!(state(&rig), "{:?}", rig.harness.state().state().pose(MEASURED));
+    assert!(state(&rig), "{:?}", results::pose(rig.harness.state().state(), MEASURED));
     assert!(rig.harness.query_all_by_label_contains("as millimeters").next().is_none());
     rig.shoot("unit-accepted");
 
@@ -60,6 +61,8 @@ fn a_click_reads_the_model_in_the_unit_that_fits() {
     );
     // What is read anew says so, and the offer names what it would replace.
     rig.send(LibraryCommand::Reload);
-    let Lookup::Failed(err) = rig.harness.state().state().pose(MEASURED) else { panic!("it is no tool in inches") };
+    let Lookup::Failed(err) = results::pose(rig.harness.state().state(), MEASURED) else {
+        panic!("it is no tool in inches")
+    };
     assert_eq!(err.units.as_ref().unwrap().says.as_deref(), Some("in"));
 }

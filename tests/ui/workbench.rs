@@ -5,6 +5,7 @@ use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{CameraPreset, Command, Pane, PredictCommand, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
@@ -82,7 +83,7 @@ impl Rig {
         rig.move_to(middle);
         rig.send(ViewCommand::Ui(UiRequest::Camera(CameraPreset::Right)));
         rig.send(ViewCommand::Ui(UiRequest::Fit));
-        assert!(rig.model().pose(MEASURED).ready().is_some());
+        assert!(results::pose(rig.model(), MEASURED).ready().is_some());
         assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
         Some(rig)
     }
@@ -109,7 +110,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     assert!(rig.model().workbench.hand.is_none());
     rig.press(Modifiers::NONE, Key::Z);
     assert_eq!(rig.model().workbench.tool, SceneTool::Pose);
-    let began = rig.model().shown_pose(MEASURED).unwrap();
+    let began = results::shown_pose(rig.model(), MEASURED).unwrap();
     for (modifiers, key, axis, by) in [
         (Modifiers::NONE, Key::ArrowRight, PoseAxis::Y, STEP_M),
         (Modifiers::SHIFT, Key::ArrowLeft, PoseAxis::Y, -10.0 * STEP_M),
@@ -131,7 +132,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
 
     // Escape gives it up; nothing was written.
     rig.press(Modifiers::NONE, Key::Escape);
-    assert!(rig.model().workbench.hand.is_none() && rig.model().accepted(MEASURED).is_none());
+    assert!(rig.model().workbench.hand.is_none() && results::accepted(rig.model(), MEASURED).is_none());
 
     // Enter takes it over: one gesture, undone and done again, also on the disk.
     rig.press(Modifiers::SHIFT, Key::ArrowRight);
@@ -142,25 +143,25 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
         let review = MaskStore::for_dataset(&dataset).unwrap().load_review(&name).unwrap();
         review.and_then(|r| r.accepted.accepted[0])
     };
-    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+    assert_eq!(results::by_hand(rig.model(), MEASURED), Some(pose));
     assert_eq!(stored(&rig).map(|a| (a.pose, a.by_hand)), Some((pose, true)));
     assert!(rig.harness.query_all_by_label_contains("Accepted by hand").count() > 0, "the figures say so");
     rig.shoot("test-accepted");
     rig.press(Modifiers::CTRL, Key::Z);
-    assert_eq!((rig.model().by_hand(MEASURED), stored(&rig)), (None, None));
+    assert_eq!((results::by_hand(rig.model(), MEASURED), stored(&rig)), (None, None));
     rig.press(Modifiers::CTRL | Modifiers::SHIFT, Key::Z);
-    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+    assert_eq!(results::by_hand(rig.model(), MEASURED), Some(pose));
     // After a restart it is still there.
     rig.restart(SIZE);
     rig.send(prefer(|s| s.workspace = Workspace::Align));
-    assert_eq!(rig.model().by_hand(MEASURED), Some(pose));
+    assert_eq!(results::by_hand(rig.model(), MEASURED), Some(pose));
 }
 
 #[test]
 fn handles_move_and_turn_the_tool_and_not_the_view() {
     let Some(mut rig) = Rig::aligned() else { return };
     rig.press(Modifiers::NONE, Key::Z);
-    let began = rig.model().manual_begins(MEASURED);
+    let began = results::manual_begins(rig.model(), MEASURED);
     let origin = rig.harness.state().on_screen(MEASURED, [began.x_m, began.planar.y_m, began.planar.z_m]).unwrap();
     rig.drag(origin, vec2(30.0, 18.0));
     let moved = rig.hand().pose;
@@ -205,7 +206,10 @@ fn icp_starts_where_the_hand_left_the_tool() {
     let report = &rig.model().results.runs.get(&run).unwrap().report;
     assert_eq!((report.start, report.runs.len()), (from.planar, 1), "one start: this one");
     // It comes back to where the registration had been by itself.
-    let off = PoseDifference::between(hand.pose.planar, rig.model().pose(MEASURED).ready().unwrap().grasp_from_object);
+    let off = PoseDifference::between(
+        hand.pose.planar,
+        results::pose(rig.model(), MEASURED).ready().unwrap().grasp_from_object,
+    );
     assert!(off.angle_rad.to_degrees() < 1.0 && off.position_m < 1e-3, "{off:?}");
     assert!(hand.cost.unwrap().cost_m2 <= hand.began_cost.unwrap().cost_m2 * 1.05);
 }
@@ -215,7 +219,7 @@ fn distances_and_angles_are_measured_from_point_to_point() {
     let Some(mut rig) = Rig::aligned() else { return };
     rig.press(Modifiers::NONE, Key::Y);
     assert_eq!(rig.model().workbench.tool, SceneTool::Distance);
-    let cloud = rig.model().cloud(MEASURED).ready().unwrap().contact_points();
+    let cloud = results::cloud(rig.model(), MEASURED).ready().unwrap().contact_points();
     let ends = [cloud[cloud.len() / 10], cloud[cloud.len() / 3]];
     for p in ends {
         let at = rig.harness.state().on_screen(MEASURED, p.to_array()).unwrap();
@@ -245,14 +249,14 @@ fn distances_and_angles_are_measured_from_point_to_point() {
 #[test]
 fn a_clicked_point_says_all_about_itself() {
     let Some(mut rig) = Rig::aligned() else { return };
-    let clouds = rig.model().cloud(MEASURED).ready().unwrap();
+    let clouds = results::cloud(rig.model(), MEASURED).ready().unwrap();
     let cloud = clouds.finger(lab::RIGHT).unwrap();
     let contact = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).nth(40).unwrap();
     let at = rig.harness.state().on_screen(MEASURED, cloud.points[contact].to_array()).unwrap();
     rig.click_at(at);
     let picked = rig.model().workbench.picked.expect("a point");
-    let clouds = rig.model().cloud(MEASURED).ready().unwrap();
-    let layers = rig.model().layers(MEASURED).ready().expect("reasons are there once they are shown");
+    let clouds = results::cloud(rig.model(), MEASURED).ready().unwrap();
+    let layers = results::layers(rig.model(), MEASURED).ready().expect("reasons are there once they are shown");
     let (reason, _) = layers.at(picked.finger, clouds.finger(picked.finger).unwrap(), picked.pixel).unwrap();
     for label in [format!("Reason {reason}"), format!("Pixel {}", rig.model().finger_name(picked.finger))] {
         assert!(rig.harness.query_all_by_label_contains(&label).count() > 0, "{label}");
@@ -270,15 +274,15 @@ fn layers_go_round_and_their_numbers_add_up() {
         assert_eq!(rig.model().workbench.layer, layer);
         rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());
     }
-    let layers = rig.model().layers(MEASURED).ready().expect("the pane shows them");
+    let layers = results::layers(rig.model(), MEASURED).ready().expect("the pane shows them");
     for finger in lab::PADS {
-        let pixels = rig.model().imprint(MEASURED, finger).ready().unwrap().len();
+        let pixels = results::imprint(rig.model(), MEASURED, finger).ready().unwrap().len();
         assert_eq!(layers.counts[finger].unwrap().iter().sum::<usize>(), pixels, "a reason for every pixel");
-        let mask = rig.model().mask_in_force(MEASURED, finger).unwrap().mask;
+        let mask = results::mask_in_force(rig.model(), MEASURED, finger).unwrap().mask;
         let outside = mask.as_slice().iter().filter(|m| !**m).count();
         assert_eq!(layers.counts[finger].unwrap()[Reason::OutsideMask as usize], outside);
     }
-    let contact = rig.model().cloud(MEASURED).ready().unwrap().contact_points().len();
+    let contact = results::cloud(rig.model(), MEASURED).ready().unwrap().contact_points().len();
     assert_eq!(layers.histogram.iter().sum::<u32>() as usize + layers.above as usize, contact);
     assert!(layers.directions.unwrap().scene_to_model.overlap > 0.8, "{:?}", layers.directions);
     // The other side has its own.
@@ -286,7 +290,7 @@ fn layers_go_round_and_their_numbers_add_up() {
     let side = rig.harness.get_by_label("Layers of the predicted side").rect().center();
     rig.click_at(side);
     assert_eq!(rig.model().workbench.side, ImprintSource::Predicted);
-    let predicted = rig.model().layers(ImprintSource::Predicted);
+    let predicted = results::layers(rig.model(), ImprintSource::Predicted);
     assert!(predicted.ready().is_some() || matches!(predicted, Lookup::Failed(_) | Lookup::Absent(_)));
     rig.shoot("test-layers-predicted");
 }
@@ -297,7 +301,7 @@ fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
     // In Inspect there are 3D views, but neither layers nor poses per finger.
-    assert!(rig.model().pose(MEASURED).ready().is_some());
+    assert!(results::pose(rig.model(), MEASURED).ready().is_some());
     assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     rig.front("Layers");
@@ -307,9 +311,9 @@ fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
     rig.front("Poses");
     assert!(rig.model().selection.panes.contains(&Pane::Poses));
     assert_eq!(rig.model().results.clouds.len(), clouds + 2, "one more for each finger");
-    let truth = rig.model().truth().unwrap();
+    let truth = results::truth(rig.model()).unwrap();
     for of in PoseOf::all(&rig.model().rig()) {
-        let pose = rig.model().pose_of(MEASURED, of).ready().unwrap().grasp_from_object;
+        let pose = results::pose_of(rig.model(), MEASURED, of).ready().unwrap().grasp_from_object;
         let off = PoseDifference::between(pose, truth);
         assert!(off.position_m < 0.02, "{of:?} {off:?}");
     }

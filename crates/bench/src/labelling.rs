@@ -27,6 +27,7 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{DrawnMask, ImprintSource};
 use touch2touch_work::mask::{MaskChoice, MaskInputs, MaskSource};
 use touch2touch_work::models::{Masking, Models};
+use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::pose::pose;
 use touch2touch_work::propose::{self, Side};
 use touch2touch_work::recipe::Recipe;
@@ -321,7 +322,8 @@ fn proposals(
     }
     let within_m = MaskChoice::default().cad_distance_m;
     let near_cad = |pose: PlanarPose, cad_pose: CadPose, pad, imprint: &DepthMap| -> anyhow::Result<Mask> {
-        let distances = propose::cad_distances((imprint, of), (&case.sample, pad), &case.tool, pose.into())?;
+        let distances =
+            propose::cad_distances(imprint, of, OnPad { sample: &case.sample, pad }, &case.tool, pose.into())?;
         Ok(propose::near_cad(&distances, within_m, cad_pose).mask)
     };
     each("CAD at the true pose", &mut |pad, imprint| near_cad(case.truth, CadPose::Truth, pad, imprint))?;
@@ -334,7 +336,7 @@ fn proposals(
         let other = case.sample.rig.other_pad(pad).ok_or_else(|| anyhow::anyhow!("there is no other finger"))?;
         let (Some(there), Some(mask)) = (&imprints[other], &truth[other]) else { anyhow::bail!("there is no other") };
         let from = Side { sample: &case.sample, pad: other, imprint: there };
-        Ok(propose::carried_across("other", (from, mask), Side { sample: &case.sample, pad, imprint })?.mask)
+        Ok(propose::carried_across("other", from, mask, Side { sample: &case.sample, pad, imprint })?.mask)
     })?;
     if let Some(from) = from {
         let masks = true_masks(from)?;
@@ -343,7 +345,11 @@ fn proposals(
             let hand = masks[pad].clone().map(|mask| DrawnMask::new(mask, Provenance::Truth));
             labels.draw(&touch2touch_work::labels::MaskPlace::measured(pad), hand);
             let to = Side { sample: &case.sample, pad, imprint };
-            Ok(propose::carried_from_pair("another", (&from.sample, &labels), to)?.mask)
+            Ok(propose::carried_from_pair(
+                propose::OtherPair { name: "another", sample: &from.sample, labels: &labels },
+                to,
+            )?
+            .mask)
         })?;
     }
     all.push(("true mask", truth.clone(), 0.0));

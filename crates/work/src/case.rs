@@ -257,7 +257,7 @@ fn results(touch: Touch<'_>, recipe: &Recipe, models: &Models, cx: &JobCx) -> Re
 fn tool_of(dataset: &Dataset, pair: PairId) -> Result<ToolModel, TaskError> {
     let tool = dataset.index.get(pair).and_then(|entry| entry.tool.as_deref());
     let name = tool.ok_or_else(|| TaskError::new(WHAT, "no tool is named"))?;
-    load_tool(dataset, name).map(|(tool, _)| tool)
+    load_tool(dataset, name).map(|loaded| loaded.model)
 }
 
 /// Content of a case to be written, besides the data.

@@ -4,12 +4,11 @@ use std::sync::Arc;
 
 use super::error::TaskError;
 use super::imprint::chain_of_pad;
+use super::on_pad::OnPad;
 use super::prediction::Prediction;
 use touch2touch_core::ensemble::{Spread, channel_spread};
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::postprocess::{DepthChain, ShiftMode};
-use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Sample;
 
 /// Several predictions of one touch against each other.
 #[derive(Clone, Debug)]
@@ -35,7 +34,7 @@ pub fn ensemble(
     predictions: &[Arc<Prediction>],
     imprints: &[Arc<DepthMap>],
     shift: ShiftMode,
-    (sample, pad): (&Sample, PadId),
+    OnPad { sample, pad }: OnPad<'_>,
 ) -> Result<Ensemble, TaskError> {
     const WHAT: &str = "Spread of the seeds";
     let spread = Spread::of(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())

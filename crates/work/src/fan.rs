@@ -11,14 +11,13 @@ use super::feel::{Felt, Touch};
 use super::imprint::imprint_of;
 use super::job::JobCx;
 use super::models::Models;
+use super::on_pad::OnPad;
 use super::prediction::Prediction;
 use super::recipe::{Recipe, Stage};
 use touch2touch_core::contact::MaskBasis;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::ensemble::{AngleFan, seeds};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
+use touch2touch_core::rig::PerPad;
 
 pub use picture::picture;
 
@@ -38,7 +37,7 @@ pub struct FingerSeeds {
 /// # Errors
 /// If the finger has no picture to start from, or a prediction fails.
 pub fn seeds_of(
-    (sample, pad): (&Sample, PadId),
+    of: OnPad<'_>,
     recipe: &Recipe,
     count: usize,
     models: &Models,
@@ -46,11 +45,11 @@ pub fn seeds_of(
 ) -> Result<FingerSeeds, TaskError> {
     let generating = recipe.generating()?;
     let list = seeds(generating.config.seed, count);
-    let made = generating.seeds(models, (sample, pad), &list, cx)?;
+    let made = generating.seeds(models, of, &list, cx)?;
     let predictions: Vec<Arc<Prediction>> = made.into_iter().map(Arc::new).collect();
-    let imprint = |made: &Arc<Prediction>| imprint_of(made, recipe.shift, sample, pad).map(Arc::new);
+    let imprint = |made: &Arc<Prediction>| imprint_of(made, recipe.shift, of.sample, of.pad).map(Arc::new);
     let imprints = predictions.iter().map(imprint).collect::<Result<Vec<_>, _>>()?;
-    let ensemble = ensemble(&predictions, &imprints, recipe.shift, (sample, pad))?;
+    let ensemble = ensemble(&predictions, &imprints, recipe.shift, of)?;
     Ok(FingerSeeds { predictions, imprints, ensemble })
 }
 
@@ -80,7 +79,7 @@ pub fn fan(touch: Touch<'_>, recipe: &Recipe, count: usize, models: &Models, cx:
     let mut fingers: PerPad<FingerSeeds> = PerPad::default();
     for (pad, _) in sample.pads.entries() {
         if generating.picture(sample, pad)?.is_some() {
-            fingers[pad] = Some(seeds_of((sample, pad), recipe, count, models, cx)?);
+            fingers[pad] = Some(seeds_of(OnPad { sample, pad }, recipe, count, models, cx)?);
         }
     }
     let mut otherwise = BTreeMap::new();
@@ -96,10 +95,8 @@ pub fn fan(touch: Touch<'_>, recipe: &Recipe, count: usize, models: &Models, cx:
     let seeds = seeds(generating.config.seed, count);
     let mut angles_rad = Vec::new();
     for (at, &seed) in seeds.iter().enumerate() {
-        let with_seed = |(model, config)| (model, GenerateConfig { seed, ..config });
-        let recipe = Recipe { generator: recipe.generator.clone().map(with_seed), ..recipe.clone() };
         let made = fingers.as_ref().map(|finger| Some((*finger?.predictions[at]).clone()));
-        angles_rad.push(angle(Felt::of_predictions(&recipe, made))?);
+        angles_rad.push(angle(Felt::of_predictions(&recipe.with_seed(seed), made))?);
     }
     let means = fingers.as_ref().map(|finger| Some(finger?.ensemble.spread.mean.clone()));
     let of_mean_rad = angle(Felt::of_imprints(recipe, means))?;

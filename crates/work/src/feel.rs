@@ -8,7 +8,7 @@ use strum::IntoEnumIterator as _;
 use super::error::TaskError;
 use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
-use super::labels::{ImprintOf, ImprintSource, MaskPlace, PairLabels};
+use super::labels::{ImprintOf, ImprintSource, PairLabels};
 use super::mask::{Contact, MaskInputs, contact_mask};
 use super::models::Models;
 use super::pose::{PoseResult, pose};
@@ -166,8 +166,7 @@ impl Felt {
         let Some(model) = &self.recipe.mask_model else { return };
         let of = self.recipe.imprint_of();
         for (pad, imprint) in self.imprints.entries() {
-            let place = MaskPlace { pad, of: of.clone() };
-            if self.recipe.hand && touch.labels.drawn(&place, imprint).is_some() {
+            if self.mask_inputs(touch, &of).drawn(pad, imprint).is_some() {
                 continue;
             }
             // What fails here fails again, and is said, where the mask is asked for.
@@ -214,11 +213,16 @@ impl Felt {
         Ok((found, least))
     }
 
+    /// Inputs of a touch's masks; drawn ones are left out where the recipe says so.
+    fn mask_inputs<'a>(&self, touch: Touch<'a>, of: &'a ImprintOf) -> MaskInputs<'a> {
+        let labels = self.recipe.hand.then_some(touch.labels);
+        MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(of) }
+    }
+
     fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
         let made_by = self.recipe.mask_recipe()?;
-        let of: ImprintOf = self.recipe.imprint_of();
-        let labels = self.recipe.hand.then_some(touch.labels);
-        let inputs = MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(&of) };
+        let of = self.recipe.imprint_of();
+        let inputs = self.mask_inputs(touch, &of);
         let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
         for (pad, imprint) in imprints.entries() {
             let unet = |imprint: &DepthMap| {

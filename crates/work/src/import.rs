@@ -139,7 +139,7 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
         let Some(entry) = dataset.index.get(pair) else { continue };
         cx.progress(done as u64, total, &entry.name);
         let job = ImportRun { dataset, labels: &labels, setup, write };
-        let one = caught(|| job.one((pair, &entry.name), &masks, &mut found));
+        let one = caught(|| job.one(pair, &entry.name, &masks, &mut found));
         if let Err(err) = one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
             found.refused.push(Remark { name: entry.name.clone(), why: err.why });
         }
@@ -209,7 +209,8 @@ struct ImportRun<'a> {
 impl ImportRun<'_> {
     fn one(
         self,
-        (pair, name): (PairId, &str),
+        pair: PairId,
+        name: &str,
         masks: &BTreeMap<PadId, &Listed>,
         found: &mut Import,
     ) -> Result<(), TaskError> {
@@ -220,7 +221,7 @@ impl ImportRun<'_> {
         // Counted only once the whole pair is saved.
         let (mut here, mut how) = (Import::default(), Vec::new());
         for (&pad, listed) in masks {
-            match self.mask(pad, listed, imprints[pad].as_ref(), (&mut stored, judged), &mut here) {
+            match self.mask(pad, listed, imprints[pad].as_ref(), &mut stored, judged, &mut here) {
                 Ok(changed) => how.extend(changed.then(|| listed.file.display().to_string())),
                 Err(err) => found.refused.push(Remark { name: listed.stem.clone(), why: err.to_string() }),
             }
@@ -247,7 +248,8 @@ impl ImportRun<'_> {
         pad: PadId,
         listed: &Listed,
         imprint: Option<&DepthMap>,
-        (stored, judged): (&mut PairLabels, bool),
+        stored: &mut PairLabels,
+        judged: bool,
         counts: &mut Import,
     ) -> Result<bool, ReadError> {
         let refuse = |what: String| ReadError { file: listed.file.clone(), what, hint: "" };

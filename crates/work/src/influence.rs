@@ -74,12 +74,12 @@ pub fn influence(
     clouds: &Clouds,
     sample: &Sample,
     tool: &ToolModel,
-    engine: RegistrationChoice,
+    registration: RegistrationChoice,
     grasp_from_object: PlanarPose,
 ) -> Result<Influence, TaskError> {
-    let on_field = matches!(engine.by, Registration::DistanceField | Registration::Certified);
-    let kernel_m = engine.gate_m().filter(|_| on_field).ok_or_else(|| {
-        let why = format!("{} has no cost that says what its pixels are worth", engine.label());
+    let on_field = matches!(registration.by, Registration::DistanceField | Registration::Certified);
+    let kernel_m = registration.gate_m().filter(|_| on_field).ok_or_else(|| {
+        let why = format!("{} has no cost that says what its pixels are worth", registration.label());
         let hint = format!("Choose {} or {}.", Registration::DistanceField.label(), Registration::Certified.label());
         TaskError::new(WHAT, why).with_hint(hint)
     })?;
@@ -251,8 +251,8 @@ mod tests {
     fn it_says_why_there_is_none() {
         let (sample, model, masks) = grasp(0, 3, 2.0);
         let clouds = lifted(&sample, &masks);
-        let of = |engine: Registration, clouds: &Clouds| {
-            influence(clouds, &sample, &model, engine.into(), PlanarPose::default()).unwrap_err()
+        let of = |by: Registration, clouds: &Clouds| {
+            influence(clouds, &sample, &model, by.into(), PlanarPose::default()).unwrap_err()
         };
         assert!(of(Registration::Gicp, &clouds).why.contains("GICP, 6 DoF"));
         assert!(of(Registration::Gicp, &clouds).hint.unwrap().contains("distance field"));

@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use super::error::TaskError;
 use super::labels::{Act, Labels, Record, Review, working_seconds};
-use super::repeats::{Repeats, repeats};
+use super::repeats::{Repeater, Repeats, repeats};
 use crate::io::dataset::Dataset;
 use touch2touch_core::dataset::Index;
 use touch2touch_core::label::Provenance;
@@ -213,13 +213,13 @@ impl LabelStats {
     }
 }
 
-/// Reads the journals of a data set. `reviews` are the states in force, which may be newer than the files; `person` is
-/// whose repeats are asked for, and `share` of which pairs come back.
+/// Reads the journals of a data set. `reviews` are the states in force, which may be newer than the files; the
+/// repeats are those of `repeater`.
 pub fn label_stats(
     dataset: &Dataset,
     labels: &Labels,
     reviews: &BTreeMap<String, Review>,
-    (person, share): (&str, f64),
+    repeater: Repeater<'_>,
 ) -> LabelStats {
     let mut stats = LabelStats::of_reviews(&dataset.index, reviews);
     let mut journals: BTreeMap<String, Vec<Record>> = BTreeMap::new();
@@ -237,7 +237,7 @@ pub fn label_stats(
             Err(_) => {}
         }
     }
-    match repeats(dataset, labels, reviews, &journals, (person, share)) {
+    match repeats(dataset, labels, reviews, &journals, repeater) {
         Ok(found) => stats.repeats = found,
         Err(err) => stats.problems.push(why("repeats", &err)),
     }

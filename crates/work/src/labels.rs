@@ -284,10 +284,11 @@ impl DrawnMask {
         marks.take_over(mask, new, ignored, by, keep_manual)
     }
 
-    /// Cleans it up; whether anything changed. Sizes are those of the rig's depth images.
+    /// Cleans it up; whether anything changed. What changes nothing leaves no trace. Sizes are those of the rig's depth
+    /// images.
     pub fn clean(&mut self, clean_up: CleanUp, rig: &Rig) -> bool {
         let clean = clean_up.apply(&self.mask, rig.depth_px_per_mm());
-        self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
+        clean != *self.mask && self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
     }
 
     /// A copy of it for the other imprint of the touch, `from` being that of this one.
@@ -381,9 +382,15 @@ impl PairLabels {
         self.masks.get(&MaskPlace::measured(pad))
     }
 
-    /// The mask drawn by hand on an imprint, if it is as large.
+    /// The mask drawn by hand on an imprint, if it is as large: where there is one it is in force, and no other. The one place
+    /// that says so; [`super::mask::contact_mask`] makes what is in force elsewhere.
     pub fn drawn(&self, place: &MaskPlace, imprint: &DepthMap) -> Option<&DrawnMask> {
-        self.masks.get(place).filter(|hand| hand.mask.size() == imprint.size())
+        self.drawn_of_size(place, imprint.size())
+    }
+
+    /// Mask drawn on an imprint, if it is of this size.
+    pub(crate) fn drawn_of_size(&self, place: &MaskPlace, size: [usize; 2]) -> Option<&DrawnMask> {
+        self.masks.get(place).filter(|hand| hand.mask.size() == size)
     }
 
     /// Puts a mask in its place, or takes it away; returns what was there.

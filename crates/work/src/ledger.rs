@@ -3,10 +3,9 @@
 use super::compare::LAB_PEAK_M;
 use super::error::TaskError;
 use super::imprint::chain_of_pad;
+use super::on_pad::OnPad;
 use super::prediction::Prediction;
 use touch2touch_core::postprocess::{ChainReading, DepthChain, Ledger, Mapping, Shift, ShiftMode, ledger, readings};
-use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Sample;
 
 /// The depth chain of a prediction.
 #[derive(Clone, Debug)]
@@ -32,7 +31,7 @@ pub fn of_prediction(
     prediction: &Prediction,
     shift: ShiftMode,
     correct: bool,
-    (sample, pad): (&Sample, PadId),
+    OnPad { sample, pad }: OnPad<'_>,
 ) -> Result<LedgerResult, TaskError> {
     let raw = &prediction.raw;
     let measured = sample.pad(pad).and_then(|touch| touch.depth()).map(|bubble| &bubble.imprint);

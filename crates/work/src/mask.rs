@@ -221,8 +221,8 @@ impl<'a> MaskInputs<'a> {
         Self { sample, tool, labels, of: Some(&ImprintOf::Measured) }
     }
 
-    /// The mask that a person drew on this imprint of a pad.
-    fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a DrawnMask> {
+    /// The mask that is in force on this imprint of a pad because a person drew it.
+    pub(crate) fn drawn(&self, pad: PadId, imprint: &DepthMap) -> Option<&'a DrawnMask> {
         self.labels?.drawn(&MaskPlace { pad, of: self.of?.clone() }, imprint)
     }
 }

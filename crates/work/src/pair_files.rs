@@ -65,7 +65,7 @@ pub struct PairParts<'a> {
     /// Bases of the contact masks, as [`super::mask::made_of`] says them.
     pub mask: &'a str,
     /// The registration.
-    pub engine: RegistrationChoice,
+    pub registration: RegistrationChoice,
     /// Pose by the registration; `None` where there is none.
     pub pose: Option<&'a PoseResult>,
     /// The true pose, `grasp_from_object`, where it is known.
@@ -85,7 +85,8 @@ struct PoseFile<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     prediction: Option<&'a str>,
     tool: Option<&'a str>,
-    engine: String,
+    #[serde(rename = "engine")]
+    registration: String,
     mask: &'a str,
     convention: &'static str,
     grasp_from_object: Matrix,
@@ -172,7 +173,7 @@ fn comments(parts: &PairParts<'_>) -> Vec<String> {
     let fingers: Vec<String> =
         parts.rig.pads().map(|pad| format!("{} = {}", pad.index(), parts.rig.pad_key(pad))).collect();
     let distance = match (parts.pose, parts.tool) {
-        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.engine),
+        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.registration),
         _ => "NaN, without a pose".to_owned(),
     };
     let predicted = parts.prediction.map_or_else(String::new, |how| format!(" ({})", how.replace('·', ",")));
@@ -217,7 +218,7 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         imprint: parts.source.key(),
         prediction: parts.prediction,
         tool: parts.tool.map(|(name, _)| name),
-        engine: parts.engine.to_string(),
+        registration: parts.registration.to_string(),
         mask: parts.mask,
         convention: CONVENTION,
         grasp_from_object: matrix(found),
@@ -252,8 +253,8 @@ mod tests {
         let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
         let clouds = clouds(&sample, &of).unwrap();
         let tool = ToolModel::new(spec.mesh()).unwrap();
-        let (engine, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
-        let found = pose(&clouds.contact_points(), &tool, &*engine.method(), Ask::default(), truth).unwrap();
+        let (registration, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
+        let found = pose(&clouds.contact_points(), &tool, &*registration.method(), Ask::default(), truth).unwrap();
         let parts = PairParts {
             name: "a/b",
             source: ImprintSource::Measured,
@@ -261,7 +262,7 @@ mod tests {
             rig: &sample.rig,
             clouds: &clouds,
             mask: "threshold",
-            engine,
+            registration,
             pose: Some(&found),
             truth,
             tool: Some(("tool", &tool)),

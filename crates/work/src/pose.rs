@@ -89,13 +89,13 @@ pub fn pose(
 pub fn basin(
     points: &[DVec3],
     tool: &ToolModel,
-    engine: RegistrationChoice,
+    registration: RegistrationChoice,
     plane: Plane,
     cx: &JobCx,
 ) -> Result<Basin, TaskError> {
     const WHAT: &str = "Basin map";
     let config = BasinConfig::new(plane);
-    let map = basin_map(points, tool, engine, &config, || cx.cancel.is_cancelled())
+    let map = basin_map(points, tool, registration, &config, || cx.cancel.is_cancelled())
         .ok_or_else(|| TaskError::cancelled(WHAT))?;
     match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
         Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),

@@ -6,6 +6,7 @@ use super::bundles::BundleInfo;
 use super::error::TaskError;
 use super::job::JobCx;
 use super::models::{GenerateInput, Models};
+use super::on_pad::OnPad;
 use super::prediction::Prediction;
 use crate::infer::engine::EngineChoice;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -64,7 +65,7 @@ impl Generating<'_> {
     pub fn seeds(
         self,
         models: &Models,
-        (sample, pad): (&Sample, PadId),
+        OnPad { sample, pad }: OnPad<'_>,
         seeds: &[u64],
         cx: &JobCx,
     ) -> Result<Vec<Prediction>, TaskError> {

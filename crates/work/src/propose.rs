@@ -15,13 +15,14 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 use super::error::TaskError;
 use super::labels::{DrawnMask, ImprintSource, MaskPlace, PairLabels, Review};
 use super::mask::MaskRecipe;
+use super::on_pad::OnPad;
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
-use touch2touch_core::manual::ManualPose;
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -113,10 +114,54 @@ impl ProposalSource {
         }
     }
 
-    /// True where it measures the distance to the CAD model.
-    pub fn is_cad(self) -> bool {
-        matches!(self, Self::CadTruth | Self::CadRegistered | Self::CadHand)
+    /// Base that a proposal of it is made from.
+    pub fn takes(self) -> Takes {
+        match self {
+            Self::Automatic => Takes::AutomaticMask,
+            Self::CadTruth => Takes::CadModel(CadAt::Truth),
+            Self::CadRegistered => Takes::CadModel(CadAt::Registered),
+            Self::CadHand => Takes::CadModel(CadAt::Hand),
+            Self::Grow => Takes::DrawnMask,
+            Self::Carry => Takes::OtherPair,
+            Self::OtherFinger => Takes::OtherPad,
+        }
     }
+
+    /// It measures the distance to the CAD model.
+    pub fn is_cad(self) -> bool {
+        matches!(self.takes(), Takes::CadModel(_))
+    }
+}
+
+/// Base of a proposal, besides the imprint. Each has one function that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// The mask of the automatic source: [`automatic`].
+    AutomaticMask,
+    /// The distances to the CAD model at a pose ([`cad_distances`]): [`near_cad`].
+    CadModel(CadAt),
+    /// The mask that a person drew on the imprint: [`grown`].
+    DrawnMask,
+    /// The mask that a person drew of the pair that [`carries_from`] names: [`carried_from_pair`].
+    OtherPair,
+    /// The mask in force of the other pad: [`carried_across`].
+    OtherPad,
+}
+
+/// Pose of the CAD model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CadAt {
+    /// At the true pose.
+    Truth,
+    /// At the pose that is registered from the masks in force.
+    Registered,
+    /// At the pose at which a hand holds it, else at which one put it: [`hand_pose`].
+    Hand,
+}
+
+/// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
+pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Option<ManualPose> {
+    held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
 }
 
 /// A proposed mask.
@@ -172,8 +217,9 @@ pub fn automatic(found: ContactMask, recipe: &MaskRecipe, model: &str) -> Propos
 /// # Errors
 /// If sizes differ or the camera's numbers cannot be right.
 pub fn cad_distances(
-    (imprint, of): (&DepthMap, ImprintSource),
-    (sample, pad): (&Sample, PadId),
+    imprint: &DepthMap,
+    of: ImprintSource,
+    OnPad { sample, pad }: OnPad<'_>,
     tool: &ToolModel,
     grasp_from_object: ManualPose,
 ) -> Result<Grid<f64>, TaskError> {
@@ -235,7 +281,8 @@ impl<'a> Side<'a> {
 }
 
 fn carried(
-    (from, mask): (Side<'_>, &Mask),
+    from: Side<'_>,
+    mask: &Mask,
     to: Side<'_>,
     from_to: DAffine3,
     gate_m: f64,
@@ -252,19 +299,29 @@ fn carried(
     Ok(Proposal { mask: found.mask, provenance, note })
 }
 
-/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known. `name` is the other
-/// pair's.
+/// Another pair, which has a mask to carry.
+#[derive(Clone, Copy, Debug)]
+pub struct OtherPair<'a> {
+    /// Name of the pair.
+    pub name: &'a str,
+    /// The pair.
+    pub sample: &'a Sample,
+    /// Labels that people gave the pair.
+    pub labels: &'a PairLabels,
+}
+
+/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known.
 ///
 /// # Errors
 /// If there is no such mask, a pose or a camera is not known, or sizes differ.
-pub fn carried_from_pair(name: &str, from: (&Sample, &PairLabels), to: Side<'_>) -> Result<Proposal, TaskError> {
-    let (sample, labels) = from;
+pub fn carried_from_pair(from: OtherPair<'_>, to: Side<'_>) -> Result<Proposal, TaskError> {
+    let OtherPair { name, sample, labels } = from;
     let measured = sample.pad(to.pad).and_then(PadTouch::depth).map(|depth| &depth.imprint);
     let hand = measured.and_then(|imprint| labels.drawn(&MaskPlace::measured(to.pad), imprint));
     let (Some(imprint), Some(hand)) = (measured, hand) else {
         return Err(TaskError::new(WHAT, format!("nobody painted this finger's mask of {name}")));
     };
-    let from = (Side { sample, pad: to.pad, imprint }, &*hand.mask);
+    let from = Side { sample, pad: to.pad, imprint };
     let pose = |sample: &Sample, whose: &str| {
         let why = || TaskError::new(WHAT, format!("the true pose of {whose} is not known, so its move is not either"));
         sample.grasp_from_object.ok_or_else(why)
@@ -272,16 +329,16 @@ pub fn carried_from_pair(name: &str, from: (&Sample, &PairLabels), to: Side<'_>)
     let (a, b) = (pose(sample, name)?, pose(to.sample, "this pair")?);
     let moved = PlanarPose { theta_rad: b.theta_rad - a.theta_rad, y_m: b.y_m - a.y_m, z_m: b.z_m - a.z_m };
     let provenance = Provenance::Copied { from: format!("the mask of {name}"), moved: Some(moved) };
-    carried(from, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
+    carried(from, &hand.mask, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
 }
 
 /// The other finger's mask of the same grasp. `name` is that finger's.
 ///
 /// # Errors
 /// If a camera is not known, or sizes differ.
-pub fn carried_across(name: &str, from: (Side<'_>, &Mask), to: Side<'_>) -> Result<Proposal, TaskError> {
+pub fn carried_across(name: &str, from: Side<'_>, mask: &Mask, to: Side<'_>) -> Result<Proposal, TaskError> {
     let provenance = Provenance::Copied { from: format!("the {name} finger's mask"), moved: None };
-    carried(from, to, across(), ACROSS_GATE_M, provenance)
+    carried(from, mask, to, across(), ACROSS_GATE_M, provenance)
 }
 
 /// The pair whose masks are carried to another: of the same tool and looked at by somebody, the nearest before it in the data

@@ -15,6 +15,7 @@ use super::predict::Generating;
 use crate::infer::engine::EngineChoice;
 use crate::infer::recipe_id::Named;
 use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::ensemble::seeds;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
 
@@ -156,6 +157,26 @@ impl<M> Recipe<M> {
         M: Clone,
     {
         Self { imprint, ..self.clone() }
+    }
+
+    /// Recipe with another seed of its predictions.
+    #[must_use]
+    pub(crate) fn with_seed(&self, seed: u64) -> Self
+    where
+        M: Clone,
+    {
+        let mut with = self.clone();
+        with.generator.iter_mut().for_each(|(_, config)| config.seed = seed);
+        with
+    }
+
+    /// So many recipes that differ from it in their seeds alone, from its own on; none where nothing is predicted.
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self>
+    where
+        M: Clone,
+    {
+        let own = self.generator.as_ref().map(|(_, config)| config.seed);
+        own.map_or_else(Vec::new, |own| seeds(own, count).into_iter().map(|seed| self.with_seed(seed)).collect())
     }
 
     /// True where the mask model is run.

@@ -62,6 +62,15 @@ fn due(mut done: Vec<(u64, String)>, repeated: &BTreeMap<String, Review>, person
     done.into_iter().take(ready).filter(comes).map(|(_, pair)| pair).collect()
 }
 
+/// Who draws pairs a second time.
+#[derive(Clone, Copy, Debug)]
+pub struct Repeater<'a> {
+    /// The person.
+    pub person: &'a str,
+    /// The share of the pairs that come back.
+    pub share: f64,
+}
+
 /// Repeats of a person: the pairs drawn a second time, and those that come back next.
 ///
 /// # Errors
@@ -71,7 +80,7 @@ pub fn repeats(
     labels: &Labels,
     reviews: &BTreeMap<String, Review>,
     journals: &BTreeMap<String, Vec<Record>>,
-    (person, share): (&str, f64),
+    Repeater { person, share }: Repeater<'_>,
 ) -> Result<Repeats, TaskError> {
     if person.is_empty() || labels.folder().is_err() || dataset.rig.depth().is_none() {
         return Ok(Repeats::default());

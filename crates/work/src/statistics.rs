@@ -42,7 +42,7 @@ pub struct StatisticsSetup {
 pub fn statistics(
     setup: &StatisticsSetup,
     load: impl Fn(PairId) -> Result<Arc<Sample>, TaskError>,
-    predict: &dyn Fn(Generating<'_>, &[GenerateInput<'_>], &JobCx) -> Result<Vec<Prediction>, TaskError>,
+    predict: impl Fn(Generating<'_>, &[GenerateInput<'_>], &JobCx) -> Result<Vec<Prediction>, TaskError>,
     cx: &JobCx,
 ) -> Result<(ShiftStatistics, Vec<TaskError>), TaskError> {
     let generating = setup.recipe.generating()?;

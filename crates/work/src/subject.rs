@@ -4,6 +4,7 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use super::recipe::Recipe;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 
 /// Fewest and most seeds of a mean.
@@ -38,6 +39,36 @@ pub struct RecipeChange {
     pub seed: Option<u64>,
     /// Mapping to meters.
     pub shift: Option<Mapping>,
+}
+
+/// Origin of a subject's imprint.
+#[derive(Clone, Debug, PartialEq)]
+pub enum MadeFrom {
+    /// The measurement.
+    Measurement,
+    /// The picture of another program's prediction.
+    Picture,
+    /// A prediction by this recipe.
+    Prediction(Recipe),
+    /// The mean of the predictions by these recipes, which differ in their seeds alone.
+    Mean(Vec<Recipe>),
+}
+
+impl RecipeChange {
+    /// Recipe that it makes of the one that settings or options give; `given` gives that, with the generator that is
+    /// named.
+    ///
+    /// # Errors
+    /// The errors of `given`, such as that there is no such generator.
+    fn of<E>(&self, given: impl FnOnce(Option<&str>) -> Result<Recipe, E>) -> Result<Recipe, E> {
+        let mut recipe = given(self.bundle.as_deref())?;
+        if let Some((_, config)) = &mut recipe.generator {
+            config.steps = self.steps.unwrap_or(config.steps);
+            config.seed = self.seed.unwrap_or(config.seed);
+        }
+        recipe.shift = self.shift.map_or(recipe.shift, Mapping::mode);
+        Ok(recipe)
+    }
 }
 
 /// A way to meters that needs no statistics of a data set.
@@ -87,6 +118,20 @@ impl Subject {
             Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
             Self::Measured | Self::Stored => None,
         }
+    }
+
+    /// Origin of the subject's imprint; `given` gives the recipe of predictions by the settings or options, with the
+    /// generator that is named, else theirs.
+    ///
+    /// # Errors
+    /// The errors of `given`, such as that there is no such generator.
+    pub fn made_from<E>(&self, given: impl FnOnce(Option<&str>) -> Result<Recipe, E>) -> Result<MadeFrom, E> {
+        Ok(match self {
+            Self::Measured => MadeFrom::Measurement,
+            Self::Stored => MadeFrom::Picture,
+            Self::Predicted(change) => MadeFrom::Prediction(change.of(given)?),
+            Self::Mean(change, count) => MadeFrom::Mean(change.of(given)?.with_seeds(*count)),
+        })
     }
 
     /// Name for people.
@@ -202,6 +247,21 @@ mod tests {
             assert!(!subject.label().is_empty());
         }
         assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(RecipeChange::default(), 8));
+    }
+
+    #[test]
+    fn a_subject_is_made_from_what_is_given_with_its_changes() {
+        let given = |named: Option<&str>| match named {
+            Some(_) => Err("there is no such generator"),
+            None => Ok(Recipe { shift: ShiftMode::PaperShift, ..Recipe::default() }),
+        };
+        let of = |text: &str| text.parse::<Subject>().unwrap().made_from(given);
+        assert_eq!((of("measured"), of("stored")), (Ok(MadeFrom::Measurement), Ok(MadeFrom::Picture)));
+        let Ok(MadeFrom::Prediction(shown)) = of("prediction") else { panic!("{:?}", of("prediction")) };
+        assert_eq!(shown.shift, ShiftMode::PaperShift);
+        let Ok(MadeFrom::Prediction(raw)) = of("prediction:shift=raw") else { panic!("a prediction") };
+        assert_eq!(raw, Recipe { shift: ShiftMode::Raw, ..shown });
+        assert_eq!(of("mean:bundle=other"), Err("there is no such generator"));
     }
 
     #[test]

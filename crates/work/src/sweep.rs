@@ -155,7 +155,7 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         for pair in read {
             let usable = pair.and_then(|pair| {
                 let tool = tools.entry(pair.tool.clone());
-                let tool = tool.or_insert_with(|| load_tool(dataset, &pair.tool).map(|(tool, _)| Arc::new(tool)));
+                let tool = tool.or_insert_with(|| load_tool(dataset, &pair.tool).map(|loaded| Arc::new(loaded.model)));
                 let why =
                     |err: &TaskError| Remark { name: pair.name.clone(), why: format!("{}: {}", err.what, err.why) };
                 let tool = tool.as_ref().map_err(why)?.clone();

@@ -148,13 +148,22 @@ pub fn named_tool(name: &str, mesh: TriMesh) -> Result<NamedTool, TaskError> {
     Ok(NamedTool { name: name.to_owned(), model })
 }
 
+/// The CAD model of a tool as its data set has it.
+#[derive(Clone, Debug)]
+pub struct LoadedTool {
+    /// The model, ready for registration.
+    pub model: ToolModel,
+    /// Oddities of its file.
+    pub notes: Vec<Problem>,
+}
+
 /// A tool of a data set, with what is odd about its file.
 ///
 /// # Errors
 /// As [`tool_file`] and [`named_tool`].
-pub fn load_tool(dataset: &Dataset, name: &str) -> Result<(ToolModel, Vec<Problem>), TaskError> {
+pub fn load_tool(dataset: &Dataset, name: &str) -> Result<LoadedTool, TaskError> {
     let ToolFile { mesh, notes } = tool_file(dataset, name)?;
-    Ok((named_tool(name, mesh)?.model, notes))
+    Ok(LoadedTool { model: named_tool(name, mesh)?.model, notes })
 }
 
 /// The CAD models of a data set, each read once. One that is not there, or cannot be used, is not looked for again.
@@ -174,9 +183,9 @@ impl<'a> Tools<'a> {
     /// The model of a tool, read when it is first asked for.
     pub fn get(&mut self, name: &str) -> Option<&ToolModel> {
         if !self.models.contains_key(name) {
-            let model = load_tool(self.dataset, name).ok().map(|(model, mut odd)| {
-                self.notes.append(&mut odd);
-                model
+            let model = load_tool(self.dataset, name).ok().map(|mut loaded| {
+                self.notes.append(&mut loaded.notes);
+                loaded.model
             });
             self.models.insert(name.to_owned(), model);
         }

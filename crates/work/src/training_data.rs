@@ -8,8 +8,9 @@ use serde_json::{Value, json};
 
 use super::error::{Remark, TaskError};
 use super::job::JobCx;
-use super::labels::{Labels, MaskPlace, PairLabels, Review};
-use super::mask::{MaskChoice, MaskInputs, MaskRecipe, without_model};
+use super::labels::{Labels, PairLabels, Review};
+use super::mask::{MaskChoice, MaskInputs, MaskRecipe, contact_mask};
+use super::recipe::no_mask_model;
 use super::tool::Tools;
 use super::usable::unusable;
 use crate::io::dataset::Dataset;
@@ -364,12 +365,15 @@ fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<
 /// The contact by hand, else near the CAD model at the true pose.
 fn contact(sample: &Sample, pad: PadId, tool: Option<&ToolModel>, labels: &PairLabels) -> Option<(Mask, Known)> {
     let imprint = &sample.pad(pad)?.depth()?.imprint;
-    if let Some(hand) = labels.drawn(&MaskPlace::measured(pad), imprint) {
-        return Some(((*hand.mask).clone(), Known::Hand));
-    }
     let recipe = MaskRecipe::Cad(MaskChoice::default().cad_distance_m.into());
-    let found = without_model(&recipe, imprint, pad, MaskInputs::measured(sample, tool, None)).ok()?;
-    (found.basis == MaskBasis::Source).then_some((found.mask, Known::Cad))
+    let inputs = MaskInputs::measured(sample, tool, Some(labels));
+    let found = contact_mask(&recipe, imprint, pad, inputs, |_| Err(no_mask_model())).ok()?;
+    let known = match found.basis {
+        MaskBasis::Hand => Known::Hand,
+        MaskBasis::Source => Known::Cad,
+        MaskBasis::Depth(_) | MaskBasis::Flat => return None,
+    };
+    Some((found.mask, known))
 }
 
 /// Holes are filled from their borders inward with the mean of what is beside them.

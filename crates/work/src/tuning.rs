@@ -16,7 +16,7 @@ use crate::io::folders;
 #[cfg(feature = "tune")]
 pub(super) use kept::KeptRun;
 #[cfg(feature = "tune")]
-pub(super) use runs::{Look, Runs, steps_within};
+pub(super) use runs::{Look, RunName, Runs, TuningTask, steps_within};
 
 /// Length of the tuning of networks.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

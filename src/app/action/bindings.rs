@@ -69,7 +69,7 @@ impl Bindings {
         Action::iter().find(|action| self.all(*action).contains(&shortcut))
     }
 
-    /// Whether a person chose the keys of an action, or took one from it.
+    /// True where a person chose the keys of an action, or took one from it.
     pub(crate) fn is_changed(&self, action: Action) -> bool {
         self.all(action) != action.defaults()
     }
@@ -106,7 +106,7 @@ impl Bindings {
         self.tidy();
     }
 
-    /// What says the same as the defaults is not kept.
+    /// A binding that says the same as the defaults is not kept.
     fn tidy(&mut self) {
         let as_before: Vec<Action> = self.own.keys().copied().filter(|action| !self.is_changed(*action)).collect();
         for action in as_before {
@@ -114,7 +114,7 @@ impl Bindings {
         }
     }
 
-    /// What a file says, and what of it is not used, in words.
+    /// The bindings that a file says, and what of it is not used, in words.
     pub fn read(value: &Value) -> (Self, Vec<String>) {
         let (mut bindings, mut refused) = (Self::default(), Vec::new());
         let Value::Object(entries) = value else {

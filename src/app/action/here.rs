@@ -1,11 +1,10 @@
-//! What belongs to the place where a person is: the workspace on screen and the pane under the pointer.
+//! The actions that belong to the place where a person is: the workspace on screen and the pane under the pointer.
 
-use super::super::pane::{Kind, Pane};
-use super::super::settings::state::Workspace;
+use super::super::pane::{Kind, Pane, Workspace};
 use super::{Action, Group};
 
 impl Action {
-    /// Whether it is about a workspace, or about a pane in it.
+    /// True where it is about a workspace, or about a pane in it.
     pub(crate) fn is_of(self, workspace: Workspace, pane: Option<Pane>) -> bool {
         pane.is_some_and(|pane| self.is_of_pane(pane)) || self.is_of_workspace(workspace)
     }
@@ -52,7 +51,7 @@ impl Action {
         }
     }
 
-    /// Whether it is about the 3D views.
+    /// True where it is about the 3D views.
     fn is_of_scene(self) -> bool {
         use Action as A;
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::Section)
@@ -63,7 +62,7 @@ impl Action {
             || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 
-    /// Whether it is about the steps of a registration.
+    /// True where it is about the steps of a registration.
     fn is_of_steps(self) -> bool {
         use Action as A;
         matches!(self, A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep)

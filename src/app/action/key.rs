@@ -87,7 +87,7 @@ pub enum Key {
 }
 
 impl Key {
-    /// What is printed on it.
+    /// The letter or word that is printed on it.
     pub fn text(self) -> String {
         let name = format!("{self:?}");
         match self {
@@ -115,17 +115,17 @@ impl Key {
         }
     }
 
-    /// Whether it is typed with Shift on most keyboards, so that Shift says nothing about the shortcut.
+    /// True where it is typed with Shift on most keyboards, so that Shift says nothing about the shortcut.
     pub(crate) fn is_shifted(self) -> bool {
         matches!(self, Self::Questionmark | Self::Exclamationmark)
     }
 
-    /// Whether it writes nothing, so that it means its action while text is being typed.
+    /// True where it writes nothing, so that it means its action while text is being typed.
     pub(crate) fn is_function(self) -> bool {
         (Self::F1..=Self::F12).contains(&self)
     }
 
-    /// Whether a text box has its own use for it together with Ctrl: undo, copy, whole words.
+    /// True where a text box has its own use for it together with Ctrl: undo, copy, whole words.
     pub(crate) fn is_for_text(self) -> bool {
         use Key as K;
         let moves = (K::ArrowLeft..=K::ArrowDown).contains(&self);
@@ -137,11 +137,11 @@ impl Key {
 /// A key with its modifiers. Ctrl stands for Cmd on a Mac.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct Shortcut {
-    /// Whether Ctrl (Cmd) is down.
+    /// True where Ctrl (Cmd) is down.
     pub ctrl: bool,
-    /// Whether Shift is down.
+    /// True where Shift is down.
     pub shift: bool,
-    /// Whether Alt is down.
+    /// True where Alt is down.
     pub alt: bool,
     /// The key.
     pub key: Key,
@@ -179,7 +179,7 @@ impl FromStr for Shortcut {
 }
 
 impl Shortcut {
-    /// The same without Shift where the key itself is typed with it.
+    /// The shortcut without Shift where the key itself is typed with it.
     #[must_use]
     pub(crate) fn plainly(self) -> Self {
         match self.key {

@@ -1,13 +1,15 @@
-//! The command that does in a shell what a pane shows: [`State::equivalent`].
+//! The command that does in a shell what a pane shows: [`equivalent`].
 
-use super::super::adapt::state::AdaptPairs;
 use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode};
-use super::super::library::state::Place;
 use super::super::pane::{Kind, Pane};
-use super::super::settings::state::ColorMap;
 use super::super::state::State;
+use super::super::state::adapt::AdaptPairs;
+use super::super::state::library::Place;
+use super::super::state::settings::ColorMap;
+use super::super::{adapt, dial, recipe, results};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
@@ -17,162 +19,178 @@ fn command(verb: &str) -> Words {
     Words::default().word("touch2touch").word(verb)
 }
 
-impl State {
-    /// The words of the command that does what a pane shows, with the settings in force; `None` for panes that only choose.
-    /// `error_m` is half the range of the colors of errors, meters.
-    pub fn equivalent_words(&self, pane: Pane, error_m: f32) -> Option<Vec<String>> {
-        let open = self.library.open.as_ref()?;
-        let path = match &open.place {
-            Place::Demo => "demo".to_owned(),
-            // Never taken for an option.
-            Place::Path(path) if path.to_string_lossy().starts_with('-') => format!("./{}", path.display()),
-            Place::Path(path) => path.display().to_string(),
-        };
-        let verb = |verb: &str| command(verb).word(&path);
-        let of_pair = |name: &str| Some(verb(name).option("--pair", self.entry()?.name.clone()));
-        let finger = self.finger_name(self.selection.finger).into_owned();
-        let side = pane.side().unwrap_or(self.inspect.source);
-        let drawn = || self.recipe_shown(ImprintSource::Predicted).words(Stage::Imprint);
-        let posed = |words: Words, side: ImprintSource| {
-            words.option("--imprint", side.key()).then(self.recipe_shown(side).until(Stage::Pose).words(Stage::Pose))
-        };
-        let words = match (pane, pane.kind()) {
-            (Pane::Browser | Pane::Log, _) => verb("doctor"),
-            (_, Kind::Color | Kind::Imprint(_) | Kind::Error) => {
-                let shown = pane.in_figure()?;
-                let both = self.selection.both_fingers;
-                let range = self.settings.range;
-                let words = verb("figure")
-                    .option("--pairs", self.entry()?.name.clone())
-                    .option("--panes", shown.key())
-                    .option("--finger", if both { "both" } else { &finger })
-                    .option("--out", pane.picture_name(true))
-                    .option("--range", format!("{}..{}", range.min_m * 1e3, range.max_m * 1e3))
-                    .option_if("--error-range-mm", (pane == Pane::Error).then_some(error_m * 1e3))
-                    .word_if(self.settings.color_map == ColorMap::Gray, "--gray")
-                    .word_if(!self.settings.footprint_visible, "--no-window");
-                if shown.is_predicted() { words.then(drawn()) } else { words }
-            }
-            (_, Kind::Scene(side)) => posed(of_pair("export")?.option("--out", "exported"), side),
-            (Pane::TimeMachine | Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
-            (Pane::BasinMap, _) => posed(of_pair("basin")?, side),
-            (Pane::Metrics | Pane::Poses, _) => {
-                let recipe = self.recipe_shown(ImprintSource::Predicted);
-                of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))
-            }
-            (Pane::Generate, _) => {
-                of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
-            }
-            (Pane::Seeds, _) => {
-                let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
-                words.option("--seeds", self.seeds.count).then(drawn())
-            }
-            (Pane::Compare, _) => {
-                let versus = self.versus();
-                of_pair("compare")?
-                    .option("--a", self.placed(&versus.a))
-                    .option("--b", self.placed(&versus.b))
-                    .then(self.recipe_shown(ImprintSource::Predicted).words(Stage::Pose))
-            }
-            (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
-            (Pane::Masks, _) => of_pair("label")?,
-            (Pane::Results | Pane::Table | Pane::Scatter, _) => {
-                let mut words = verb("evaluate");
-                for (bundle, _) in self.evaluated().filter(|(_, chosen)| *chosen) {
-                    words = words.option("--bundle", bundle.origin.path().display());
-                }
-                // Each bundle draws with its own choices.
-                let recipe = Recipe { generator: None, ..self.in_force(ImprintSource::Predicted) };
-                words
-                    .option_if("--grasps", self.table.grasps_per_tool)
-                    .word_if(self.table.published, "--paper")
-                    .then(recipe.words(Stage::Pose))
-            }
-            (Pane::Dial, _) => self.dial_words(verb("sweep"))?,
-            (Pane::Adapt, _) => {
-                let setup = self.adapt_setup()?;
-                let words = verb("adapt").option("--out", "fitted");
-                let words = words.option_if("--tune", self.adapt.tune.then_some(self.adapt.steps));
-                let words = match self.adapt.pairs {
-                    AdaptPairs::All => words,
-                    AdaptPairs::Done | AdaptPairs::Listed => words.option("--pairs", self.names(setup.pairs)?),
-                };
-                // The fit is of what the exact inverse gives, and of no hand.
-                words.then(Recipe { shift: ShiftMode::default(), ..setup.recipe.clone() }.words(Stage::Pose))
-            }
-            (Pane::Train, _) => self.train_words(command("masks").word("train").word(&path)),
-            _ => return None,
-        };
-        Some(words.list())
-    }
+/// A start as `--start` reads it: degrees and twice millimeters.
+fn start_text(start: PlanarPose) -> String {
+    let degrees = read_as(start.theta_rad, start.theta_rad.to_degrees(), f64::to_radians);
+    let [y_mm, z_mm] = [start.y_m, start.z_m].map(|length_m| read_as(length_m, length_m * 1e3, |mm| mm * 1e-3));
+    format!("{degrees},{y_mm},{z_mm}")
+}
 
-    fn dial_words(&self, words: Words) -> Option<Words> {
-        let dial = &self.dial;
-        let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
-        let values: Vec<String> = values.into_iter().map(Setting::key).collect();
-        let words = words.option("--dial", dial.dial.key()).option("--values", values.join(","));
-        let words = match dial.pairs {
-            DialPairs::All => words,
-            DialPairs::Spread(count) => words.option("--pairs", count),
-            DialPairs::Listed => words.option("--only", self.names(self.dial_pairs())?),
-        };
-        Some(words.word_if(!dial.predictions, "--measured-only").then(self.dial_recipe().words(Stage::Pose)))
-    }
+/// A number at or beside `near` that is read as exactly this value, a short one first; `near` where there is none.
+fn read_as(value: f64, near: f64, read: impl Fn(f64) -> f64) -> f64 {
+    let short = (near * 1e9).round() / 1e9;
+    [short, near, near.next_up(), near.next_down()].into_iter().find(|n| read(*n) == value).unwrap_or(near)
+}
 
-    fn train_words(&self, words: Words) -> Words {
-        let form = self.train.form;
-        let words = words
-            .option_if("--steps", form.by_steps.then_some(form.steps))
-            .option_if("--minutes", (!form.by_steps).then_some(form.minutes))
-            .option("--held-out", form.choice.held_out_percent)
-            .option("--seed", form.choice.seed)
-            .word_if(form.choice.test_in_train, "--test-in-train");
-        match (&self.settings.mask.bundle, self.bundle(BundleKind::Mask)) {
-            (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
-            _ => words,
+/// The words of the command that does what a pane shows, with the settings in force; `None` for panes that only choose.
+/// `error_m` is half the range of the colors of errors, meters.
+pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<String>> {
+    let open = state.library.open.as_ref()?;
+    let path = match &open.place {
+        Place::Demo => "demo".to_owned(),
+        // Never taken for an option.
+        Place::Path(path) if path.to_string_lossy().starts_with('-') => format!("./{}", path.display()),
+        Place::Path(path) => path.display().to_string(),
+    };
+    let verb = |verb: &str| command(verb).word(&path);
+    let of_pair = |name: &str| Some(verb(name).option("--pair", state.entry()?.name.clone()));
+    let finger = state.finger_name(state.selection.finger).into_owned();
+    let side = pane.side().unwrap_or(state.inspect.source);
+    let drawn = || recipe_shown(state, ImprintSource::Predicted).words(Stage::Imprint);
+    let posed = |words: Words, side: ImprintSource| {
+        words.option("--imprint", side.key()).then(recipe_shown(state, side).until(Stage::Pose).words(Stage::Pose))
+    };
+    let words = match (pane, pane.kind()) {
+        (Pane::Browser | Pane::Log, _) => verb("doctor"),
+        (_, Kind::Color | Kind::Imprint(_) | Kind::Error) => {
+            let shown = pane.in_figure()?;
+            let both = state.selection.both_fingers;
+            let range = state.settings.range;
+            let words = verb("figure")
+                .option("--pairs", state.entry()?.name.clone())
+                .option("--panes", shown.key())
+                .option("--finger", if both { "both" } else { &finger })
+                .option("--out", pane.picture_name(true))
+                .option("--range", format!("{}..{}", range.min_m * 1e3, range.max_m * 1e3))
+                .option_if("--error-range-mm", (pane == Pane::Error).then_some(error_m * 1e3))
+                .word_if(state.settings.color_map == ColorMap::Gray, "--gray")
+                .word_if(!state.settings.footprint_visible, "--no-window");
+            if shown.is_predicted() { words.then(drawn()) } else { words }
         }
-    }
-
-    /// [`Self::equivalent_words`] as one line for a shell.
-    pub fn equivalent(&self, pane: Pane, error_m: f32) -> Option<String> {
-        let words: Vec<String> = self.equivalent_words(pane, error_m)?.iter().map(|word| quoted(word)).collect();
-        Some(words.join(" "))
-    }
-
-    /// A subject with the folder of its bundle in place of the bundle's name.
-    fn placed(&self, subject: &Subject) -> Subject {
-        let placed = |wish: &RecipeChange| {
-            let bundle = wish.bundle.as_ref().map(|name| {
-                let found = self.library.bundles.iter().find(|bundle| bundle.name == *name);
-                found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
-            });
-            RecipeChange { bundle, ..wish.clone() }
-        };
-        match subject {
-            Subject::Predicted(wish) => Subject::Predicted(placed(wish)),
-            Subject::Mean(wish, seeds) => Subject::Mean(placed(wish), *seeds),
-            other => other.clone(),
+        (_, Kind::Scene(side)) => posed(of_pair("export")?.option("--out", "exported"), side),
+        (Pane::TimeMachine, _) => {
+            let start = state.inspect.start.map(|start| start_text(start.get()));
+            posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
         }
-    }
-
-    /// The recipe of what is shown of an imprint: by the prediction on screen, or the one that would be made.
-    fn recipe_shown(&self, imprint: ImprintSource) -> Recipe {
-        let finger = self.selection.finger;
-        let shown = self.chosen(finger).cloned().or_else(|| self.recipe(self.touch_key(finger)?));
-        let shown = shown.and_then(|key| Some((self.library.bundle(&key.bundle)?.clone(), key)));
-        let recipe = self.in_force(imprint);
-        match shown {
-            Some((bundle, key)) => {
-                Recipe { generator: Some((bundle.into(), key.config())), engine: key.runtime, ..recipe }
+        (Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
+        (Pane::BasinMap, _) => {
+            let plane: &'static str = state.inspect.plane.into();
+            posed(of_pair("basin")?, side).option("--plane", plane)
+        }
+        (Pane::Metrics | Pane::Poses, _) => {
+            let recipe = recipe_shown(state, ImprintSource::Predicted);
+            of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))
+        }
+        (Pane::Generate, _) => {
+            of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
+        }
+        (Pane::Seeds, _) => {
+            let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
+            words.option("--seeds", state.seeds.count).then(drawn())
+        }
+        (Pane::Compare, _) => {
+            let versus = state.settings.compared();
+            of_pair("compare")?
+                .option("--a", placed(state, &versus.a))
+                .option("--b", placed(state, &versus.b))
+                .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
+        }
+        (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
+        (Pane::Masks, _) => of_pair("label")?,
+        (Pane::Results | Pane::Table | Pane::Scatter, _) => {
+            let mut words = verb("evaluate");
+            for (bundle, _) in results::evaluated(state).filter(|(_, chosen)| *chosen) {
+                words = words.option("--bundle", bundle.origin.path().display());
             }
-            None => Recipe { generator: None, ..recipe },
+            // Each bundle draws with its own choices.
+            let recipe = Recipe { generator: None, ..recipe::in_force(state, ImprintSource::Predicted) };
+            words
+                .option_if("--grasps", state.table.grasps_per_tool)
+                .word_if(state.table.published, "--paper")
+                .then(recipe.words(Stage::Pose))
         }
-    }
+        (Pane::Dial, _) => dial_words(state, verb("sweep"))?,
+        (Pane::Adapt, _) => {
+            let setup = adapt::setup(state)?;
+            let words = verb("adapt").option("--out", "fitted");
+            let words = words.option_if("--tune", state.adapt.tune.then_some(state.adapt.steps));
+            let words = match state.adapt.pairs {
+                AdaptPairs::All => words,
+                AdaptPairs::Done | AdaptPairs::Listed => words.option("--pairs", names(state, setup.pairs)?),
+            };
+            // The fit is of what the exact inverse gives, and of no hand.
+            words.then(Recipe { shift: ShiftMode::default(), ..setup.recipe.clone() }.words(Stage::Pose))
+        }
+        (Pane::Train, _) => train_words(state, command("masks").word("train").word(&path)),
+        _ => return None,
+    };
+    Some(words.list())
+}
 
-    /// The names of these pairs, as one word; `None` where there are none.
-    fn names(&self, pairs: impl IntoIterator<Item = PairId>) -> Option<String> {
-        let all = &self.library.open.as_ref()?.source.index().pairs;
-        let names: Vec<&str> = pairs.into_iter().filter_map(|id| Some(all.get(id.0 as usize)?.name.as_str())).collect();
-        (!names.is_empty()).then(|| names.join(","))
+fn dial_words(state: &State, words: Words) -> Option<Words> {
+    let dial = &state.dial;
+    let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
+    let values: Vec<String> = values.into_iter().map(Setting::key).collect();
+    let words = words.option("--dial", dial.dial.key()).option("--values", values.join(","));
+    let words = match dial.pairs {
+        DialPairs::All => words,
+        DialPairs::Spread(count) => words.option("--pairs", count),
+        DialPairs::Listed => words.option("--only", names(state, dial::pairs(state))?),
+    };
+    Some(words.word_if(!dial.predictions, "--measured-only").then(dial::recipe(state).words(Stage::Pose)))
+}
+
+fn train_words(state: &State, words: Words) -> Words {
+    let form = state.train.form;
+    let words = words
+        .option_if("--steps", form.by_steps.then_some(form.steps))
+        .option_if("--minutes", (!form.by_steps).then_some(form.minutes))
+        .option("--held-out", form.choice.held_out_percent)
+        .option("--seed", form.choice.seed)
+        .word_if(form.choice.test_in_train, "--test-in-train");
+    match (&state.settings.mask.bundle, recipe::bundle(state, BundleKind::Mask)) {
+        (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
+        _ => words,
     }
+}
+
+/// [`equivalent_words`] as one line for a shell.
+pub fn equivalent(state: &State, pane: Pane, error_m: f32) -> Option<String> {
+    let words: Vec<String> = equivalent_words(state, pane, error_m)?.iter().map(|word| quoted(word)).collect();
+    Some(words.join(" "))
+}
+
+/// A subject with the folder of its bundle in place of the bundle's name.
+fn placed(state: &State, subject: &Subject) -> Subject {
+    let placed = |wish: &RecipeChange| {
+        let bundle = wish.bundle.as_ref().map(|name| {
+            let found = state.library.bundles.iter().find(|bundle| bundle.name == *name);
+            found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
+        });
+        RecipeChange { bundle, ..wish.clone() }
+    };
+    match subject {
+        Subject::Predicted(wish) => Subject::Predicted(placed(wish)),
+        Subject::Mean(wish, seeds) => Subject::Mean(placed(wish), *seeds),
+        other => other.clone(),
+    }
+}
+
+/// The recipe of what is shown of an imprint: by the prediction on screen, or the one that would be made.
+fn recipe_shown(state: &State, imprint: ImprintSource) -> Recipe {
+    let finger = state.selection.finger;
+    let shown = results::chosen(state, finger).cloned().or_else(|| recipe::prediction(state, state.touch_key(finger)?));
+    let shown = shown.and_then(|key| Some((state.library.bundle(&key.bundle)?.clone(), key)));
+    let recipe = recipe::in_force(state, imprint);
+    match shown {
+        Some((bundle, key)) => Recipe { generator: Some((bundle.into(), key.config)), engine: key.runtime, ..recipe },
+        None => Recipe { generator: None, ..recipe },
+    }
+}
+
+/// The names of these pairs, as one word; `None` where there are none.
+fn names(state: &State, pairs: impl IntoIterator<Item = PairId>) -> Option<String> {
+    let all = &state.library.open.as_ref()?.source.index().pairs;
+    let names: Vec<&str> = pairs.into_iter().filter_map(|id| Some(all.get(id.0 as usize)?.name.as_str())).collect();
+    (!names.is_empty()).then(|| names.join(","))
 }

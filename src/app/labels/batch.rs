@@ -3,10 +3,10 @@
 use std::sync::Arc;
 
 use super::super::effect::{Access, Effect, Errand};
-use super::super::services::DataSource;
+use super::super::source::DataSource;
 use super::super::state::State;
-use super::super::tasks;
-use super::super::tasks::state::{Level, TaskKind};
+use super::super::state::tasks::{Level, TaskKind};
+use super::super::{recipe, results, tasks};
 use super::end_stroke;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::error::TaskError;
@@ -15,33 +15,11 @@ use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::propose::{self, Batch, BatchSetup, ProposeSetup};
 
-impl State {
-    /// Whether masks can be proposed for the listed pairs.
-    pub(crate) fn can_propose_all(&self) -> bool {
-        let predicts = self.worked_on(self.selection.finger) == ImprintSource::Predicted;
-        let has_model = !predicts || self.bundle(BundleKind::Generator).is_ok();
-        !self.library.order.is_empty() && has_model && self.running(TaskKind::Propose).is_none()
-    }
-
-    /// What proposing masks for the listed pairs does.
-    fn batch_setup(&self) -> BatchSetup {
-        let imprint = self.worked_on(self.selection.finger);
-        let mask = &self.settings.mask;
-        let recipe = self.in_force(imprint);
-        BatchSetup {
-            propose: ProposeSetup { source: mask.proposal, recipe, pose: None, carry_from: None },
-            pairs: self.library.order.clone(),
-            over_drawn: mask.over_drawn,
-            person: self.known_person(),
-        }
-    }
-}
-
 /// Starts it.
 pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
-    let Some(open) = state.library.open.as_ref().filter(|_| state.can_propose_all()) else { return };
-    let (source, setup) = (open.source.clone(), state.batch_setup());
+    let Some(open) = state.library.open.as_ref().filter(|_| can_propose_all(state)) else { return };
+    let (source, setup) = (open.source.clone(), batch_setup(state));
     let title = format!("Propose masks for {} pairs", setup.pairs.len());
     tasks::start(state, title, ProposeAll { source, setup }, effects);
 }
@@ -109,5 +87,25 @@ fn reread(state: &mut State, names: &[String]) {
         }
         doc.reread(name);
         state.history.forget(name);
+    }
+}
+
+/// True where masks can be proposed for the listed pairs.
+pub(crate) fn can_propose_all(state: &State) -> bool {
+    let predicts = results::worked_on(state, state.selection.finger) == ImprintSource::Predicted;
+    let has_model = !predicts || recipe::bundle(state, BundleKind::Generator).is_ok();
+    !state.library.order.is_empty() && has_model && state.tasks.of_kind(TaskKind::Propose).is_none()
+}
+
+/// The setup of proposing masks for the listed pairs.
+fn batch_setup(state: &State) -> BatchSetup {
+    let imprint = results::worked_on(state, state.selection.finger);
+    let mask = &state.settings.mask;
+    let recipe = recipe::in_force(state, imprint);
+    BatchSetup {
+        propose: ProposeSetup { source: mask.proposal, recipe, pose: None, carry_from: None },
+        pairs: state.library.order.clone(),
+        over_drawn: mask.over_drawn,
+        person: state.settings.known_labeler(),
     }
 }

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use super::super::keys::{CloudKey, ImprintSource, PoseKey, Revision};
+use super::super::results;
 use super::super::state::State;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::PadId;
@@ -15,7 +16,7 @@ use touch2touch_work::pose::PoseResult;
 pub struct Ghost<'a> {
     /// The finger whose mask was changed.
     pub finger: PadId,
-    /// Which change of the document it is of.
+    /// The change of the document that it is of.
     pub revision: Revision,
     /// The mask before.
     pub mask: &'a Arc<Mask>,
@@ -25,23 +26,21 @@ pub struct Ghost<'a> {
     pub clouds: Option<(&'a CloudKey, &'a Arc<Clouds>)>,
 }
 
-impl State {
-    /// What the last change of a mask of an imprint of the selected pair started from, until the next stroke; `None` where
-    /// there was none, or ghosts are switched off.
-    pub fn ghost(&self, source: ImprintSource) -> Option<Ghost<'_>> {
-        let changed = self.document.changed.as_ref()?;
-        let here = changed.pair == self.pair_name() && changed.source == source && self.document.stroke.is_none();
-        let mask = changed.mask.as_ref().filter(|_| here && self.settings.ghosts)?;
-        let key = changed.before.as_ref();
-        let clouds = key.and_then(|key| Some((&key.cloud, self.results.clouds.get(&key.cloud)?)));
-        let (finger, revision) = (changed.finger, changed.revision);
-        Some(Ghost { finger, revision, mask, pose: key.and_then(|key| self.results.poses.get(key)), clouds })
-    }
+/// The start of the last change of a mask of an imprint of the selected pair, until the next stroke; `None` where
+/// there was none, or ghosts are switched off.
+pub fn ghost(state: &State, source: ImprintSource) -> Option<Ghost<'_>> {
+    let changed = state.document.changed.as_ref()?;
+    let here = changed.pair == state.pair_name() && changed.source == source && state.document.stroke.is_none();
+    let mask = changed.mask.as_ref().filter(|_| here && state.settings.ghosts)?;
+    let key = changed.before.as_ref();
+    let clouds = key.and_then(|key| Some((&key.cloud, state.results.clouds.get(&key.cloud)?)));
+    let (finger, revision) = (changed.finger, changed.revision);
+    Some(Ghost { finger, revision, mask, pose: key.and_then(|key| state.results.poses.get(key)), clouds })
+}
 
-    /// The recipe of the pose that is shown of an imprint.
-    pub(super) fn shown_pose_key(&self, source: ImprintSource) -> Option<PoseKey> {
-        self.pose(source).shown()?;
-        let now = self.pose_key(source).ok().flatten().filter(|key| self.results.poses.contains(key));
-        now.or_else(|| self.latest(source)?.pose.clone())
-    }
+/// The recipe of the pose that is shown of an imprint.
+pub(crate) fn shown_pose_key(state: &State, source: ImprintSource) -> Option<PoseKey> {
+    results::pose(state, source).shown()?;
+    let now = results::pose_key(state, source).ok().flatten().filter(|key| state.results.poses.contains(key));
+    now.or_else(|| results::latest(state, source)?.pose.clone())
 }

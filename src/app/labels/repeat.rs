@@ -4,8 +4,8 @@
 //! studio has to know. When it is done and left, it is forgotten, and read again as it was.
 
 use super::super::state::State;
+use super::super::state::labels::Repeating;
 use super::Review;
-use super::state::Repeating;
 use touch2touch_core::dataset::PairId;
 
 /// So many pairs are done between two that come back.
@@ -33,7 +33,7 @@ pub(in crate::app) fn next_repeat(state: &State, all_done: bool) -> Option<PairI
 /// Makes a pair one that nobody has drawn on, to be shown next.
 pub(in crate::app) fn begin_repeat(state: &mut State, pair: PairId) {
     let Some(name) = state.library.entry(pair).map(|entry| entry.name.clone()) else { return };
-    let person = state.person();
+    let person = state.settings.labeler();
     let doc = &mut state.document;
     let repeating = Repeating { person, review: doc.review(&name), note: doc.note(&name).to_owned() };
     doc.forget(&name);

@@ -2,17 +2,17 @@
 
 use std::path::PathBuf;
 
-use super::state::Question;
+use super::super::state::labels::Question;
 use super::{end_stroke, save_again};
 use crate::app::effect::{Effect, NotSaved};
 use crate::app::keys::Revision;
 use crate::app::state::State;
-use crate::app::tasks::state::Level;
-use crate::app::view::state::UiRequest;
+use crate::app::state::tasks::Level;
+use crate::app::state::view::UiRequest;
 use touch2touch_work::error::TaskErrorKind;
 use touch2touch_work::labels::{Operation, Unsaved};
 
-/// What can happen to labels that are not on the disk.
+/// A command to labels that are not on the disk.
 #[derive(Clone, Debug)]
 pub enum UnsavedCommand {
     /// The window is to be closed: at once where all is saved, else once it is or the person says.
@@ -62,7 +62,7 @@ fn retry(state: &mut State, effects: &mut Vec<Effect>) {
 
 fn elsewhere(state: &mut State, folder: PathBuf, effects: &mut Vec<Effect>) {
     end_stroke(state, effects);
-    let unsaved = state.unsaved();
+    let unsaved = unsaved(state);
     let revisions: Vec<(String, Revision)> =
         unsaved.iter().filter_map(|one| Some((one.name.clone(), *state.document.asked.get(&one.name)?))).collect();
     if let Some(open) = state.library.open.as_ref().filter(|_| !unsaved.is_empty()) {
@@ -138,15 +138,13 @@ pub(in crate::app) fn kept(
     close_when_saved(state, effects);
 }
 
-impl State {
-    /// The labels that are not on the disk, as they are now.
-    pub fn unsaved(&self) -> Vec<Unsaved> {
-        let one = |name: &String| {
-            let repeat = self.document.repeats.get(name).map(|repeating| repeating.person.clone());
-            let person = repeat.clone().or_else(|| self.known_person());
-            let deed = Operation { person, ..Operation::named("saved elsewhere") };
-            Some(Unsaved { name: name.clone(), labels: self.document.finished(name)?, deed, repeat })
-        };
-        self.document.unsaved.iter().filter_map(one).collect()
-    }
+/// The labels that are not on the disk, as they are now.
+pub fn unsaved(state: &State) -> Vec<Unsaved> {
+    let one = |name: &String| {
+        let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
+        let person = repeat.clone().or_else(|| state.settings.known_labeler());
+        let deed = Operation { person, ..Operation::named("saved elsewhere") };
+        Some(Unsaved { name: name.clone(), labels: state.document.finished(name)?, deed, repeat })
+    };
+    state.document.unsaved.iter().filter_map(one).collect()
 }

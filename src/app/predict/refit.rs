@@ -5,10 +5,10 @@ use std::sync::Arc;
 
 use super::super::effect::{Access, Effect, Errand};
 use super::super::keys::{ImprintSource, ShiftMode};
-use super::super::services::DataSource;
+use super::super::source::DataSource;
 use super::super::state::State;
-use super::super::tasks::state::TaskKind;
-use super::super::{settings, tasks};
+use super::super::state::tasks::TaskKind;
+use super::super::{recipe, results, settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::error::TaskError;
@@ -28,12 +28,12 @@ pub(super) fn start(state: &mut State, effects: &mut Vec<Effect>) {
     if state.tasks.running.values().any(|task| task.kind == TaskKind::Refit && !task.cancelling) {
         return;
     }
-    let ready = state.can_generate().and_then(|()| state.bundle(BundleKind::Generator));
+    let ready = results::can_generate(state).and_then(|()| recipe::bundle(state, BundleKind::Generator));
     if let Err(absent) = ready {
         return state.log.error(&TaskError::new(TITLE, absent.text().trim_end_matches('.')));
     }
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-    let recipe = state.in_force(ImprintSource::Predicted);
+    let recipe = recipe::in_force(state, ImprintSource::Predicted);
     tasks::start(state, format!("{TITLE} of {}", source.title()), Refit { recipe, source }, effects);
 }
 
@@ -60,7 +60,7 @@ impl Errand for Refit {
         let predict = |by: Generating<'_>, inputs: &[GenerateInput<'_>], cx: &JobCx| {
             access.services.predict(by.bundle, by.engine, by.config, inputs, cx)
         };
-        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), &predict, cx)?;
+        let (found, _) = statistics(&setup, |pair| source.load(pair).map(Arc::new), predict, cx)?;
         let saved = access.services.save_statistics(&found)?;
         Ok((found, saved))
     }

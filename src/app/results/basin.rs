@@ -2,34 +2,22 @@
 
 use std::sync::Arc;
 
+use super::super::jobs::{Job, Lane};
+use super::super::keys::BasinKey;
 use super::super::pane::Demand;
-use super::pose::{PoseKey, Registered};
-use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State};
-use touch2touch_core::align::basin::{Basin, Plane};
-use touch2touch_work::pose::basin;
-
-/// A basin map.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct BasinKey {
-    /// What is registered, and how.
-    pub pose: PoseKey,
-    /// Which starts are tried.
-    pub plane: Plane,
-}
+use super::super::results;
+use super::super::results::{Computes, Demands, Registered};
+use super::super::services::SharedServices;
+use super::super::state::{Absent, Lookup, State};
+use touch2touch_core::align::basin::Basin;
 
 impl Computes for BasinKey {
-    type Value = Basin;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Basin>> {
-        let Registered { clouds, tool, .. } = self.pose.find(state)?;
-        let (engine, plane) = (self.pose.engine, self.plane);
+        let Registered { clouds, tool, .. } = results::registered(state, &self.pose)?;
+        let (registration, plane) = (self.pose.registration, self.plane);
         Some(Job::new(Lane::Compute, "Basin map", move |cx| {
-            basin(&clouds.contact_points(), &tool.model, engine, plane, cx)
+            touch2touch_work::pose::basin(&clouds.contact_points(), &tool.model, registration, plane, cx)
         }))
-    }
-
-    fn bytes(found: &Basin) -> usize {
-        found.bytes()
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Basin>) {
@@ -39,33 +27,29 @@ impl Computes for BasinKey {
     }
 }
 
-impl State {
-    /// The recipe of the basin map; `Ok(None)` while something it is made from is missing.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub(crate) fn basin_key(&self) -> Result<Option<BasinKey>, Absent> {
-        let pose = self.pose_key(self.inspect.source)?;
-        Ok(pose.map(|pose| BasinKey { pose, plane: self.inspect.plane }))
-    }
-
-    /// The basin map.
-    pub fn basin(&self) -> Lookup<'_, Basin> {
-        if let failed @ Lookup::Failed(_) = self.tool() {
-            return failed.without();
-        }
-        let before = || {
-            let map = self.results.basins.get(self.latest(self.inspect.source)?.basin.as_ref()?)?;
-            (map.config.plane == self.inspect.plane).then_some(map)
-        };
-        self.look_or(self.basin_key(), before).value()
-    }
+/// The recipe of the basin map; `Ok(None)` while something it is made from is missing.
+///
+/// # Errors
+/// Why there can be none.
+pub(crate) fn basin_key(state: &State) -> Result<Option<BasinKey>, Absent> {
+    let pose = results::pose_key(state, state.inspect.source)?;
+    Ok(pose.map(|pose| BasinKey { pose, plane: state.inspect.plane }))
 }
 
-impl Demands<'_> {
-    pub(crate) fn basin(&mut self) {
-        if let (true, Ok(Some(key))) = (self.state.needs(Demand::Basin), self.state.basin_key()) {
-            self.ask(key);
-        }
+/// The basin map.
+pub fn basin(state: &State) -> Lookup<'_, Basin> {
+    if let failed @ Lookup::Failed(_) = results::tool(state) {
+        return failed.without();
+    }
+    let before = || {
+        let map = state.results.basins.get(results::latest(state, state.inspect.source)?.basin.as_ref()?)?;
+        (map.config.plane == state.inspect.plane).then_some(map)
+    };
+    state.look_or(basin_key(state), before).value()
+}
+
+pub(crate) fn want_basin(wants: &mut Demands<'_>) {
+    if let (true, Ok(Some(key))) = (wants.state.needs(Demand::Basin), basin_key(wants.state)) {
+        wants.ask(key);
     }
 }

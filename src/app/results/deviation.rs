@@ -1,42 +1,34 @@
 //! Signed distances between contact points and the registered model.
 
-use super::pose::{PoseKey, Registered};
-use super::{Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
-use touch2touch_work::deviation::{Deviation, deviation};
-
-/// The distances at a registered pose.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct DeviationKey(pub PoseKey);
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{DeviationKey, ImprintSource};
+use super::super::results;
+use super::super::results::{Computes, Demands, Registered};
+use super::super::services::SharedServices;
+use super::super::state::{Lookup, State};
+use touch2touch_work::deviation::Deviation;
 
 impl Computes for DeviationKey {
-    type Value = Deviation;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Deviation>> {
-        let Registered { clouds, tool, .. } = self.0.find(state)?;
+        let Registered { clouds, tool, .. } = results::registered(state, &self.0)?;
         let pose = state.results.poses.get(&self.0)?.grasp_from_object;
-        Some(Job::new(Lane::Compute, "Distances to the model", move |_| Ok(deviation(&clouds, &tool.model, pose))))
-    }
-
-    fn bytes(found: &Deviation) -> usize {
-        found.bytes()
+        Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
+            Ok(touch2touch_work::deviation::deviation(&clouds, &tool.model, pose))
+        }))
     }
 }
 
-impl State {
-    /// How far the contact points of an imprint lie from the model at its registered pose.
-    pub fn deviation(&self, source: ImprintSource) -> Lookup<'_, Deviation> {
-        let key = self.pose_key(source).map(|key| key.map(DeviationKey));
-        self.look_or(key, || None).value()
-    }
+/// The distances of the contact points of an imprint from the model at its registered pose.
+pub fn deviation(state: &State, source: ImprintSource) -> Lookup<'_, Deviation> {
+    let key = results::pose_key(state, source).map(|key| key.map(DeviationKey));
+    state.look_or(key, || None).value()
 }
 
-impl Demands<'_> {
-    /// The distances of an imprint, once its pose is there.
-    pub(crate) fn deviation(&mut self, source: ImprintSource) {
-        let state = self.state;
-        let Ok(Some(pose)) = state.pose_key(source) else { return };
-        if state.shows_deviation(source) && state.results.poses.contains(&pose) {
-            self.ask(DeviationKey(pose));
-        }
+/// The distances of an imprint, once its pose is there.
+pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
+    let state = wants.state;
+    let Ok(Some(pose)) = results::pose_key(state, source) else { return };
+    if results::shows_deviation(state, source) && state.results.poses.contains(&pose) {
+        wants.ask(DeviationKey(pose));
     }
 }

@@ -1,35 +1,20 @@
-//! What an import of masks would change.
+//! The plan of an import of masks: what it would change.
 
-use super::super::export::state::ImportForm;
-use super::super::keys::{DatasetSeq, Revision};
-use super::{Computes, Demands, Job, Lane, SharedServices, State};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{ImportPlanKey, Revision};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::import::{Import, plan_import};
-
-/// The plan of an import, over what is drawn and marked now.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ImportPlanKey {
-    /// The data set.
-    pub dataset: DatasetSeq,
-    /// What is asked about.
-    pub form: ImportForm,
-    /// The last change of the document.
-    pub revision: Revision,
-}
+use touch2touch_work::import::{Import, ImportSetup, plan_import};
 
 impl Computes for ImportPlanKey {
-    type Value = Import;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Import>> {
         let source = state.library.open.as_ref()?.source.clone();
-        let setup = state.import_setup()?;
+        let setup = import_setup(state)?;
         Some(Job::new(Lane::Files, "Plan of an import", move |cx| {
             plan_import(source.on_disk("Plan of an import")?, &setup, cx)
         }))
-    }
-
-    fn bytes(plan: &Import) -> usize {
-        (plan.changed.len() + plan.unmatched.len() + plan.refused.len()) * 128
     }
 
     /// The form says it.
@@ -38,20 +23,23 @@ impl Computes for ImportPlanKey {
     }
 }
 
-impl State {
-    /// The plan of the import that the form describes, while the form is open.
-    pub fn import_plan_key(&self) -> Option<ImportPlanKey> {
-        let (open, form) = (self.library.open.as_ref()?, self.export.importing.clone()?);
-        Some(ImportPlanKey { dataset: open.seq, form, revision: Revision(self.document.last_revision) })
+/// The plan of the import that the form describes, while the form is open.
+pub fn import_plan_key(state: &State) -> Option<ImportPlanKey> {
+    let (open, form) = (state.library.open.as_ref()?, state.export.importing.clone()?);
+    Some(ImportPlanKey { dataset: open.seq, form, revision: Revision(state.document.last_revision) })
+}
+
+pub(crate) fn want_import_plan(wants: &mut Demands<'_>) {
+    // Over what is on the disk: a stroke must have come there first.
+    let at_rest = wants.state.document.stroke.is_none() && wants.state.document.unsaved.is_empty();
+    if let Some(key) = import_plan_key(wants.state).filter(|_| at_rest) {
+        wants.ask(key);
     }
 }
 
-impl Demands<'_> {
-    pub(crate) fn import_plan(&mut self) {
-        // Over what is on the disk: a stroke must have come there first.
-        let at_rest = self.state.document.stroke.is_none() && self.state.document.unsaved.is_empty();
-        if let Some(key) = self.state.import_plan_key().filter(|_| at_rest) {
-            self.ask(key);
-        }
-    }
+/// The setup of the import that the form describes, while it is open.
+pub(crate) fn import_setup(state: &State) -> Option<ImportSetup> {
+    let form = state.export.importing.as_ref()?;
+    let (from, over_drawn, person) = (form.from.clone(), form.over_drawn, state.settings.known_labeler());
+    Some(ImportSetup { from, format: None, over_drawn, person })
 }

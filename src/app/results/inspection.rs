@@ -2,35 +2,22 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
-
-use super::super::keys::RegistrationChoice;
-use super::pose::Registered;
-use super::run::RunKey;
-use super::{Absent, Computes, Demands, Job, Lane, Lookup, SharedServices, State};
-use touch2touch_core::align::{AlignReport, TraceStep};
-use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::inspect::Counterparts;
-use touch2touch_core::pose::ToolModel;
-use touch2touch_work::pose::PoseResult;
-
-/// The steps of a recorded registration.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct InspectionKey(pub RunKey);
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{ImprintSource, Inspection, InspectionKey, RunKey};
+use super::super::results;
+use super::super::results::{Computes, Demands, Registered};
+use super::super::services::SharedServices;
+use super::super::state::inspect::Inspected;
+use super::super::state::{Absent, Lookup, State};
 
 impl Computes for InspectionKey {
-    type Value = Inspection;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
-        let (Registered { clouds, tool, .. }, engine) = (self.0.pose.find(state)?, self.0.pose.engine);
+        let (Registered { clouds, tool, .. }, registration) =
+            (results::registered(state, &self.0.pose)?, self.0.pose.registration);
         let run = state.results.runs.get(&self.0)?.clone();
         Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
-            Ok(Inspection::new(run, clouds.contact_points(), &tool.model, engine))
+            Ok(Inspection::new(run, clouds.contact_points(), &tool.model, registration))
         }))
-    }
-
-    fn bytes(inspection: &Inspection) -> usize {
-        inspection.bytes()
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
@@ -40,125 +27,50 @@ impl Computes for InspectionKey {
     }
 }
 
-/// A recorded registration with what its steps are looked at with.
-#[derive(Clone, Debug)]
-pub struct Inspection {
-    /// The recorded registration.
-    pub result: Arc<PoseResult>,
-    /// The contact points that were offered, meters, grasp frame.
-    pub points: Vec<DVec3>,
-    /// What the points are compared with.
-    pub counterparts: Counterparts,
-    /// Per start the positions of its steps in the trace.
-    runs: Vec<Vec<usize>>,
+/// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
+///
+/// # Errors
+/// Why there can be none.
+pub(crate) fn inspection_key(state: &State) -> Result<Option<RunKey>, Absent> {
+    let pose = results::pose_key(state, state.inspect.source)?;
+    Ok(pose.map(|pose| RunKey { pose, start: state.inspect.start }))
 }
 
-impl Inspection {
-    /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, engine: RegistrationChoice) -> Self {
-        let report = &result.report;
-        let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
-        for (i, step) in report.trace.iter().enumerate() {
-            if step.run >= runs.len() {
-                runs.resize(step.run + 1, Vec::new());
-            }
-            runs[step.run].push(i);
+/// The recorded run that is looked at.
+pub fn inspection(state: &State) -> Lookup<'_, Arc<Inspection>> {
+    if let failed @ Lookup::Failed(_) = results::tool(state) {
+        return failed.without();
+    }
+    let before = || state.results.inspections.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
+    let key = inspection_key(state);
+    let run = key.clone().ok().flatten().and_then(|run| state.failure(run));
+    state.look_or(key.map(|key| key.map(InspectionKey)), before).or_failed(run)
+}
+
+/// The steps that are looked at, or the recorded registration that they are of.
+pub(crate) fn want_inspection(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if let (true, Ok(Some(run))) = (results::shows_steps(state, state.inspect.source), inspection_key(state)) {
+        let there = state.results.runs.contains(&run);
+        let key = InspectionKey(run.clone());
+        match there || state.results.inspections.contains(&key) {
+            true => wants.ask(key),
+            false => wants.ask(run),
         }
-        Self { result, points, counterparts: Counterparts::new(tool, engine.by), runs }
-    }
-
-    /// The registration's report with its trace.
-    pub fn report(&self) -> &AlignReport {
-        &self.result.report
-    }
-
-    /// Starts there are.
-    pub fn num_runs(&self) -> usize {
-        self.runs.len()
-    }
-
-    /// Steps of a start, the applied start included.
-    pub(crate) fn num_steps(&self, run: usize) -> usize {
-        self.runs.get(run).map_or(0, Vec::len)
-    }
-
-    /// The steps of a start, in order.
-    pub fn steps(&self, run: usize) -> impl Iterator<Item = &TraceStep> + '_ {
-        self.runs.get(run).into_iter().flatten().filter_map(|&i| self.report().trace.get(i))
-    }
-
-    /// A step of a start; beyond the end its last.
-    pub fn step(&self, run: usize, at: usize) -> Option<&TraceStep> {
-        let steps = self.runs.get(run)?;
-        self.report().trace.get(*steps.get(at.min(steps.len().checked_sub(1)?))?)
-    }
-
-    /// The pose that a start was asked to begin at, `grasp_from_object`.
-    pub fn requested(&self, run: usize) -> Option<PlanarPose> {
-        self.report().runs.get(run).map(|r| r.start)
-    }
-
-    /// The pose it began at, `grasp_from_object`: not always the one asked for.
-    pub fn applied(&self, run: usize) -> Option<PlanarPose> {
-        self.steps(run).next().map(|s| s.grasp_from_object)
-    }
-
-    /// What happens after a step, in words: the reason to stop at the last one.
-    pub fn what_next(&self, run: usize, at: usize) -> String {
-        let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
-            return "no step was recorded".into();
-        };
-        if at >= last {
-            return self.report().runs.get(run).map_or_else(|| self.report().stop.to_string(), |r| r.stop.to_string());
-        }
-        match self.step(run, at + 1) {
-            Some(next) if next.kernel_m != here.kernel_m => {
-                format!("this kernel is done; the next is {:.2} mm wide", next.kernel_m * 1e3)
-            }
-            Some(next) if next.points != here.points => format!("goes on with {} points", next.points),
-            _ => "still moving".into(),
-        }
-    }
-
-    /// Bytes held.
-    pub fn bytes(&self) -> usize {
-        self.points.len() * 24 + self.report().trace.len() * 8 + (100 << 10)
     }
 }
 
-impl State {
-    /// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub(crate) fn inspection_key(&self) -> Result<Option<RunKey>, Absent> {
-        let pose = self.pose_key(self.inspect.source)?;
-        Ok(pose.map(|pose| RunKey { pose, start: self.inspect.start }))
-    }
-
-    /// The recorded run that is looked at.
-    pub fn inspection(&self) -> Lookup<'_, Arc<Inspection>> {
-        if let failed @ Lookup::Failed(_) = self.tool() {
-            return failed.without();
-        }
-        let before = || self.results.inspections.get(self.latest(self.inspect.source)?.inspection.as_ref()?);
-        let key = self.inspection_key();
-        let run = key.clone().ok().flatten().and_then(|run| self.failure(run));
-        self.look_or(key.map(|key| key.map(InspectionKey)), before).or_failed(run)
-    }
+/// The step that is looked at, of the run shown (also of the one before, while the next is computed).
+pub fn inspected(state: &State) -> Option<Inspected<'_>> {
+    let inspection = inspection(state).shown()?;
+    let last_run = inspection.num_runs().checked_sub(1)?;
+    let run = state.inspect.run.unwrap_or(inspection.report().winner).min(last_run);
+    let last = inspection.num_steps(run).checked_sub(1)?;
+    let at = state.inspect.at.unwrap_or(last).min(last);
+    Some(Inspected { inspection, run, at, step: inspection.step(run, at)? })
 }
 
-impl Demands<'_> {
-    /// The steps that are looked at, or the recorded registration that they are of.
-    pub(crate) fn inspection(&mut self) {
-        let state = self.state;
-        if let (true, Ok(Some(run))) = (state.shows_steps(state.inspect.source), state.inspection_key()) {
-            let there = state.results.runs.contains(&run);
-            let key = InspectionKey(run.clone());
-            match there || state.results.inspections.contains(&key) {
-                true => self.ask(key),
-                false => self.ask(run),
-            }
-        }
-    }
+/// The step that the 3D view of a side shows instead of the registered pose.
+pub(crate) fn inspected_in(state: &State, source: ImprintSource) -> Option<Inspected<'_>> {
+    if results::shows_steps(state, source) { inspected(state) } else { None }
 }

@@ -2,40 +2,25 @@
 
 use std::sync::Arc;
 
-use super::super::labels::state::{PairLabels, Stored};
-use super::super::tasks::state::Level;
-use super::{Computes, Job, Lane, PairKey, SharedServices, State};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::LabelsKey;
+use super::super::keys::dataset::Read;
+use super::super::results::Computes;
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::super::state::labels::Stored;
+use super::super::state::tasks::Level;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::JournalHistory;
 
-/// The labels stored for a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LabelsKey {
-    /// The pair.
-    pub pair: PairKey,
-    /// Whether those of a second time are meant.
-    pub repeat: bool,
-}
-
-/// Labels as they were read.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Read {
-    labels: PairLabels,
-    /// What was done before.
-    told: JournalHistory,
-}
-
-impl LabelsKey {
-    fn name(self, state: &State) -> Option<String> {
-        Some(state.library.entry(self.pair.pair)?.name.clone())
-    }
+/// The name of the pair.
+fn name(state: &State, key: LabelsKey) -> Option<String> {
+    Some(state.library.entry(key.pair.pair)?.name.clone())
 }
 
 impl Computes for LabelsKey {
-    type Value = Read;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Read>> {
-        let (source, name) = (state.library.open.as_ref()?.source.clone(), self.name(state)?);
+        let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, *self)?);
         let repeat = state.document.repeats.get(&name).map(|repeating| repeating.person.clone());
         if repeat.is_some() != self.repeat {
             return None;
@@ -52,7 +37,7 @@ impl Computes for LabelsKey {
     }
 
     fn arrived(&self, state: &mut State, read: &Arc<Read>) {
-        let Some(name) = self.name(state) else { return };
+        let Some(name) = name(state, *self) else { return };
         let doc = &mut state.document;
         // Asked for before the pair came back, or before that was over.
         if doc.repeats.contains_key(&name) != self.repeat {
@@ -78,7 +63,7 @@ impl Computes for LabelsKey {
     }
 
     fn failed(&self, state: &mut State, err: &TaskError) -> bool {
-        if let Some(name) = self.name(state).filter(|name| state.document.repeats.contains_key(name) == self.repeat) {
+        if let Some(name) = name(state, *self).filter(|name| state.document.repeats.contains_key(name) == self.repeat) {
             state.document.stored.insert(name, Stored::Blocked(err.clone()));
         }
         true

@@ -4,78 +4,40 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::keys::{MaskRecipe, Revision};
-use super::super::labels::state::{DrawnMask, MaskPlace};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{AutomaticMask, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
 use super::super::pane::Pane;
-use super::super::tasks::state::Level;
-use super::Request;
-use super::imprint::ImprintKey;
-use super::tool::ToolKey;
-use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::results::Request;
+use super::super::state::tasks::Level;
+use super::super::state::{Absent, Lookup, State};
+use super::super::{recipe, results};
 use touch2touch_core::bits::Bits;
-use touch2touch_core::contact::{ContactMask, MaskBasis};
+use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::labels::{DrawnMask, MaskPlace};
 use touch2touch_work::mask::{self, MaskInputs};
 
-/// An automatic mask of one imprint.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MaskKey {
-    /// The imprint.
-    pub imprint: ImprintKey,
-    /// The recipe.
-    pub recipe: MaskRecipe,
-}
-
-/// The mask in force, as part of a recipe.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub enum MaskVersion {
-    /// Automatic.
-    Auto(MaskRecipe),
-    /// Corrected by hand.
-    Hand(Revision),
-}
-
-impl MaskVersion {
-    /// The pixels, for an imprint; `None` if they are not there.
-    pub(crate) fn find(&self, state: &State, imprint: &ImprintKey) -> Option<Arc<Mask>> {
-        match self {
-            Self::Auto(recipe) => {
-                let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
-                state.results.masks.get(&key).map(|found| found.mask.clone())
-            }
-            Self::Hand(revision) => {
-                let hand = state.drawn_mask_on(imprint)?;
-                (hand.revision == *revision).then(|| hand.mask.clone())
-            }
+/// The pixels of a mask of an imprint; `None` if they are not there.
+pub(crate) fn mask_pixels(state: &State, version: &MaskVersion, imprint: &ImprintKey) -> Option<Arc<Mask>> {
+    match version {
+        MaskVersion::Auto(recipe) => {
+            let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+            state.results.masks.get(&key).map(|found| found.mask.clone())
+        }
+        MaskVersion::Hand(revision) => {
+            let hand = drawn_mask_on(state, imprint)?;
+            (hand.revision == *revision).then(|| hand.mask.clone())
         }
     }
 }
 
-/// An automatic mask.
-#[derive(Clone, Debug)]
-pub struct AutomaticMask {
-    /// The pixels in contact.
-    pub mask: Arc<Mask>,
-    /// What it is made of in the end.
-    pub basis: MaskBasis,
-    /// As [`ContactMask::unsure`].
-    pub unsure: Option<f64>,
-}
-
-impl From<ContactMask> for AutomaticMask {
-    fn from(found: ContactMask) -> Self {
-        Self { mask: Arc::new(found.mask), basis: found.basis, unsure: found.unsure }
-    }
-}
-
 impl Computes for MaskKey {
-    type Value = AutomaticMask;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<AutomaticMask>> {
-        let imprint = self.imprint.find(state)?;
+        let imprint = results::imprint_input(state, &self.imprint)?;
         let touch = self.imprint.touch();
         let sample = state.results.samples.get(&touch.pair)?.clone();
         if let MaskRecipe::Unet(id, least) = &self.recipe {
@@ -96,10 +58,6 @@ impl Computes for MaskKey {
         }))
     }
 
-    fn bytes(found: &AutomaticMask) -> usize {
-        found.mask.len()
-    }
-
     /// The log says once what a mask is made of where that is not what its recipe names.
     fn arrived(&self, state: &mut State, found: &Arc<AutomaticMask>) {
         let Some(why) = found.basis.note() else { return };
@@ -117,182 +75,166 @@ impl Computes for MaskKey {
 pub struct MaskInForce<'a> {
     /// The pixels, as large as the imprint.
     pub mask: &'a Arc<Mask>,
-    /// What decides whether it has to be drawn again.
+    /// The version that decides whether it has to be drawn again.
     pub version: MaskVersion,
-    /// Where it comes from, for the screen.
+    /// The provenance, for the screen.
     pub label: String,
 }
 
-impl State {
-    /// The recipe of the automatic masks that the settings ask for, of whatever pair.
-    ///
-    /// # Errors
-    /// Why the source that the settings ask for cannot give one.
-    pub(crate) fn automatic_recipe(&self) -> Result<MaskRecipe, Absent> {
-        let model = self.bundle(BundleKind::Mask).map(|bundle| &bundle.id);
-        self.settings.mask.choice.recipe(model.ok()).ok_or(Absent::NoMaskModel)
-    }
-
-    /// The recipe of a finger's automatic mask.
-    ///
-    /// # Errors
-    /// Why the source that the settings ask for cannot give one for this finger.
-    pub(crate) fn mask_recipe(&self, finger: PadId) -> Result<MaskRecipe, Absent> {
-        let recipe = self.automatic_recipe()?;
-        match recipe {
-            MaskRecipe::Cad(_) => {
-                self.tool_name()?;
-                let sample = self.sample().ready();
-                if sample.is_some_and(|s| s.grasp_from_object.is_none()) {
-                    return Err(Absent::NoTruth);
-                }
-                if self.touch(finger).ready().is_some_and(|t| t.camera().is_none()) {
-                    return Err(Absent::NoCamera);
-                }
+/// The recipe of a finger's automatic mask.
+///
+/// # Errors
+/// Why the source that the settings ask for cannot give one for this finger.
+pub(crate) fn mask_recipe(state: &State, finger: PadId) -> Result<MaskRecipe, Absent> {
+    let recipe = recipe::automatic_mask(state)?;
+    match recipe {
+        MaskRecipe::Cad(_) => {
+            results::tool_name(state)?;
+            let sample = results::sample(state).ready();
+            if sample.is_some_and(|s| s.grasp_from_object.is_none()) {
+                return Err(Absent::NoTruth);
             }
-            MaskRecipe::Truth => {
-                if self.touch(finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
-                    return Err(Absent::NotSimulated);
-                }
+            if results::touch(state, finger).ready().is_some_and(|t| t.camera().is_none()) {
+                return Err(Absent::NoCamera);
             }
-            MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(..) => {}
         }
-        Ok(recipe)
-    }
-
-    /// The recipe of the automatic mask of one finger's imprint.
-    fn mask_key(&self, source: ImprintSource, finger: PadId) -> Result<MaskKey, Absent> {
-        Ok(MaskKey { imprint: self.imprint_key(source, finger)?, recipe: self.mask_recipe(finger)? })
-    }
-
-    /// The automatic mask of one finger's imprint.
-    pub(crate) fn automatic_mask(&self, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
-        if self.imprint(source, finger).ready().is_none() {
-            return self.imprint(source, finger).without();
-        }
-        self.look_or(self.mask_key(source, finger).map(Some), || None).map(|found| &found.mask)
-    }
-
-    /// Where a mask that is drawn on one finger's imprint belongs; `None` while there is no such imprint.
-    pub(crate) fn mask_place(&self, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
-        Some(MaskPlace { pad: finger, of: self.imprint_key(source, finger).ok()?.of()? })
-    }
-
-    /// What can be drawn on of what is on screen.
-    pub fn mask_places(&self) -> Vec<MaskPlace> {
-        let places = |finger| ImprintSource::iter().filter_map(move |source| self.mask_place(source, finger));
-        self.fingers().into_iter().flat_map(places).collect()
-    }
-
-    /// The mask that a person drew on an imprint.
-    pub(crate) fn drawn_mask_on(&self, imprint: &ImprintKey) -> Option<&DrawnMask> {
-        let touch = imprint.touch();
-        let name = &self.library.entry(touch.pair.pair)?.name;
-        self.document.drawn_mask(name, &MaskPlace { pad: touch.finger, of: imprint.of()? })
-    }
-
-    /// The corrected mask of one finger's imprint, if it is there and as large.
-    pub fn drawn_mask(&self, source: ImprintSource, finger: PadId) -> Option<&DrawnMask> {
-        let place = self.mask_place(source, finger)?;
-        self.document.pair(self.pair_name())?.drawn(&place, self.imprint(source, finger).ready()?)
-    }
-
-    /// The mask in force on one finger's imprint: the corrected one, else the automatic one.
-    ///
-    /// # Errors
-    /// What is there instead.
-    pub fn mask_in_force(
-        &self,
-        source: ImprintSource,
-        finger: PadId,
-    ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
-        if let Some(hand) = self.drawn_mask(source, finger) {
-            let base = hand.base();
-            let label = if base.is_empty() { "By hand".into() } else { format!("By hand, from {base}") };
-            return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
-        }
-        let lookup = self.automatic_mask(source, finger);
-        match (lookup, self.mask_recipe(finger)) {
-            (Lookup::Ready(mask), Ok(recipe)) => {
-                let label = self.automatic_provenance(source, finger, &recipe).text();
-                Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
+        MaskRecipe::Truth => {
+            if results::touch(state, finger).ready().is_some_and(|t| t.depth().is_none_or(|b| b.truth.is_none())) {
+                return Err(Absent::NotSimulated);
             }
-            (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
-            (other, _) => Err(other),
         }
+        MaskRecipe::Threshold(_) | MaskRecipe::TopPercent(_) | MaskRecipe::Unet(..) => {}
     }
+    Ok(recipe)
+}
 
-    /// The mask of what lies near the CAD model, which the gate of the mask tools may need.
-    fn gate_key(&self, source: ImprintSource, finger: PadId) -> Option<MaskKey> {
-        let recipe = MaskRecipe::Cad(self.settings.mask.gate.cad_m?.into());
-        Some(MaskKey { imprint: self.imprint_key(source, finger).ok()?, recipe })
+/// The recipe of the automatic mask of one finger's imprint.
+fn mask_key(state: &State, source: ImprintSource, finger: PadId) -> Result<MaskKey, Absent> {
+    Ok(MaskKey { imprint: results::imprint_key(state, source, finger)?, recipe: mask_recipe(state, finger)? })
+}
+
+/// The automatic mask of one finger's imprint.
+pub(crate) fn automatic_mask(state: &State, source: ImprintSource, finger: PadId) -> Lookup<'_, Arc<Mask>> {
+    if results::imprint(state, source, finger).ready().is_none() {
+        return results::imprint(state, source, finger).without();
     }
+    state.look_or(mask_key(state, source, finger).map(Some), || None).map(|found| &found.mask)
+}
 
-    /// Whether what the gate needs to know of the CAD model is there.
-    pub(crate) fn gate_is_known(&self, source: ImprintSource, finger: PadId) -> bool {
-        self.gate_key(source, finger).is_none_or(|key| self.results.masks.get(&key).is_some())
+/// The place of a mask that is drawn on one finger's imprint; `None` while there is no such imprint.
+pub(crate) fn mask_place(state: &State, source: ImprintSource, finger: PadId) -> Option<MaskPlace> {
+    Some(MaskPlace { pad: finger, of: results::imprint_key(state, source, finger).ok()?.of()? })
+}
+
+/// The places of masks that can be drawn on, of all that is on screen.
+pub fn mask_places(state: &State) -> Vec<MaskPlace> {
+    let places = |finger| ImprintSource::iter().filter_map(move |source| mask_place(state, source, finger));
+    state.fingers().into_iter().flat_map(places).collect()
+}
+
+/// The mask that is in force on an imprint because a person drew it.
+pub(crate) fn drawn_mask_on<'a>(state: &'a State, imprint: &ImprintKey) -> Option<&'a DrawnMask> {
+    let touch = imprint.touch();
+    let name = &state.library.entry(touch.pair.pair)?.name;
+    let place = MaskPlace { pad: touch.finger, of: imprint.of()? };
+    state.document.pair(name)?.drawn(&place, results::imprint_input(state, imprint)?.get().ok()?)
+}
+
+/// The corrected mask of one finger's imprint, if it is there and as large.
+pub fn drawn_mask(state: &State, source: ImprintSource, finger: PadId) -> Option<&DrawnMask> {
+    drawn_mask_on(state, &results::imprint_key(state, source, finger).ok()?)
+}
+
+/// The mask in force on one finger's imprint: the corrected one, else the automatic one.
+///
+/// # Errors
+/// The look-up that stands in its place.
+pub fn mask_in_force(
+    state: &State,
+    source: ImprintSource,
+    finger: PadId,
+) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
+    if let Some(hand) = drawn_mask(state, source, finger) {
+        let base = hand.base();
+        let label = if base.is_empty() { "By hand".into() } else { format!("By hand, from {base}") };
+        return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
     }
-
-    /// The pixels that a hand may change; `None` = all.
-    ///
-    /// # Errors
-    /// Why that is not known.
-    pub fn allowed(&self, source: ImprintSource, finger: PadId) -> Result<Option<Mask>, &'static str> {
-        let gate = self.settings.mask.gate;
-        if gate.is_open() {
-            return Ok(None);
+    let lookup = automatic_mask(state, source, finger);
+    match (lookup, mask_recipe(state, finger)) {
+        (Lookup::Ready(mask), Ok(recipe)) => {
+            let label = automatic_provenance(state, source, finger, &recipe).text();
+            Ok(MaskInForce { mask, version: MaskVersion::Auto(recipe), label })
         }
-        let near = match self.gate_key(source, finger) {
-            Some(key) => {
-                let unknown = "what lies near the CAD model is not known: it takes a tool and its true pose";
-                Some(self.results.masks.get(&key).ok_or(unknown)?)
-            }
-            None => None,
-        };
-        let imprint = self.imprint(source, finger).ready().ok_or("the imprint is not there")?;
-        Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
-    }
-
-    /// Where the pixels of an automatic mask come from.
-    pub(crate) fn automatic_provenance(&self, source: ImprintSource, finger: PadId, recipe: &MaskRecipe) -> Provenance {
-        let key = self.imprint_key(source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
-        let found = key.ok().and_then(|key| self.results.masks.get(&key));
-        recipe.provenance(self.model_of(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
-    }
-
-    /// The name of the mask model that a recipe takes; empty where it takes none.
-    pub(crate) fn model_of(&self, recipe: &MaskRecipe) -> &str {
-        match recipe {
-            MaskRecipe::Unet(id, _) => self.library.bundle(id).map_or("", |bundle| &bundle.name),
-            _ => "",
-        }
+        (Lookup::Ready(_), Err(absent)) => Err(Lookup::Absent(absent)),
+        (other, _) => Err(other),
     }
 }
 
-impl Demands<'_> {
-    pub(crate) fn mask(&mut self, source: ImprintSource, finger: PadId) {
-        let state = self.state;
-        if let Some(key) = state.gate_key(source, finger).filter(|_| state.selection.panes.contains(&Pane::Masks)) {
-            let can = state.sample().ready().is_some_and(|sample| sample.grasp_from_object.is_some());
-            if can && state.imprint(source, finger).ready().is_some() && state.tool_name().is_ok() {
-                if state.tool().ready().is_none() {
-                    self.tool();
-                } else {
-                    self.ask(key);
-                }
+/// The mask of what lies near the CAD model, which the gate of the mask tools may need.
+fn gate_key(state: &State, source: ImprintSource, finger: PadId) -> Option<MaskKey> {
+    let recipe = MaskRecipe::Cad(state.settings.mask.gate.cad_m?.into());
+    Some(MaskKey { imprint: results::imprint_key(state, source, finger).ok()?, recipe })
+}
+
+/// True where everything that the gate needs to know of the CAD model is there.
+pub(crate) fn gate_is_known(state: &State, source: ImprintSource, finger: PadId) -> bool {
+    gate_key(state, source, finger).is_none_or(|key| state.results.masks.get(&key).is_some())
+}
+
+/// The pixels that a hand may change; `None` = all.
+///
+/// # Errors
+/// Why that is not known.
+pub fn allowed(state: &State, source: ImprintSource, finger: PadId) -> Result<Option<Mask>, &'static str> {
+    let gate = state.settings.mask.gate;
+    if gate.is_open() {
+        return Ok(None);
+    }
+    let near = match gate_key(state, source, finger) {
+        Some(key) => {
+            let unknown = "what lies near the CAD model is not known: it takes a tool and its true pose";
+            Some(state.results.masks.get(&key).ok_or(unknown)?)
+        }
+        None => None,
+    };
+    let imprint = results::imprint(state, source, finger).ready().ok_or("the imprint is not there")?;
+    Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
+}
+
+/// The provenance of the pixels of an automatic mask.
+pub(crate) fn automatic_provenance(
+    state: &State,
+    source: ImprintSource,
+    finger: PadId,
+    recipe: &MaskRecipe,
+) -> Provenance {
+    let key = results::imprint_key(state, source, finger).map(|imprint| MaskKey { imprint, recipe: recipe.clone() });
+    let found = key.ok().and_then(|key| state.results.masks.get(&key));
+    recipe.provenance(state.library.mask_model(recipe), found.map_or(MaskBasis::Source, |found| found.basis))
+}
+
+pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: PadId) {
+    let state = wants.state;
+    if let Some(key) = gate_key(state, source, finger).filter(|_| state.selection.panes.contains(&Pane::Masks)) {
+        let can = results::sample(state).ready().is_some_and(|sample| sample.grasp_from_object.is_some());
+        if can && results::imprint(state, source, finger).ready().is_some() && results::tool_name(state).is_ok() {
+            if results::tool(state).ready().is_none() {
+                results::want_tool(wants);
+            } else {
+                wants.ask(key);
             }
         }
-        // Stored corrections first: they may make the automatic mask unnecessary.
-        if !state.document.stored.contains_key(state.pair_name())
-            || state.drawn_mask(source, finger).is_some()
-            || state.imprint(source, finger).ready().is_none()
-        {
-            return;
-        }
-        let Ok(key) = state.mask_key(source, finger) else { return };
-        if matches!(key.recipe, MaskRecipe::Cad(_)) && state.tool().ready().is_none() {
-            return self.tool();
-        }
-        self.ask(key);
     }
+    // Stored corrections first: they may make the automatic mask unnecessary.
+    if !state.document.stored.contains_key(state.pair_name())
+        || drawn_mask(state, source, finger).is_some()
+        || results::imprint(state, source, finger).ready().is_none()
+    {
+        return;
+    }
+    let Ok(key) = mask_key(state, source, finger) else { return };
+    if matches!(key.recipe, MaskRecipe::Cad(_)) && results::tool(state).ready().is_none() {
+        return results::want_tool(wants);
+    }
+    wants.ask(key);
 }

@@ -1,31 +1,17 @@
-//! What an export of masks would write where.
+//! The plan of an export of masks: what it would write where.
 
-use super::super::keys::{DatasetSeq, Revision};
-use super::{Computes, Demands, Job, Lane, SharedServices, State};
-use touch2touch_work::export::{ExportChoice, Plan};
-
-/// The plan of an export, of what is drawn and marked now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MaskPlanKey {
-    /// The data set.
-    pub dataset: DatasetSeq,
-    /// What is asked for.
-    pub choice: ExportChoice,
-    /// The last change of the document.
-    pub revision: Revision,
-}
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{MaskPlanKey, Revision};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use touch2touch_work::export::Plan;
 
 impl Computes for MaskPlanKey {
-    type Value = Plan;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.own_labels(), self.choice);
         Some(Job::new(Lane::Files, "Plan of an export", move |_| source.plan_masks(&changed, choice)))
-    }
-
-    fn bytes(plan: &Plan) -> usize {
-        plan.total() * 128
     }
 
     /// The form says it.
@@ -34,19 +20,15 @@ impl Computes for MaskPlanKey {
     }
 }
 
-impl State {
-    /// The plan of the export that the form describes, while the form is open.
-    pub fn mask_plan_key(&self) -> Option<MaskPlanKey> {
-        let open = self.library.open.as_ref().filter(|_| self.export.asking_masks)?;
-        let revision = Revision(self.document.last_revision);
-        Some(MaskPlanKey { dataset: open.seq, choice: self.export.masks, revision })
-    }
+/// The plan of the export that the form describes, while the form is open.
+pub fn mask_plan_key(state: &State) -> Option<MaskPlanKey> {
+    let open = state.library.open.as_ref().filter(|_| state.export.asking_masks)?;
+    let revision = Revision(state.document.last_revision);
+    Some(MaskPlanKey { dataset: open.seq, choice: state.export.masks, revision })
 }
 
-impl Demands<'_> {
-    pub(crate) fn mask_plan(&mut self) {
-        if let Some(key) = self.state.mask_plan_key().filter(|_| self.state.document.stroke.is_none()) {
-            self.ask(key);
-        }
+pub(crate) fn want_mask_plan(wants: &mut Demands<'_>) {
+    if let Some(key) = mask_plan_key(wants.state).filter(|_| wants.state.document.stroke.is_none()) {
+        wants.ask(key);
     }
 }

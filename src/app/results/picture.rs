@@ -1,17 +1,14 @@
 //! The prediction of another program that lies beside a pair as a picture.
 
-use super::imprint::gone;
-use super::{Computes, Job, Lane, SharedServices, State, TouchKey};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::PictureKey;
+use super::super::results::{Computes, gone};
+use super::super::services::SharedServices;
+use super::super::state::State;
 use touch2touch_work::compare::{Beside, beside};
 use touch2touch_work::error::TaskError;
 
-/// The picture beside one touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PictureKey(pub TouchKey);
-
 impl Computes for PictureKey {
-    type Value = Beside;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {
         let pair = self.0.pair;
         let source = state.library.open.as_ref()?.source.clone();
@@ -24,10 +21,6 @@ impl Computes for PictureKey {
                     .with_hint("It is read from NAME_vqvae.png beside NAME_bubble.png.")
             })
         }))
-    }
-
-    fn bytes(found: &Beside) -> usize {
-        4 * (found.tile.len() + found.imprint.len())
     }
 
     /// The pane says it in place of the picture.

@@ -2,30 +2,23 @@
 
 use std::sync::Arc;
 
-use super::super::keys::RegistrationChoice;
-use super::super::workbench::state::PoseOf;
-use super::cloud::CloudKey;
-use super::tool::ToolKey;
-use super::{Absent, Computed, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, ToolKey};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::results::Computed;
+use super::super::state::workbench::PoseOf;
+use super::super::state::{Absent, Lookup, State};
+use super::super::{recipe, results};
 use touch2touch_core::align::Ask;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::cloud::Clouds;
-use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::error::TaskError;
+use touch2touch_work::pose::PoseResult;
 use touch2touch_work::tool::NamedTool;
 
-/// A pose of a cloud.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PoseKey {
-    /// The cloud whose contact points are registered.
-    pub cloud: CloudKey,
-    /// The tool.
-    pub tool: Arc<str>,
-    /// The registration.
-    pub engine: RegistrationChoice,
-}
-
-/// What is registered: the inputs of every job about a pose.
+/// The inputs of every job about a pose: what is registered.
 pub(crate) struct Registered {
     pub(crate) clouds: Arc<Clouds>,
     pub(crate) tool: Arc<NamedTool>,
@@ -33,154 +26,148 @@ pub(crate) struct Registered {
     pub(crate) truth: Option<PlanarPose>,
 }
 
-impl PoseKey {
-    /// The job that registers it.
-    fn registering(&self, state: &State, ask: Ask<'static>) -> Option<Job<PoseResult>> {
-        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
-        Some(Job::new(Lane::Compute, "Pose", move |_| {
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
-        }))
-    }
+/// The job that registers a cloud.
+fn registering(state: &State, key: &PoseKey, ask: Ask<'static>) -> Option<Job<PoseResult>> {
+    let (Registered { clouds, tool, truth }, registration) = (registered(state, key)?, key.registration);
+    Some(Job::new(Lane::Compute, "Pose", move |_| {
+        touch2touch_work::pose::pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
+    }))
+}
 
-    /// What is registered; `None` if it is not there.
-    pub(crate) fn find(&self, state: &State) -> Option<Registered> {
-        let (pair, _) = self.cloud.place()?;
-        let tool = ToolKey { dataset: pair.dataset, name: self.tool.clone() };
-        Some(Registered {
-            clouds: state.results.clouds.get(&self.cloud)?.clone(),
-            tool: state.results.tools.get(&tool)?.clone(),
-            truth: state.results.samples.get(&pair)?.grasp_from_object,
-        })
-    }
+/// The inputs of a registration; `None` if they are not there.
+pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
+    let (pair, _) = key.cloud.place()?;
+    let tool = ToolKey { dataset: pair.dataset, name: key.tool.clone() };
+    Some(Registered {
+        clouds: state.results.clouds.get(&key.cloud)?.clone(),
+        tool: state.results.tools.get(&tool)?.clone(),
+        truth: state.results.samples.get(&pair)?.grasp_from_object,
+    })
 }
 
 impl Computes for PoseKey {
-    type Value = PoseResult;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        self.registering(state, Ask::default())
-    }
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
+        registering(state, self, Ask::default())
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<PoseResult>) {
-        if let Some(at) = self.cloud.place().filter(|(_, side)| state.pose_key(*side) == Ok(Some(self.clone()))) {
+        if let Some(at) = self.cloud.place().filter(|(_, side)| pose_key(state, *side) == Ok(Some(self.clone()))) {
             state.results.latest.entry(at).or_default().pose = Some(self.clone());
         }
     }
 }
 
-/// A pose without its proof, where the registration may ask for one: it is there at once, and the pose itself unless it
-/// needs one.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ProvisionalPoseKey(pub PoseKey);
-
 impl Computes for ProvisionalPoseKey {
-    type Value = PoseResult;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        self.0.registering(state, Ask { provisional: true, ..Ask::default() })
-    }
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
+        registering(state, &self.0, Ask { provisional: true, ..Ask::default() })
     }
 
     fn arrived(&self, state: &mut State, found: &Arc<PoseResult>) {
         if found.report.needs_no_proof() {
-            Computed::Pose(self.0.clone(), found.clone()).keep(state);
+            super::keep(Computed::Pose(self.0.clone(), found.clone()), state);
         }
     }
 }
 
-impl State {
-    /// The recipe of the pose of an imprint; `Ok(None)` while something it is made from is not there yet.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub fn pose_key(&self, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
-        let tool = self.tool_name();
-        let Some(cloud) = self.cloud_key(source)? else {
-            return Ok(None);
-        };
-        if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
-            return Err(self.rig().pads().find_map(|f| self.mask_recipe(f).err()).unwrap_or(Absent::NoContact));
-        }
-        Ok(Some(PoseKey { cloud, tool: tool?.into(), engine: self.settings.pose_engine }))
-    }
-
-    /// The pose of an imprint.
-    pub fn pose(&self, source: ImprintSource) -> Lookup<'_, PoseResult> {
-        if let failed @ Lookup::Failed(_) = self.tool() {
-            return failed.without();
-        }
-        let before = || {
-            let latest = || self.results.poses.get(self.latest(source)?.pose.as_ref()?);
-            self.provisional_pose(source).or_else(latest)
-        };
-        self.look_or(self.pose_key(source), before).value()
-    }
-
-    /// The pose of an imprint without its proof, while that is being made.
-    pub fn provisional_pose(&self, source: ImprintSource) -> Option<&Arc<PoseResult>> {
-        let key = self.pose_key(source).ok()??;
-        if self.results.poses.contains(&key) {
-            return None;
-        }
-        self.results.provisional_poses.get(&ProvisionalPoseKey(key))
-    }
-
-    /// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
-    ///
-    /// # Errors
-    /// Why there can be none.
-    pub(crate) fn pose_key_of(&self, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
-        let Some(mut key) = self.pose_key(source)? else { return Ok(None) };
-        if let PoseOf::Finger(finger) = of {
-            let part = key.cloud.parts[finger].take();
-            if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-                return Err(Absent::NoFinger);
-            }
-            key.cloud.parts = PerPad::default();
-            key.cloud.parts[finger] = part;
-        }
-        Ok(Some(key))
-    }
-
-    /// The pose from one finger or both.
-    pub fn pose_of(&self, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
-        let key = self.pose_key_of(source, of);
-        let cloud = key.clone().ok().flatten().and_then(|key| self.failure(key.cloud));
-        self.look_or(key, || None).or_failed(cloud).value()
+/// The recipe of the pose of an imprint; `Ok(None)` while something it is made from is not there yet.
+///
+/// # Errors
+/// Why there can be none.
+pub fn pose_key(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
+    match unmasked(state, source) {
+        Some(_) => Err(Absent::NoContact),
+        None => pose_key_of_the_rest(state, source),
     }
 }
 
-impl Demands<'_> {
-    /// The pose; where it may take a proof, one without first.
-    pub(crate) fn pose(&mut self, source: ImprintSource) {
-        let Ok(Some(key)) = self.state.pose_key(source) else { return };
-        let results = &self.state.results;
-        let provisional = ProvisionalPoseKey(key.clone());
-        let tried =
-            results.provisional_poses.contains(&provisional) || self.state.failure(provisional.clone()).is_some();
-        if key.engine.by.may_prove() && !tried && !results.poses.contains(&key) {
-            self.ask(provisional);
-        } else {
-            self.ask(key);
-        }
-    }
+/// Why a finger of an imprint has no mask, where none can be made: a pose of the others alone is not that of all.
+fn unmasked(state: &State, source: ImprintSource) -> Option<&TaskError> {
+    state.rig().pads().find_map(|finger| match results::mask_in_force(state, source, finger) {
+        Err(Lookup::Failed(err)) => Some(err),
+        _ => None,
+    })
+}
 
-    /// The poses of single fingers in the table, and the clouds that they are made of: the joint one is asked for anyway.
-    pub(crate) fn pose_table(&mut self, source: ImprintSource) {
-        let state = self.state;
-        for finger in state.rig().pads() {
-            match state.pose_key_of(source, PoseOf::Finger(finger)) {
-                Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => self.ask(key),
-                Ok(Some(key)) => self.ask(key.cloud),
-                _ => {}
-            }
+/// [`pose_key`] of the fingers that have masks.
+fn pose_key_of_the_rest(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
+    let tool = results::tool_name(state);
+    let Some(cloud) = results::cloud_key(state, source)? else {
+        return Ok(None);
+    };
+    if cloud.parts.iter().flatten().all(|(_, mask)| mask.is_none()) {
+        return Err(state.rig().pads().find_map(|f| results::mask_recipe(state, f).err()).unwrap_or(Absent::NoContact));
+    }
+    Ok(Some(PoseKey::of(cloud, tool?.into(), &recipe::in_force(state, source))))
+}
+
+/// The pose of an imprint.
+pub fn pose(state: &State, source: ImprintSource) -> Lookup<'_, PoseResult> {
+    if let failed @ Lookup::Failed(_) = results::tool(state) {
+        return failed.without();
+    }
+    if let Some(err) = unmasked(state, source) {
+        return Lookup::Failed(err);
+    }
+    let before = || {
+        let latest = || state.results.poses.get(results::latest(state, source)?.pose.as_ref()?);
+        provisional_pose(state, source).or_else(latest)
+    };
+    state.look_or(pose_key(state, source), before).value()
+}
+
+/// The pose of an imprint without its proof, while that is being made.
+pub fn provisional_pose(state: &State, source: ImprintSource) -> Option<&Arc<PoseResult>> {
+    let key = pose_key(state, source).ok()??;
+    if state.results.poses.contains(&key) {
+        return None;
+    }
+    state.results.provisional_poses.get(&ProvisionalPoseKey(key))
+}
+
+/// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
+///
+/// # Errors
+/// Why there can be none.
+pub(crate) fn pose_key_of(state: &State, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
+    let PoseOf::Finger(finger) = of else { return pose_key(state, source) };
+    let Some(mut key) = pose_key_of_the_rest(state, source)? else { return Ok(None) };
+    let part = key.cloud.parts[finger].take();
+    if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
+        return Err(Absent::NoFinger);
+    }
+    key.cloud.parts = PerPad::default();
+    key.cloud.parts[finger] = part;
+    Ok(Some(key))
+}
+
+/// The pose from one finger or both.
+pub fn pose_of(state: &State, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
+    let key = pose_key_of(state, source, of);
+    let cloud = key.clone().ok().flatten().and_then(|key| state.failure(key.cloud));
+    state.look_or(key, || None).or_failed(cloud).value()
+}
+
+/// The pose; where it may take a proof, one without first.
+pub(crate) fn want_pose(wants: &mut Demands<'_>, source: ImprintSource) {
+    let Ok(Some(key)) = pose_key(wants.state, source) else { return };
+    let results = &wants.state.results;
+    let provisional = ProvisionalPoseKey(key.clone());
+    let tried = results.provisional_poses.contains(&provisional) || wants.state.failure(provisional.clone()).is_some();
+    if key.registration.by.may_prove() && !tried && !results.poses.contains(&key) {
+        wants.ask(provisional);
+    } else {
+        wants.ask(key);
+    }
+}
+
+/// The poses of single fingers in the table, and the clouds that they are made of: the joint one is asked for anyway.
+pub(crate) fn want_pose_table(wants: &mut Demands<'_>, source: ImprintSource) {
+    let state = wants.state;
+    for finger in state.rig().pads() {
+        match pose_key_of(state, source, PoseOf::Finger(finger)) {
+            Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => wants.ask(key),
+            Ok(Some(key)) => wants.ask(key.cloud),
+            _ => {}
         }
     }
 }

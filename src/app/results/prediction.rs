@@ -4,82 +4,27 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::super::keys::{Bits64, Sampler, Spacing};
-use super::super::services::{DataSource, Services};
-use super::preview::Onlooker;
-use super::{Computes, Demands, Job, Lane, Results, SharedServices, State, TouchKey};
-use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::ensemble::seeds;
-use touch2touch_core::grid::RgbGrid;
+use strum::IntoEnumIterator as _;
+
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{Key, Keyed, MetersKey, PredictionKey, SeedKey, ShiftMode, StoredKey, TouchKey};
+use super::super::results;
+use super::super::results::preview::Onlooker;
+use super::super::results::{Computes, Demands};
+use super::super::services::{Services, SharedServices};
+use super::super::source::DataSource;
+use super::super::state::State;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::postprocess::RawPrediction;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models;
 use touch2touch_work::prediction::Prediction;
 
-/// Everything that decides a prediction.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PredictionKey {
-    /// The touch whose GelSlim image is the condition.
-    pub touch: TouchKey,
-    /// The bundle's identity (its digest): a changed bundle is another recipe.
-    pub bundle: Arc<str>,
-    /// Denoising steps asked for.
-    pub steps: u32,
-    /// Seed of the noise.
-    pub seed: u64,
-    /// The sampler.
-    pub sampler: Sampler,
-    /// DDIM's noise share, 0..1.
-    pub eta: Bits64,
-    /// The training steps visited.
-    pub spacing: Spacing,
-    /// Scale of the guidance; 1 is none.
-    pub guidance: Bits64,
-    /// The model runtime: two of them round differently.
-    pub runtime: EngineChoice,
-}
-
-impl PredictionKey {
-    /// The recipe of a touch with a bundle, a runtime and the choices of one generation.
-    pub fn new(touch: TouchKey, bundle: Arc<str>, runtime: EngineChoice, config: &GenerateConfig) -> Self {
-        Self {
-            touch,
-            bundle,
-            steps: config.steps,
-            seed: config.seed,
-            sampler: config.sampler,
-            eta: config.eta.into(),
-            spacing: config.spacing,
-            guidance: config.guidance.into(),
-            runtime,
-        }
-    }
-
-    /// The recipes that differ from it in their seeds alone: `count` of them, from its own on.
-    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
-        seeds(self.seed, count).into_iter().map(|seed| Self { seed, ..self.clone() }).collect()
-    }
-
-    /// The choices of one generation.
-    pub fn config(&self) -> GenerateConfig {
-        GenerateConfig {
-            steps: self.steps,
-            eta: self.eta.get(),
-            seed: self.seed,
-            sampler: self.sampler,
-            spacing: self.spacing,
-            guidance: self.guidance.get(),
-        }
-    }
-}
-
 impl Computes for PredictionKey {
-    type Value = Prediction;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         let (services, recipe) = (services.clone(), self.clone());
         let source = state.library.open.as_ref()?.source.clone();
@@ -91,53 +36,23 @@ impl Computes for PredictionKey {
         }))
     }
 
-    fn bytes(prediction: &Prediction) -> usize {
-        prediction.raw.channels.iter().map(|c| c.len() * 4).sum()
-    }
-
     fn arrived(&self, state: &mut State, _: &Arc<Prediction>) {
         state.results.list_made(self, true);
     }
 }
 
-impl Results {
-    /// Lists a prediction that was kept; with `in_front` it is shown where the settings name none that is there.
-    pub(super) fn list_made(&mut self, recipe: &PredictionKey, in_front: bool) {
-        let made = self.made.entry(recipe.touch).or_default();
-        made.retain(|other| other != recipe);
-        made.push(recipe.clone());
-        self.shown.made(recipe, in_front);
-        // Old predictions may have left the cache to make room.
-        let kept = &self.predictions;
-        self.made.values_mut().for_each(|list| list.retain(|recipe| kept.contains(recipe)));
-        self.shown.retain(kept);
-    }
-}
-
-/// A prediction with one of several seeds.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct SeedKey(pub PredictionKey);
-
 impl Computes for SeedKey {
-    type Value = Prediction;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         self.0.job(state, services)
     }
 
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
         // A seed among several does not push away what is looked at.
-        state.keep_prediction(self.0.clone(), made.clone(), false);
+        keep_prediction(state, self.0.clone(), made.clone(), false);
     }
 }
 
-/// The predictions of a touch that lie on the disk from before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StoredKey(pub TouchKey);
-
 impl Computes for StoredKey {
-    type Value = Keyed;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Keyed>> {
         let (services, touch) = (services.clone(), self.0);
         let bundles = state.library.bundles.clone();
@@ -153,53 +68,24 @@ impl Computes for StoredKey {
         }))
     }
 
-    /// Where the settings name none of them, the one used last is shown, unless something is already.
+    /// Shows the one used last where the settings name none of them, unless something is shown already.
     fn arrived(&self, state: &mut State, found: &Arc<Keyed>) {
         state.results.looked_up.insert(self.0);
-        let nothing = state.shown(self.0).is_none();
+        let nothing = results::shown(state, self.0).is_none();
         for (key, made) in found.iter() {
             if !state.results.predictions.contains(key) {
-                state.keep_prediction(key.clone(), made.clone(), nothing);
+                keep_prediction(state, key.clone(), made.clone(), nothing);
             }
         }
     }
 }
-
-impl Demands<'_> {
-    /// What was made of a touch before this start of the program.
-    pub(crate) fn stored(&mut self, finger: PadId, touch: TouchKey) {
-        let state = self.state;
-        if state.can_start(finger) {
-            self.ask_unless(state.results.looked_up.contains(&touch), StoredKey(touch));
-        }
-    }
-
-    /// The prediction of a finger that nobody looked at when the other one's was made.
-    pub(crate) fn other_finger(&mut self, finger: PadId) {
-        let state = self.state;
-        let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| state.chosen(pad));
-        let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
-        let looked_up = state.results.looked_up.contains(&touch);
-        let recipe = PredictionKey { touch, ..made.clone() };
-        if !state.settings.generate.both_fingers || !looked_up || state.results.predictions.contains(&recipe) {
-            return;
-        }
-        let under_way = state.tasks.generating(&recipe).is_some();
-        if state.library.bundle(&recipe.bundle).is_some() && state.can_start(finger) && !under_way {
-            self.ask(recipe);
-        }
-    }
-}
-
-/// Predictions with their keys.
-pub(crate) type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;
 
 /// Makes `recipes`, all of one pair and bundle. A finger without a GelSlim image is left out where another has one.
 /// `sample` is the pair, if it is loaded; `onlooker` sees pictures on the way.
 ///
 /// # Errors
 /// If no finger has a GelSlim image, the pair or the model cannot be loaded or run, or the job was told to stop.
-pub fn generate(
+pub(crate) fn generate(
     services: &dyn Services,
     recipes: Vec<PredictionKey>,
     bundle: &BundleInfo,
@@ -219,7 +105,7 @@ pub fn generate(
         Some(sample) => sample,
         None => Arc::new(source.load(first.touch.pair.pair)?),
     };
-    let (engine, config) = (first.runtime, first.config());
+    let (engine, config) = (first.runtime, first.config);
     let touched = |recipe: PredictionKey| {
         let touch = sample.pad(recipe.touch.finger)?;
         let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
@@ -234,7 +120,7 @@ pub fn generate(
     }
     let wanted = |key: &PredictionKey| {
         let (picture, size) = &pictures[&key.touch.finger];
-        models::GenerateInput { difference: picture, seed: key.seed, size: *size }
+        models::GenerateInput { difference: picture, seed: key.config.seed, size: *size }
     };
     let wanted: Vec<models::GenerateInput<'_>> = keys.iter().map(wanted).collect();
     if keys.is_empty() {
@@ -246,4 +132,58 @@ pub fn generate(
     };
     let made = services.predict(bundle, engine, &config, &wanted, &cx)?;
     Ok(keys.into_iter().zip(made.into_iter().map(Arc::new)).collect())
+}
+
+/// Asks for the predictions of a touch that were made before this start of the program.
+pub(crate) fn want_stored(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
+    let state = wants.state;
+    if results::can_start(state, finger) {
+        wants.ask_unless(state.results.looked_up.contains(&touch), StoredKey(touch));
+    }
+}
+
+/// The prediction of a finger that nobody looked at when the other one's was made.
+pub(crate) fn want_other_finger(wants: &mut Demands<'_>, finger: PadId) {
+    let state = wants.state;
+    let made = state.rig().pads().filter(|pad| *pad != finger).find_map(|pad| results::chosen(state, pad));
+    let (Some(touch), Some(made)) = (state.touch_key(finger), made) else { return };
+    let looked_up = state.results.looked_up.contains(&touch);
+    let recipe = PredictionKey { touch, ..made.clone() };
+    if !state.settings.generate.both_fingers || !looked_up || state.results.predictions.contains(&recipe) {
+        return;
+    }
+    let under_way = state.tasks.generating(&recipe).is_some();
+    if state.library.bundle(&recipe.bundle).is_some() && results::can_start(state, finger) && !under_way {
+        wants.ask(recipe);
+    }
+}
+
+/// Keeps an imprint in place of the prediction that it was made of, which cannot be made here.
+pub(crate) fn hold(state: &mut State, recipe: PredictionKey, shift: ShiftMode, imprint: Arc<DepthMap>, model: &str) {
+    let why = format!("only this imprint is in the case; the model {model} that would make it anew is not here");
+    let chains = ShiftMode::iter().map(|mode| (mode, Err(why.clone()))).collect();
+    let made = Prediction {
+        raw: RawPrediction { channels: vec![(*imprint).clone()] },
+        chains: Arc::new(chains),
+        fit: None,
+        color: None,
+        bundle: recipe.bundle.clone(),
+        engine: "the case".into(),
+        seconds: 0.0,
+        kept: true,
+    };
+    keep_prediction(state, recipe.clone(), Arc::new(made), true);
+    let bytes = MetersKey::bytes(&imprint);
+    state.results.imprints.insert(MetersKey(recipe, shift), imprint, bytes);
+}
+
+/// Keeps a prediction of the open data set; with `in_front` it is shown where the settings name none that is there.
+pub(crate) fn keep_prediction(state: &mut State, recipe: PredictionKey, made: Arc<Prediction>, in_front: bool) {
+    if state.library.open.as_ref().is_none_or(|open| open.seq != recipe.touch.pair.dataset) {
+        return;
+    }
+    let results = &mut state.results;
+    let bytes = PredictionKey::bytes(&made);
+    results.predictions.insert(recipe.clone(), made, bytes);
+    results.list_made(&recipe, in_front);
 }

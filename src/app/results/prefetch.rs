@@ -3,24 +3,22 @@
 use std::sync::Arc;
 use std::time::Duration;
 
+use super::super::jobs::Job;
+use super::super::keys::{ImprintSource, PredictionKey, PrefetchKey};
 use super::super::pane::Demand;
-use super::prediction::PredictionKey;
-use super::{Computes, Demands, Job, SharedServices, State};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::prediction::Prediction;
 
-/// What a prediction may cost to be made without being asked for, seconds.
+/// The highest cost of a prediction that is made without being asked for, seconds.
 pub(crate) const CHEAP_S: f64 = 1.0;
-/// How often it is looked whether the pair is still on screen, before its prediction begins.
+/// The time between two looks whether the pair is still on screen, before its prediction begins.
 const LOOK: Duration = Duration::from_millis(10);
 
-/// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PrefetchKey(pub PredictionKey);
-
 impl Computes for PrefetchKey {
-    type Value = Prediction;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         let Job { lane, what, body } = self.0.job(state, services)?;
         // Once for a pair and settings: the other finger follows at once.
@@ -42,49 +40,39 @@ impl Computes for PrefetchKey {
     }
 
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        state.keep_prediction(self.0.clone(), made.clone(), true);
+        results::keep_prediction(state, self.0.clone(), made.clone(), true);
     }
 }
 
-impl State {
-    /// What a prediction made as this one would be cost on this machine, seconds: the median of those of the open data
-    /// set; `None` if there are none.
-    pub fn cost_of(&self, recipe: &PredictionKey) -> Option<f64> {
-        let same =
-            |made: &PredictionKey| PredictionKey { touch: recipe.touch, seed: recipe.seed, ..made.clone() } == *recipe;
-        let made = self.results.predictions.iter().filter(|(key, _)| same(key));
-        let mut seconds: Vec<f64> = made.map(|(_, prediction)| prediction.seconds).collect();
-        seconds.sort_by(f64::total_cmp);
-        seconds.get(seconds.len() / 2).copied()
+/// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
+pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
+    let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison, Demand::Ledger];
+    let (_, cloud) = results::shows_cloud(state, ImprintSource::Predicted);
+    let shown = cloud || needs.into_iter().any(|need| state.needs(need));
+    let asked_for =
+        state.tasks.any_generating().is_some() || (results::seeds_asked(state) && state.needs(Demand::Seeds));
+    if !state.settings.generate.by_itself
+        || !shown
+        || asked_for
+        || !results::fingers_to_generate(state).contains(&finger)
+    {
+        return None;
     }
-
-    /// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
-    pub(crate) fn prefetch(&self, finger: PadId) -> Option<PrefetchKey> {
-        let needs = [Demand::Imprint(super::ImprintSource::Predicted), Demand::Comparison, Demand::Ledger];
-        let (_, cloud) = self.shows_cloud(super::ImprintSource::Predicted);
-        let shown = cloud || needs.into_iter().any(|need| self.needs(need));
-        let asked_for = self.tasks.any_generating().is_some() || (self.seeds_asked() && self.needs(Demand::Seeds));
-        if !self.settings.generate.by_itself || !shown || asked_for || !self.fingers_to_generate().contains(&finger) {
-            return None;
-        }
-        let touch = self.touch_key(finger).filter(|touch| self.results.looked_up.contains(touch))?;
-        let key = PrefetchKey(self.recipe(touch)?);
-        // What a person picked under these settings is meant.
-        let there = self.results.predictions.contains(&key.0) || self.picked(touch).is_some();
-        if there || !self.can_start(finger) {
-            return None;
-        }
-        let cheap = self.cost_of(&key.0).is_none_or(|seconds| seconds < CHEAP_S);
-        (cheap && self.failure(key.clone()).is_none()).then_some(key)
+    let touch = state.touch_key(finger).filter(|touch| state.results.looked_up.contains(touch))?;
+    let key = PrefetchKey(recipe::prediction(state, touch)?);
+    // What a person picked under these settings is meant.
+    let there = state.results.predictions.contains(&key.0) || results::picked(state, touch).is_some();
+    if there || !results::can_start(state, finger) {
+        return None;
     }
+    let cheap = state.results.cost_of(&key.0).is_none_or(|seconds| seconds < CHEAP_S);
+    (cheap && state.failure(key.clone()).is_none()).then_some(key)
 }
 
-impl Demands<'_> {
-    /// The predictions of the pair on screen that cost little.
-    pub(crate) fn predictions_ahead(&mut self) {
-        let fingers = self.state.fingers_to_generate();
-        for key in fingers.into_iter().filter_map(|finger| self.state.prefetch(finger)) {
-            self.ask_unless(false, key);
-        }
+/// The predictions of the pair on screen that cost little.
+pub(crate) fn want_predictions_ahead(wants: &mut Demands<'_>) {
+    let fingers = results::fingers_to_generate(wants.state);
+    for key in fingers.into_iter().filter_map(|finger| prefetch(wants.state, finger)) {
+        wants.ask_unless(false, key);
     }
 }

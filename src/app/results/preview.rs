@@ -3,38 +3,28 @@
 use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use super::super::keys::ShiftMode;
+use super::super::keys::{ImprintSource, PredictionKey, Preview, ShiftMode, TouchKey};
 use super::super::pane::Demand;
-use super::prediction::PredictionKey;
-use super::{ImprintSource, State, TouchKey};
+use super::super::state::State;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::job::{PreviewPicture, Previews};
-
-/// A prediction as it looks on the way.
-#[derive(Clone, Debug)]
-pub struct Preview {
-    /// What is being made.
-    pub recipe: PredictionKey,
-    /// How it looks.
-    pub picture: PreviewPicture,
-}
 
 /// Receives pictures on the way.
 pub(crate) type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;
 
-/// What of a prediction under way would be looked at now. The runtime keeps it up to date while jobs run.
+/// The pictures of predictions under way that would be looked at now. The runtime keeps this up to date while jobs run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PreviewRequest {
     /// After so many steps, and after the first; 0 = never.
     pub every: u32,
-    /// How they become meters.
+    /// The mapping to meters.
     pub shift: ShiftMode,
     /// The touches whose predicted imprint is on screen.
     pub touches: BTreeSet<TouchKey>,
 }
 
 impl PreviewRequest {
-    /// Whether a picture of `touch` is wanted after `step` steps.
+    /// True where a picture of `touch` is wanted after `step` steps.
     pub fn wants(&self, touch: TouchKey, step: u32) -> bool {
         self.every > 0 && (step == 1 || step.is_multiple_of(self.every)) && self.touches.contains(&touch)
     }
@@ -43,14 +33,14 @@ impl PreviewRequest {
 /// Who looks at the pictures of predictions on the way, whichever they are.
 #[derive(Clone)]
 pub struct Onlooker {
-    /// What would be looked at now.
+    /// The pictures that would be looked at now.
     pub wish: Arc<Mutex<PreviewRequest>>,
     /// Receives it.
     pub sink: PreviewSink,
 }
 
 impl Onlooker {
-    /// The same for the predictions of one call, in its order.
+    /// The onlooker of the predictions of one call, in its order.
     pub fn of(self, items: Vec<PredictionKey>) -> Arc<dyn Previews> {
         Arc::new(Watched { by: self, items })
     }
@@ -74,19 +64,17 @@ impl Previews for Watched {
     }
 }
 
-impl State {
-    /// The prediction on its way to one finger of the selected pair, as it looks now.
-    pub fn preview(&self, finger: PadId) -> Option<&Arc<Preview>> {
-        self.results.previews.get(&self.touch_key(finger)?).filter(|_| self.document.stroke.is_none())
-    }
+/// The prediction on its way to one finger of the selected pair, as it looks now.
+pub fn preview(state: &State, finger: PadId) -> Option<&Arc<Preview>> {
+    state.results.previews.get(&state.touch_key(finger)?).filter(|_| state.document.stroke.is_none())
+}
 
-    /// What of a prediction under way would be looked at: the predicted imprints on screen, unless a pen is on them.
-    pub fn preview_wish(&self) -> PreviewRequest {
-        let shown = self.needs(Demand::Imprint(ImprintSource::Predicted)) && self.document.stroke.is_none();
-        let touches = match self.pair_key().filter(|_| shown) {
-            Some(pair) => self.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
-            None => Default::default(),
-        };
-        PreviewRequest { every: self.settings.generate.preview_every, shift: self.settings.shift, touches }
-    }
+/// The pictures of predictions under way that would be looked at: the predicted imprints on screen, unless a pen is on them.
+pub fn preview_wish(state: &State) -> PreviewRequest {
+    let shown = state.needs(Demand::Imprint(ImprintSource::Predicted)) && state.document.stroke.is_none();
+    let touches = match state.pair_key().filter(|_| shown) {
+        Some(pair) => state.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),
+        None => Default::default(),
+    };
+    PreviewRequest { every: state.settings.generate.preview_every, shift: state.settings.shift, touches }
 }

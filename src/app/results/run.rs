@@ -1,40 +1,26 @@
 //! Registrations with everything recorded: every step, and what became of every point.
 
-use super::super::keys::PoseBits;
-use super::pose::{PoseKey, Registered};
-use super::{Computes, ImprintSource, Job, Lane, SharedServices, State};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{ImprintSource, PoseBits, RunKey};
+use super::super::results;
+use super::super::results::{Computes, Registered};
+use super::super::services::SharedServices;
+use super::super::state::State;
 use touch2touch_core::align::Ask;
 use touch2touch_work::pose::{PoseResult, pose};
 
-/// A registration with everything recorded: every step, and what became of every point.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct RunKey {
-    /// What is registered, and how.
-    pub pose: PoseKey,
-    /// Where it starts (`grasp_from_object`); `None` = where the engine starts by itself.
-    pub start: Option<PoseBits>,
-}
-
 impl Computes for RunKey {
-    type Value = PoseResult;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        let Registered { clouds, tool, truth } = self.pose.find(state)?;
-        let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
+        let Registered { clouds, tool, truth } = results::registered(state, &self.pose)?;
+        let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
+            pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
         }))
-    }
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
     }
 }
 
-impl State {
-    /// The recorded registration from the engine's own starts; `None` while its inputs are not there.
-    pub(crate) fn run_key(&self, source: ImprintSource) -> Option<RunKey> {
-        Some(RunKey { pose: self.pose_key(source).ok()??, start: None })
-    }
+/// The recorded registration from the registration's own starts; `None` while its inputs are not there.
+pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
+    Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
 }

@@ -1,21 +1,20 @@
 //! The tensors of a pair.
 
-use super::{Absent, Computes, Job, Lane, Lookup, PairKey, SharedServices, State};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::PairKey;
+use super::super::results::Computes;
+use super::super::services::SharedServices;
+use super::super::state::{Absent, Lookup, State};
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch_work::error::TaskError;
 
 impl Computes for PairKey {
-    type Value = Sample;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Sample>> {
         let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.pair);
         let what = format!("Load {}", state.library.entry(pair)?.name);
         Some(Job::new(Lane::Files, what, move |_| source.load(pair)))
-    }
-
-    fn bytes(sample: &Sample) -> usize {
-        sample.bytes()
     }
 
     fn failed(&self, state: &mut State, _: &TaskError) -> bool {
@@ -23,30 +22,33 @@ impl Computes for PairKey {
     }
 }
 
-impl State {
-    /// The tensors of the selected pair.
-    pub fn sample(&self) -> Lookup<'_, Sample> {
-        if self.library.open.is_none() {
-            return Lookup::Absent(Absent::NothingOpen);
-        }
-        match self.pair_key() {
-            Some(key) => self.look(key).value(),
-            None => Lookup::Absent(Absent::NothingSelected),
-        }
+/// The tensors of the selected pair.
+pub fn sample(state: &State) -> Lookup<'_, Sample> {
+    if state.library.open.is_none() {
+        return Lookup::Absent(Absent::NothingOpen);
     }
+    match state.pair_key() {
+        Some(key) => state.look(key).value(),
+        None => Lookup::Absent(Absent::NothingSelected),
+    }
+}
 
-    /// What one finger felt.
-    pub fn touch(&self, finger: PadId) -> Lookup<'_, PadTouch> {
-        self.sample().and_then(Absent::NoFinger, |sample| sample.pad(finger))
-    }
+/// The touch of one finger.
+pub fn touch(state: &State, finger: PadId) -> Lookup<'_, PadTouch> {
+    sample(state).and_then(Absent::NoFinger, |sample| sample.pad(finger))
+}
 
-    /// What one GelSlim felt.
-    pub fn gelslim(&self, finger: PadId) -> Lookup<'_, ColorTouch> {
-        self.touch(finger).and_then(Absent::NoGelSlim, |touch| touch.color())
-    }
+/// The touch of one GelSlim.
+pub fn gelslim(state: &State, finger: PadId) -> Lookup<'_, ColorTouch> {
+    touch(state, finger).and_then(Absent::NoGelSlim, |touch| touch.color())
+}
 
-    /// What one Soft Bubble felt.
-    pub fn bubble(&self, finger: PadId) -> Lookup<'_, DepthTouch> {
-        self.touch(finger).and_then(Absent::NoBubble, |touch| touch.depth())
-    }
+/// The touch of one Soft Bubble.
+pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
+    touch(state, finger).and_then(Absent::NoBubble, |touch| touch.depth())
+}
+
+/// The true pose of the selected pair, `grasp_from_object`, where it is known.
+pub fn truth(state: &State) -> Option<PlanarPose> {
+    sample(state).ready()?.grasp_from_object
 }

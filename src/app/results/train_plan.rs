@@ -1,28 +1,18 @@
-//! What a training of the mask model would learn from.
+//! The plan of a training of the mask model: what it would learn from.
 
-use super::super::keys::{DatasetSeq, Revision};
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{Revision, TrainPlanKey};
 use super::super::pane::Demand;
-use super::super::tasks::state::TaskKind;
-use super::{Computes, Demands, Job, Lane, SharedServices, State};
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::super::state::tasks::TaskKind;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::labels::Labels;
-use touch2touch_work::train::{TrainChoice, TrainPlan, plan};
-
-/// The plan of a training, on what is drawn and marked now.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TrainPlanKey {
-    /// The data set.
-    pub dataset: DatasetSeq,
-    /// How it is divided.
-    pub choice: TrainChoice,
-    /// The last change of the document.
-    pub revision: Revision,
-}
+use touch2touch_work::train::{TrainPlan, plan};
 
 impl Computes for TrainPlanKey {
-    type Value = TrainPlan;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<TrainPlan>> {
         let source = state.library.open.as_ref()?.source.clone();
         let (changed, choice) = (state.document.labels.clone(), self.choice);
@@ -32,34 +22,28 @@ impl Computes for TrainPlanKey {
         }))
     }
 
-    fn bytes(plan: &TrainPlan) -> usize {
-        (plan.masks() + plan.held_out[0]) * 256
-    }
-
     /// The pane says it.
     fn failed(&self, _: &mut State, _: &TaskError) -> bool {
         false
     }
 }
 
-impl State {
-    /// The plan of the training that the pane describes.
-    pub(crate) fn train_plan_key(&self) -> Option<TrainPlanKey> {
-        let open = self.library.open.as_ref()?;
-        let revision = Revision(self.document.last_revision);
-        Some(TrainPlanKey { dataset: open.seq, choice: self.train.form.choice, revision })
-    }
+/// The plan of the training that the pane describes.
+pub(crate) fn train_plan_key(state: &State) -> Option<TrainPlanKey> {
+    let open = state.library.open.as_ref()?;
+    let revision = Revision(state.document.last_revision);
+    Some(TrainPlanKey { dataset: open.seq, choice: state.train.form.choice, revision })
 }
 
-impl Demands<'_> {
-    pub(crate) fn train_plan(&mut self) {
-        let state = self.state;
-        if !state.needs(Demand::Training) || state.document.stroke.is_some() || state.running(TaskKind::Train).is_some()
-        {
-            return;
-        }
-        if let Some(key) = state.train_plan_key() {
-            self.ask(key);
-        }
+pub(crate) fn want_train_plan(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if !state.needs(Demand::Training)
+        || state.document.stroke.is_some()
+        || state.tasks.of_kind(TaskKind::Train).is_some()
+    {
+        return;
+    }
+    if let Some(key) = train_plan_key(state) {
+        wants.ask(key);
     }
 }

@@ -3,35 +3,29 @@
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use super::super::keys::ShiftMode;
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{
+    CloudDifferenceKey, CloudKey, ComparedKey, EnsembleKey, ImprintKey, ImprintSource, MaskKey, MetersKey, PictureKey,
+    PoseKey, PredictionKey, SeedKey, ShiftMode, TouchKey, VersusKey,
+};
 use super::super::pane::Demand;
-use super::super::settings::state::versus::{Versus, VersusMode};
-use super::cloud::CloudKey;
-use super::imprint::{EnsembleKey, Imprint, ImprintKey, MetersKey};
-use super::mask::MaskKey;
-use super::picture::PictureKey;
-use super::pose::PoseKey;
-use super::prediction::{PredictionKey, SeedKey};
-use super::{Absent, Computes, Demands, ImprintSource, Job, Lane, Lookup, SharedServices, State, TouchKey};
+use super::super::results::{Computes, Demands, Imprint};
+use super::super::services::SharedServices;
+use super::super::state::settings::versus::{Versus, VersusMode};
+use super::super::state::{Absent, Lookup, State};
+use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::compare::{Comparison, Depicted, between, tile_of};
 use touch2touch_work::deviation::{CloudDifference, cloud_difference};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{RecipeChange, Subject};
-
-/// A prediction that is compared with something.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ComparedKey(pub PredictionKey);
+use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 
 impl Computes for ComparedKey {
-    type Value = Prediction;
-
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         self.0.job(state, services)
     }
@@ -39,22 +33,6 @@ impl Computes for ComparedKey {
     /// It does not push away what is looked at, as little as a seed among several.
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
         SeedKey(self.0.clone()).arrived(state, made);
-    }
-}
-
-/// One imprint against another of the same touch.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct VersusKey {
-    /// One: the error map is its imprint minus the other's.
-    pub a: ImprintKey,
-    /// The other.
-    pub b: ImprintKey,
-}
-
-impl VersusKey {
-    /// A prediction against the measurement of its touch.
-    pub fn measured(recipe: PredictionKey, shift: ShiftMode) -> Self {
-        Self { b: ImprintKey::Measured(recipe.touch), a: ImprintKey::Predicted(recipe, shift) }
     }
 }
 
@@ -70,7 +48,7 @@ impl Part {
             ImprintKey::Predicted(recipe, shift) => Some((state.results.predictions.get(recipe)?.clone(), *shift)),
             _ => None,
         };
-        Some(Self { imprint: key.find(state)?, drawn })
+        Some(Self { imprint: results::imprint_input(state, key)?, drawn })
     }
 
     fn depicted<'a>(
@@ -93,8 +71,6 @@ impl Part {
 }
 
 impl Computes for VersusKey {
-    type Value = Comparison;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Comparison>> {
         let touch = self.a.touch();
         let parts = [Part::of(&self.a, state)?, Part::of(&self.b, state)?];
@@ -113,31 +89,16 @@ impl Computes for VersusKey {
             between(&a?, &b?, &sample, touch.finger)
         }))
     }
-
-    fn bytes(found: &Comparison) -> usize {
-        found.error.len() * 4
-    }
-}
-
-/// How far the points of one cloud lie from another.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct CloudDifferenceKey {
-    /// The cloud whose points are measured.
-    pub a: CloudKey,
-    /// The other.
-    pub b: CloudKey,
 }
 
 impl Computes for CloudDifferenceKey {
-    type Value = CloudDifference;
-
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
         let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
         let mut imprints: PerPad<[Imprint; 2]> = PerPad::default();
         for (pad, (imprint, _)) in self.a.parts.entries() {
             if let Some((other, _)) = &self.b.parts[pad] {
-                imprints[pad] = Some([imprint.find(state)?, other.find(state)?]);
+                imprints[pad] = Some([results::imprint_input(state, imprint)?, results::imprint_input(state, other)?]);
             }
         }
         Some(Job::new(Lane::Compute, "Distances between clouds", move |_| {
@@ -147,136 +108,6 @@ impl Computes for CloudDifferenceKey {
             });
             Ok(cloud_difference(&a, &b, &imprints))
         }))
-    }
-
-    fn bytes(found: &CloudDifference) -> usize {
-        found.bytes()
-    }
-}
-
-impl State {
-    /// What is compared with what in the workspace in front.
-    pub fn versus(&self) -> Versus {
-        self.settings.versus.get(&self.settings.workspace).cloned().unwrap_or_default()
-    }
-
-    /// The recipe of a wished prediction of a touch, and how it becomes meters.
-    fn wished(&self, touch: TouchKey, wish: &RecipeChange) -> Result<(PredictionKey, ShiftMode), Absent> {
-        let bundle = match &wish.bundle {
-            None => self.bundle(BundleKind::Generator)?,
-            Some(name) => {
-                let found = self.library.bundle_named(BundleKind::Generator, Some(name), &self.rig());
-                found.filter(|bundle| bundle.name == *name).ok_or(Absent::NoSuchGenerator)?
-            }
-        };
-        let mut config = self.settings.generate.config(bundle);
-        config.steps = wish.steps.unwrap_or(config.steps);
-        config.seed = wish.seed.unwrap_or(config.seed);
-        let key = PredictionKey::new(touch, bundle.id.clone(), self.settings.runtime, &config);
-        if self.is_color(&key) {
-            return Err(Absent::PredictsColor);
-        }
-        Ok((key, wish.shift.map_or(self.settings.shift, |mapping| mapping.mode())))
-    }
-
-    /// The recipes of the predictions that a subject is made of, and how they become meters; none of what is not made.
-    fn made_for(&self, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
-        match subject {
-            Subject::Measured | Subject::Stored => Ok((Vec::new(), self.settings.shift)),
-            Subject::Predicted(wish) => self.wished(touch, wish).map(|(recipe, shift)| (vec![recipe], shift)),
-            Subject::Mean(wish, count) => {
-                let (first, shift) = self.wished(touch, wish)?;
-                Ok((first.with_seeds(*count), shift))
-            }
-        }
-    }
-
-    /// The imprint that a subject is of a finger.
-    ///
-    /// # Errors
-    /// Why there is none.
-    pub fn subject_key(&self, subject: &Subject, finger: PadId) -> Result<ImprintKey, Absent> {
-        let touch = self.touch_key(finger).ok_or(Absent::NothingSelected)?;
-        match subject {
-            Subject::Measured => self.imprint_key(ImprintSource::Measured, finger),
-            // The one that the other panes show, made by whatever settings.
-            Subject::Predicted(wish) if *wish == RecipeChange::default() => {
-                self.imprint_key(ImprintSource::Predicted, finger)
-            }
-            Subject::Predicted(wish) => {
-                let (recipe, shift) = self.wished(touch, wish)?;
-                Ok(ImprintKey::Predicted(recipe, shift))
-            }
-            Subject::Mean(..) => {
-                let (recipes, shift) = self.made_for(subject, touch)?;
-                Ok(ImprintKey::Mean(EnsembleKey { touch, recipes, shift }))
-            }
-            Subject::Stored => Ok(ImprintKey::Picture(touch)),
-        }
-    }
-
-    /// The imprint that a subject is of a finger, meters, raw bubble orientation.
-    pub fn subject(&self, subject: &Subject, finger: PadId) -> Lookup<'_, DepthMap> {
-        let key = match self.subject_key(subject, finger) {
-            Ok(key) => key,
-            Err(absent) => return Lookup::Absent(absent),
-        };
-        let unmade = match (&key, self.touch_key(finger)) {
-            (ImprintKey::Predicted(..) | ImprintKey::Mean(_), Some(touch)) => {
-                if self.sample().ready().is_some() && !self.can_start(finger) {
-                    return Lookup::Absent(Absent::NoInput);
-                }
-                let made = self.made_for(subject, touch).map(|(recipes, _)| recipes).unwrap_or_default();
-                made.into_iter().find_map(|recipe| self.failure(ComparedKey(recipe)))
-            }
-            _ => None,
-        };
-        self.imprint_of(key).or_failed(unmade)
-    }
-
-    /// One subject against another of a finger.
-    pub fn subjects_compared(&self, a: &Subject, b: &Subject, finger: PadId) -> Lookup<'_, Comparison> {
-        match (self.subject_key(a, finger), self.subject_key(b, finger)) {
-            (Ok(a), Ok(b)) => self.look(VersusKey { a, b }).value(),
-            (Err(absent), _) | (_, Err(absent)) => Lookup::Absent(absent),
-        }
-    }
-
-    /// The cloud of a subject, the contact by the masks in force on the two sides that are always shown, else by
-    /// automatic ones; `Err` holds the masks that are missing for it.
-    fn subject_cloud(&self, subject: &Subject) -> Result<CloudKey, Vec<MaskKey>> {
-        match side_of(subject) {
-            Some(side) => self.cloud_key(side).ok().flatten().ok_or_else(Vec::new),
-            None => {
-                let fingers =
-                    self.rig().pads().filter_map(|finger| Some((finger, self.subject_key(subject, finger).ok()?)));
-                self.automatic_cloud(fingers)
-            }
-        }
-    }
-
-    /// The surface points of a subject, where they are there, with their recipe.
-    pub(crate) fn subject_points(&self, subject: &Subject) -> Option<(CloudKey, &Arc<Clouds>)> {
-        let key = self.subject_cloud(subject).ok()?;
-        let found = self.results.clouds.get(&key)?;
-        Some((key, found))
-    }
-
-    fn subject_pose_key(&self, subject: &Subject) -> Option<PoseKey> {
-        let cloud = self.subject_cloud(subject).ok()?;
-        Some(PoseKey { cloud, tool: self.tool_name().ok()?.into(), engine: self.settings.pose_engine })
-    }
-
-    /// The pose of a subject, where it is there.
-    pub fn subject_pose(&self, subject: &Subject) -> Option<&PoseResult> {
-        self.results.poses.get(&self.subject_pose_key(subject)?).map(|pose| &**pose)
-    }
-
-    /// How far the points of one subject lie from those of another, where that is there, with its recipe.
-    pub fn subjects_apart(&self, a: &Subject, b: &Subject) -> Option<(CloudDifferenceKey, &CloudDifference)> {
-        let key = CloudDifferenceKey { a: self.subject_cloud(a).ok()?, b: self.subject_cloud(b).ok()? };
-        let found = self.results.apart.get(&key)?;
-        Some((key, found))
     }
 }
 
@@ -289,111 +120,228 @@ fn side_of(subject: &Subject) -> Option<ImprintSource> {
     }
 }
 
-impl Demands<'_> {
-    /// What the pane of the comparison shows and is not there.
-    pub(in crate::app) fn versus(&mut self) {
-        let state = self.state;
-        if !state.needs(Demand::Versus) || state.sample().ready().is_none() {
-            return;
+/// The recipes that a subject is made from by the settings.
+///
+/// # Errors
+/// Why it cannot be made.
+fn made_from(state: &State, subject: &Subject) -> Result<MadeFrom, Absent> {
+    subject.made_from(|named| recipe::of_generator(state, named))
+}
+
+/// The keys of the predictions that a subject of a touch is made of, and how they become meters; none of what is not made.
+fn made_for(state: &State, subject: &Subject, touch: TouchKey) -> Result<(Vec<PredictionKey>, ShiftMode), Absent> {
+    let recipes = match made_from(state, subject)? {
+        MadeFrom::Measurement | MadeFrom::Picture => Vec::new(),
+        MadeFrom::Prediction(recipe) => vec![recipe],
+        MadeFrom::Mean(recipes) => recipes,
+    };
+    let shift = recipes.first().map_or(state.settings.shift, |recipe| recipe.shift);
+    let keys: Vec<PredictionKey> = recipes.iter().filter_map(|recipe| PredictionKey::of(touch, recipe)).collect();
+    if keys.first().is_some_and(|key| state.library.predicts_color(&key.bundle)) {
+        return Err(Absent::PredictsColor);
+    }
+    Ok((keys, shift))
+}
+
+/// The imprint that a subject is of a finger.
+///
+/// # Errors
+/// Why there is none.
+pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<ImprintKey, Absent> {
+    let touch = state.touch_key(finger).ok_or(Absent::NothingSelected)?;
+    match subject {
+        Subject::Measured => results::imprint_key(state, ImprintSource::Measured, finger),
+        // The one that the other panes show, made by whatever settings.
+        Subject::Predicted(wish) if *wish == RecipeChange::default() => {
+            results::imprint_key(state, ImprintSource::Predicted, finger)
         }
-        let Versus { a, b, mode } = state.versus();
-        let both = [a, b];
-        let posed = state.seed_pose_absent().is_none();
-        let shown = state.fingers();
-        let needed: Vec<PadId> = state.rig().pads().filter(|finger| posed || shown.contains(finger)).collect();
-        for subject in &both {
-            for finger in &needed {
-                self.subject(subject, *finger);
+        Subject::Predicted(_) => {
+            let (mut recipes, shift) = made_for(state, subject, touch)?;
+            let recipe = recipes.pop().ok_or(Absent::NoSuchGenerator)?;
+            Ok(ImprintKey::Predicted(recipe, shift))
+        }
+        Subject::Mean(..) => {
+            let (recipes, shift) = made_for(state, subject, touch)?;
+            Ok(ImprintKey::Mean(EnsembleKey { touch, recipes, shift }))
+        }
+        Subject::Stored => Ok(ImprintKey::Picture(touch)),
+    }
+}
+
+/// The imprint that a subject is of a finger, meters, raw bubble orientation.
+pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup<'a, DepthMap> {
+    let key = match subject_key(state, subject, finger) {
+        Ok(key) => key,
+        Err(absent) => return Lookup::Absent(absent),
+    };
+    let unmade = match (&key, state.touch_key(finger)) {
+        (ImprintKey::Predicted(..) | ImprintKey::Mean(_), Some(touch)) => {
+            if results::sample(state).ready().is_some() && !results::can_start(state, finger) {
+                return Lookup::Absent(Absent::NoInput);
             }
+            let made = made_for(state, subject, touch).map(|(recipes, _)| recipes).unwrap_or_default();
+            made.into_iter().find_map(|recipe| state.failure(ComparedKey(recipe)))
         }
-        for finger in shown {
-            let with = |subject: &Subject| state.subject_key(subject, finger).ok().filter(|key| self.is_there(key));
-            let [a, b] = [&both[0], &both[1]].map(with);
-            let measured = with(&Subject::Measured);
-            for (a, b) in [(&a, &b), (&a, &measured), (&b, &measured)] {
-                if let (Some(a), Some(b)) = (a, b)
-                    && (a != b || mode == VersusMode::Difference)
-                {
-                    self.ask(VersusKey { a: a.clone(), b: b.clone() });
-                }
-            }
-        }
-        // While the pen is down the cloud would be out of date before it is there.
-        if !posed || state.document.stroke.is_some() {
-            return;
-        }
-        for subject in &both {
-            self.subject_place(subject);
-        }
-        let clouds = both.each_ref().map(|subject| state.subject_cloud(subject).ok());
-        if let [Some(a), Some(b)] = clouds
-            && mode == VersusMode::Apart
-            && state.results.clouds.contains(&a)
-            && state.results.clouds.contains(&b)
-        {
-            self.ask(CloudDifferenceKey { a, b });
+        _ => None,
+    };
+    results::imprint_of(state, key).or_failed(unmade)
+}
+
+/// One subject against another of a finger.
+pub fn subjects_compared<'a>(state: &'a State, a: &Subject, b: &Subject, finger: PadId) -> Lookup<'a, Comparison> {
+    match (subject_key(state, a, finger), subject_key(state, b, finger)) {
+        (Ok(a), Ok(b)) => state.look(VersusKey { a, b }).value(),
+        (Err(absent), _) | (_, Err(absent)) => Lookup::Absent(absent),
+    }
+}
+
+/// The cloud of a subject, the contact by the masks in force on the two sides that are always shown, else by
+/// automatic ones; `Err` holds the masks that are missing for it.
+fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskKey>> {
+    match side_of(subject) {
+        Some(side) => results::cloud_key(state, side).ok().flatten().ok_or_else(Vec::new),
+        None => {
+            let fingers =
+                state.rig().pads().filter_map(|finger| Some((finger, subject_key(state, subject, finger).ok()?)));
+            results::automatic_cloud(state, fingers)
         }
     }
+}
 
-    fn is_there(&self, key: &ImprintKey) -> bool {
-        self.state.imprint_of(key.clone()).ready().is_some()
+/// The surface points of a subject, where they are there, with their recipe.
+pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Arc<Clouds>)> {
+    let key = subject_cloud(state, subject).ok()?;
+    let found = state.results.clouds.get(&key)?;
+    Some((key, found))
+}
+
+fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
+    if let Some(side) = side_of(subject) {
+        return results::pose_key(state, side).ok()?;
     }
+    let cloud = subject_cloud(state, subject).ok()?;
+    Some(PoseKey::of(cloud, results::tool_name(state).ok()?.into(), &recipe::in_force(state, ImprintSource::Predicted)))
+}
 
-    /// The imprint of a subject, and the predictions that it is made of.
-    fn subject(&mut self, subject: &Subject, finger: PadId) {
-        let state = self.state;
-        let Some(touch) = state.touch_key(finger) else { return };
-        match (side_of(subject), state.subject_key(subject, finger)) {
-            (Some(ImprintSource::Measured), _) => {}
-            (Some(ImprintSource::Predicted), _) => {
-                self.stored(finger, touch);
-                self.imprint(finger, touch);
-                self.other_finger(finger);
-            }
-            (None, Ok(ImprintKey::Picture(touch))) => self.ask(PictureKey(touch)),
-            (None, Ok(key)) if state.can_start(finger) => {
-                let Ok((recipes, shift)) = state.made_for(subject, touch) else { return };
-                let mut whole = true;
-                for recipe in recipes {
-                    if state.results.predictions.contains(&recipe) {
-                        let meters = MetersKey(recipe, shift);
-                        whole &= state.results.imprints.contains(&meters);
-                        self.ask(meters);
-                    } else {
-                        whole = false;
-                        self.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
-                    }
-                }
-                if let ImprintKey::Mean(key) = key
-                    && whole
-                {
-                    self.ask(key);
-                }
-            }
-            (None, _) => {}
+/// The pose of a subject, where it is there.
+pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseResult> {
+    state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
+}
+
+/// The distances of the points of one subject from those of another, where they are there, with their key.
+pub fn subjects_apart<'a>(
+    state: &'a State,
+    a: &Subject,
+    b: &Subject,
+) -> Option<(CloudDifferenceKey, &'a CloudDifference)> {
+    let key = CloudDifferenceKey { a: subject_cloud(state, a).ok()?, b: subject_cloud(state, b).ok()? };
+    let found = state.results.apart.get(&key)?;
+    Some((key, found))
+}
+
+/// Asks for what the pane of the comparison shows and is not there.
+pub(crate) fn want_versus(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if !state.needs(Demand::Versus) || results::sample(state).ready().is_none() {
+        return;
+    }
+    let Versus { a, b, mode } = state.settings.compared();
+    let both = [a, b];
+    let posed = results::seed_pose_absent(state).is_none();
+    let shown = state.fingers();
+    let needed: Vec<PadId> = state.rig().pads().filter(|finger| posed || shown.contains(finger)).collect();
+    for subject in &both {
+        for finger in &needed {
+            want_subject(wants, subject, *finger);
         }
     }
+    for finger in shown {
+        let with = |subject: &Subject| subject_key(state, subject, finger).ok().filter(|key| want_is_there(wants, key));
+        let [a, b] = [&both[0], &both[1]].map(with);
+        let measured = with(&Subject::Measured);
+        for (a, b) in [(&a, &b), (&a, &measured), (&b, &measured)] {
+            if let (Some(a), Some(b)) = (a, b)
+                && (a != b || mode == VersusMode::Difference)
+            {
+                wants.ask(VersusKey { a: a.clone(), b: b.clone() });
+            }
+        }
+    }
+    // While the pen is down the cloud would be out of date before it is there.
+    if !posed || state.document.stroke.is_some() {
+        return;
+    }
+    for subject in &both {
+        want_subject_place(wants, subject);
+    }
+    let clouds = both.each_ref().map(|subject| subject_cloud(state, subject).ok());
+    if let [Some(a), Some(b)] = clouds
+        && mode == VersusMode::Apart
+        && state.results.clouds.contains(&a)
+        && state.results.clouds.contains(&b)
+    {
+        wants.ask(CloudDifferenceKey { a, b });
+    }
+}
 
-    /// Masks, cloud and pose of a subject.
-    fn subject_place(&mut self, subject: &Subject) {
-        let state = self.state;
-        if let Some(side) = side_of(subject) {
-            for finger in state.rig().pads() {
-                self.mask(side, finger);
-            }
-            if self.cloud(side) {
-                self.pose(side);
-            }
-            return;
+pub(crate) fn want_is_there(wants: &Demands<'_>, key: &ImprintKey) -> bool {
+    results::imprint_of(wants.state, key.clone()).ready().is_some()
+}
+
+/// The imprint of a subject, and the predictions that it is made of.
+pub(crate) fn want_subject(wants: &mut Demands<'_>, subject: &Subject, finger: PadId) {
+    let state = wants.state;
+    let Some(touch) = state.touch_key(finger) else { return };
+    match (side_of(subject), subject_key(state, subject, finger)) {
+        (Some(ImprintSource::Measured), _) => {}
+        (Some(ImprintSource::Predicted), _) => {
+            results::want_stored(wants, finger, touch);
+            results::want_imprint(wants, finger, touch);
+            results::want_other_finger(wants, finger);
         }
-        self.tool();
-        match state.subject_cloud(subject) {
-            Err(missing) => missing.into_iter().for_each(|mask| self.ask(mask)),
-            Ok(cloud) if !state.results.clouds.contains(&cloud) => self.ask(cloud),
-            Ok(_) if state.tool().ready().is_some() => {
-                state.subject_pose_key(subject).into_iter().for_each(|pose| self.ask(pose));
+        (None, Ok(ImprintKey::Picture(touch))) => wants.ask(PictureKey(touch)),
+        (None, Ok(key)) if results::can_start(state, finger) => {
+            let Ok((recipes, shift)) = made_for(state, subject, touch) else { return };
+            let mut whole = true;
+            for recipe in recipes {
+                if state.results.predictions.contains(&recipe) {
+                    let meters = MetersKey(recipe, shift);
+                    whole &= state.results.imprints.contains(&meters);
+                    wants.ask(meters);
+                } else {
+                    whole = false;
+                    wants.ask_unless(state.tasks.generating(&recipe).is_some(), ComparedKey(recipe));
+                }
             }
-            Ok(_) => {}
+            if let ImprintKey::Mean(key) = key
+                && whole
+            {
+                wants.ask(key);
+            }
         }
+        (None, _) => {}
+    }
+}
+
+/// Masks, cloud and pose of a subject.
+pub(crate) fn want_subject_place(wants: &mut Demands<'_>, subject: &Subject) {
+    let state = wants.state;
+    if let Some(side) = side_of(subject) {
+        for finger in state.rig().pads() {
+            results::want_mask(wants, side, finger);
+        }
+        if results::want_cloud(wants, side) {
+            results::want_pose(wants, side);
+        }
+        return;
+    }
+    results::want_tool(wants);
+    match subject_cloud(state, subject) {
+        Err(missing) => missing.into_iter().for_each(|mask| wants.ask(mask)),
+        Ok(cloud) if !state.results.clouds.contains(&cloud) => wants.ask(cloud),
+        Ok(_) if results::tool(state).ready().is_some() => {
+            subject_pose_key(state, subject).into_iter().for_each(|pose| wants.ask(pose));
+        }
+        Ok(_) => {}
     }
 }

@@ -1,16 +1,18 @@
-//! The thread that follows a folder. It sleeps almost always, and wakes the window only when a touch arrived.
+//! The thread that follows a folder, as `touch2touch watch` does. It sleeps almost always, and wakes the window only when a
+//! touch arrived.
 
 use std::sync::Arc;
 use std::sync::mpsc::Sender;
 
 use super::super::answers::Answer;
 use super::super::keys::DatasetSeq;
-use super::super::services::{DataSource, Following};
+use super::super::source::{DataSource, Followed};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
 use touch2touch_work::error::TaskError;
+use touch2touch_work::follow::{FollowEvent, Following};
 use touch2touch_work::io::caught::caught;
-use touch2touch_work::io::follow::PERIOD;
+use touch2touch_work::io::follow::Arrival;
 use touch2touch_work::job::Cancel;
 
 /// A followed folder.
@@ -18,7 +20,7 @@ pub(super) enum FollowTask {
     /// On a thread of its own, until told to stop.
     Thread(Cancel),
     /// Looked at in each round, where the runtime has no threads.
-    Inline(DatasetSeq, Box<dyn Following>),
+    Inline(DatasetSeq, Arc<dyn DataSource>, Box<Following>),
 }
 
 impl Runtime {
@@ -29,7 +31,8 @@ impl Runtime {
         }
         let Some((seq, source)) = of else { return };
         if !self.threaded {
-            self.follower = source.follow().map(|following| FollowTask::Inline(seq, following));
+            let following = source.follow().map(Box::new);
+            self.follower = following.map(|following| FollowTask::Inline(seq, source, following));
             return;
         }
         let cancel = Cancel::default();
@@ -51,8 +54,9 @@ impl Runtime {
     }
 
     pub(super) fn poll_follower(&mut self) {
-        if let Some(FollowTask::Inline(seq, following)) = &mut self.follower {
-            while let Some(followed) = following.poll() {
+        if let Some(FollowTask::Inline(seq, source, following)) = &mut self.follower {
+            while let Some(event) = following.poll() {
+                let Some(followed) = followed(&**source, following, event) else { continue };
                 let answer = Answer::Followed(*seq, followed);
                 drop(self.sender.send(Event { id: JobId::Follow, answer }));
             }
@@ -62,15 +66,31 @@ impl Runtime {
 
 fn watch(seq: DatasetSeq, source: &dyn DataSource, stop: &Cancel, sender: &Sender<Event>, wake: &Wake) {
     let Some(mut following) = source.follow() else { return };
-    while !stop.is_cancelled() {
-        match following.poll() {
-            Some(followed) => {
-                if sender.send(Event { id: JobId::Follow, answer: Answer::Followed(seq, followed) }).is_err() {
-                    return;
-                }
-                wake();
-            }
-            None => std::thread::sleep(PERIOD),
+    while let Some(event) = following.wait(stop, false) {
+        let Some(followed) = followed(source, &mut following, event) else { continue };
+        if sender.send(Event { id: JobId::Follow, answer: Answer::Followed(seq, followed) }).is_err() {
+            return;
         }
+        wake();
     }
+}
+
+/// The touch that an event is about, with the data set that it arrived in.
+fn followed(source: &dyn DataSource, following: &mut Following, event: FollowEvent) -> Option<Followed> {
+    let ready = match event {
+        FollowEvent::Ready(ready) => ready,
+        FollowEvent::Trouble(trouble) => {
+            log::warn!("{}: {} ({})", trouble.file.display(), trouble.what, trouble.hint);
+            return None;
+        }
+        FollowEvent::Recovered => return None,
+    };
+    let sample = match following.read(&ready) {
+        Arrival::Unfinished | Arrival::Gone => return None,
+        Arrival::Broken(problem) => {
+            Err(TaskError::new(format!("Load {}", ready.name), problem.what).with_hint(problem.hint))
+        }
+        Arrival::Whole(loaded) => Ok(Arc::new(loaded.sample)),
+    };
+    Some(Followed { source: source.grown(following.dataset()?)?, pair: ready.id, completed: ready.completed, sample })
 }

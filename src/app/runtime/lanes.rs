@@ -10,7 +10,7 @@ use strum::IntoEnumIterator as _;
 use super::super::answers::Answer;
 use super::super::jobs::{self, Body, Lane};
 use super::super::keys::DatasetSeq;
-use super::super::results::{Computed, Request};
+use super::super::state::results::{Computed, Request};
 use super::{JobId, Wake, lock};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::io::caught::caught;
@@ -69,7 +69,7 @@ pub(super) struct Lanes {
     lanes: Vec<Arc<LaneState>>,
     threads: Vec<(Lane, JoinHandle<()>)>,
     sender: Sender<Event>,
-    /// What the queues were last filled from.
+    /// The demands that the queues were last filled from.
     demanded: Vec<Request>,
     threaded: bool,
 }
@@ -164,7 +164,7 @@ impl Lanes {
         self.demanded = wanted.to_vec();
     }
 
-    /// Whether everything wanted runs or waits already.
+    /// True where everything wanted runs or waits already.
     fn all_placed(&self, wanted: &[Request], started: &BTreeSet<Request>) -> bool {
         let waiting: BTreeSet<Request> = self
             .lanes

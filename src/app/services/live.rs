@@ -1,8 +1,6 @@
 //! The services of the program: data sets and labels through `io`, models through `infer`, settings in the user's
 //! configuration folder.
 
-mod follow;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -10,11 +8,12 @@ use std::time::Duration;
 
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
-use super::super::labels::state::{PairLabels, Review};
-use super::super::library::state::Place;
 use super::super::services::Opened;
-use super::super::settings::state::{SETTINGS_VERSION, Settings};
-use super::{DataSource, Following, Services};
+use super::super::source::DataSource;
+use super::super::state::labels::{PairLabels, Review};
+use super::super::state::library::Place;
+use super::super::state::settings::{SETTINGS_VERSION, Settings};
+use super::Services;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::diffusion::GenerateConfig;
@@ -27,19 +26,20 @@ use touch2touch_work::case::{self, Case, Held};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
+use touch2touch_work::follow::Following;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::store::{self, Store};
-use touch2touch_work::io::case_file;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, files, folders};
+use touch2touch_work::io::{atomic, case_file, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::label_stats::{LabelStats, label_stats};
 use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
 use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
 use touch2touch_work::new_bundle::models_folder;
 use touch2touch_work::prediction::Prediction;
+use touch2touch_work::repeats::Repeater;
 use touch2touch_work::tool::tool_file;
 use touch2touch_work::tuning::unfinished_folder;
 
@@ -47,18 +47,18 @@ use touch2touch_work::tuning::unfinished_folder;
 const PATIENCE: Duration = Duration::from_millis(150);
 /// The settings file inside the configuration folder.
 const SETTINGS_FILE: &str = "settings.json";
-/// Where a settings file that cannot be used is put.
+/// The place to which a settings file is put that cannot be used.
 const BAD_SETTINGS_FILE: &str = "settings.bad.json";
 
 /// The program's services. Models stay loaded between calls.
 #[derive(Debug, Default)]
 pub struct LiveServices {
     config_folder: Option<PathBuf>,
-    /// Where fitted models are kept.
+    /// The folder of fitted models.
     models_folder: Option<PathBuf>,
-    /// Where tuning that was stopped is kept.
+    /// The folder of tuning that was stopped.
     unfinished: Option<PathBuf>,
-    /// Where labels wait that could not be saved.
+    /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
     models: Models,
 }
@@ -126,7 +126,7 @@ pub struct LiveSource {
     /// Second masks, by person.
     repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     case: Option<(PairId, Case, Held)>,
-    /// Where labels wait that could not be saved.
+    /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
     recovered: Recovered,
 }
@@ -137,7 +137,7 @@ impl LiveSource {
         &self.dataset
     }
 
-    /// What a person drew a second time: the same each time, so that only differences are written.
+    /// The second drawings of each person: one value for all, so that only differences are written.
     fn repeats_of(&self, person: &str) -> Result<Labels, TaskError> {
         let mut known = self.repeats.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(labels) = known.get(person) {
@@ -188,8 +188,21 @@ impl DataSource for LiveSource {
         Ok(tool_file(&self.dataset, tool)?.mesh)
     }
 
-    fn follow(&self) -> Option<Box<dyn Following>> {
-        follow::start(self)
+    fn follow(&self) -> Option<Following> {
+        Following::continuing(self.dataset.clone())
+    }
+
+    fn grown(&self, dataset: &Arc<Dataset>) -> Option<Arc<dyn DataSource>> {
+        Some(Arc::new(Self {
+            dataset: dataset.clone(),
+            labels: self.labels.continued(dataset),
+            problems: dataset.problems.clone(),
+            reviews: self.reviews.clone(),
+            repeats: self.repeats.clone(),
+            case: None,
+            waiting: self.waiting.clone(),
+            recovered: Recovered::default(),
+        }))
     }
 
     fn load_labels(&self, name: &str) -> Result<PairLabels, TaskError> {
@@ -226,7 +239,7 @@ impl DataSource for LiveSource {
         self.repeats_of(person)?.save(name, labels, deed).map(drop)
     }
 
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: (&str, f64)) -> Result<LabelStats, TaskError> {
+    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: Repeater<'_>) -> Result<LabelStats, TaskError> {
         Ok(label_stats(&self.dataset, &self.labels, reviews, whose))
     }
 
@@ -286,7 +299,7 @@ impl Services for LiveServices {
     ) -> Vec<(PredictionKey, Prediction)> {
         let keyed = |kept: KeptPrediction| {
             let bundle = kept.prediction.bundle.clone();
-            (PredictionKey::new(touch, bundle, kept.engine, &kept.config), kept.prediction)
+            (PredictionKey { touch, bundle, config: kept.config, runtime: kept.engine }, kept.prediction)
         };
         self.models.kept(bundles, engine, difference).into_iter().map(keyed).collect()
     }

@@ -105,8 +105,8 @@ pub(in super::super) struct LabelArgs {
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     /// The registration.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    pub(super) engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    pub(super) registration: RegistrationChoice,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
     #[command(flatten)]

@@ -34,8 +34,8 @@ pub(in super::super) struct ProposeArgs {
     #[arg(long, value_name = "PAIR")]
     carry_from: Option<String>,
     /// The registration of `cad_registered`.
-    #[arg(long, value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Who labels; else whom the system says.
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
@@ -71,7 +71,7 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
     let setup = BatchSetup {
         propose: ProposeSetup {
             source: args.source,
-            recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.engine)?,
+            recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?,
             pose: None,
             carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
         },

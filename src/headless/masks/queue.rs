@@ -40,8 +40,8 @@ pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long, default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    engine: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     #[command(flatten)]
     mapping: MappingArgs,
     /// The engine that runs the models.
@@ -74,7 +74,7 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     Ok(Setup {
         bundles: bundles.iter().filter(generator).map(|b| b.origin().clone()).collect(),
         classifier: first(|b| b.tool_classifier().is_some()),
-        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.engine, args.runtime)?,
+        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.registration, args.runtime)?,
         ..Setup::default()
     })
 }

@@ -8,6 +8,7 @@ use super::super::args::DatasetArgs;
 use super::super::{Common, Output, VerbResult};
 use touch2touch_work::label_stats::{Counts, Effort, LabelStats, label_stats};
 use touch2touch_work::labels::{Labels, Review, system_person};
+use touch2touch_work::repeats::Repeater;
 
 /// Arguments of `masks stats`.
 #[derive(Debug, Args)]
@@ -40,7 +41,7 @@ pub(super) fn run(args: &StatsArgs) -> VerbResult {
     }
     let person = args.person.clone().or_else(system_person).unwrap_or_default();
     // Nothing is to come back here: that is for the studio.
-    let stats = label_stats(&dataset, &labels, &reviews.states, (&person, 0.0));
+    let stats = label_stats(&dataset, &labels, &reviews.states, Repeater { person: &person, share: 0.0 });
     for problem in &stats.problems {
         output.note(problem);
     }

@@ -32,8 +32,8 @@ pub(in crate::headless) struct PoseArgs {
     pub(super) tool: ToolArgs,
     /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other. A key may be
     /// followed by what is left out: `:gate=MM` (contacts farther from the model) or `:trim=SHARE` (the farthest).
-    #[arg(long, value_name = "ENGINE", default_value = "default", value_parser = EnginesParser)]
-    pub(super) engine: Engines,
+    #[arg(long = "engine", value_name = "ENGINE", default_value = "default", value_parser = RegistrationsParser)]
+    pub(super) registration: Registrations,
     /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
     /// `10,0,-2`. Repeat for several.
     #[arg(long = "start", value_name = "DEG,MM,MM", value_parser = parse_start, allow_hyphen_values = true)]
@@ -79,22 +79,22 @@ pub(super) enum Imprints {
 
 /// The registrations to run, in this order.
 #[derive(Debug, Clone)]
-pub(in crate::headless) struct Engines(pub(in crate::headless) Vec<RegistrationChoice>);
+pub(in crate::headless) struct Registrations(pub(in crate::headless) Vec<RegistrationChoice>);
 
 /// Reads a registration, or one of the short names; lists them all in the help.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::headless) struct EnginesParser;
+pub(in crate::headless) struct RegistrationsParser;
 
-impl TypedValueParser for EnginesParser {
-    type Value = Engines;
+impl TypedValueParser for RegistrationsParser {
+    type Value = Registrations;
 
     fn parse_ref(
         &self,
         cmd: &clap::Command,
         arg: Option<&clap::Arg>,
         value: &std::ffi::OsStr,
-    ) -> Result<Engines, clap::Error> {
-        Ok(Engines(match value.to_str() {
+    ) -> Result<Registrations, clap::Error> {
+        Ok(Registrations(match value.to_str() {
             Some("default") => vec![RegistrationChoice::default()],
             Some("lab") => vec![Registration::LabIcp.into()],
             Some("all") => Registration::iter().map(Into::into).collect(),
@@ -142,14 +142,14 @@ impl PoseArgs {
             Imprints::Measured => ImprintSource::Measured,
             Imprints::Predicted | Imprints::Both => ImprintSource::Predicted,
         };
-        self.model.posed(imprint, rig, &self.mask, self.engine.0[0])
+        self.model.posed(imprint, rig, &self.mask, self.registration.0[0])
     }
 }
 
 /// The registration as the arguments want it.
-pub(super) fn registration(args: &PoseArgs, engine: RegistrationChoice) -> Box<dyn Register> {
-    if engine.by != Registration::LabIcp {
-        return engine.method();
+pub(super) fn registration(args: &PoseArgs, choice: RegistrationChoice) -> Box<dyn Register> {
+    if choice.by != Registration::LabIcp {
+        return choice.method();
     }
     let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };
     if let Some(seed) = args.paper_starts {

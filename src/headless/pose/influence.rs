@@ -45,16 +45,18 @@ impl NamedPlace {
 /// pose has none. That it cannot be written is an error.
 pub(super) fn write(
     stem: &Path,
-    (clouds, sample, tool): (&Clouds, &Sample, &ToolModel),
-    (imprint, engine): (ImprintSource, RegistrationChoice),
+    clouds: &Clouds,
+    sample: &Sample,
+    tool: &ToolModel,
+    (imprint, registration): (ImprintSource, RegistrationChoice),
     found: &PoseResult,
 ) -> anyhow::Result<Result<Influences, TaskError>> {
-    let found = match influence(clouds, sample, tool, engine, found.grasp_from_object) {
+    let found = match influence(clouds, sample, tool, registration, found.grasp_from_object) {
         Ok(found) => found,
         Err(why) => return Ok(Err(why)),
     };
-    let engine = engine.to_string().replace([':', '='], "_");
-    let file = names::with_ending(stem, &format!("_{}_{engine}_influence.npz", imprint.key()));
+    let registration = registration.to_string().replace([':', '='], "_");
+    let file = names::with_ending(stem, &format!("_{}_{registration}_influence.npz", imprint.key()));
     let name = |pad| sample.rig.pad_key(pad).to_string();
     let arrays: Vec<(String, Tensor)> = found
         .pixels

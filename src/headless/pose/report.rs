@@ -18,7 +18,8 @@ use touch2touch_core::units::angle_error;
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PoseRow {
     pub(super) name: String,
-    pub(super) engine: String,
+    #[serde(rename = "engine")]
+    pub(super) registration: String,
     pub(super) imprint: &'static str,
     /// Bases of the masks: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
     /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
@@ -88,11 +89,12 @@ pub(super) struct AngleMetrics {
 
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
-    /// The figures of the first engine on the first kind of imprint.
+    /// The figures of the first registration on the first kind of imprint.
     #[serde(flatten)]
     pub(super) first: AngleMetrics,
-    /// `engine` (first kind of imprint) and `engine/imprint` (all): the figures of each.
-    pub(super) engines: BTreeMap<String, AngleMetrics>,
+    /// `registration` (first kind of imprint) and `registration/imprint` (all): the figures of each.
+    #[serde(rename = "engines")]
+    pub(super) registrations: BTreeMap<String, AngleMetrics>,
 }
 
 #[derive(Debug, Serialize)]
@@ -114,20 +116,21 @@ pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a PoseRow>) -> AngleMetr
     AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-pub(super) fn summary(cases: &[PoseRow], first_imprint: &str, first_engine: RegistrationChoice) -> Summary {
-    let of = |engine: &str, imprint: &str| figures(cases.iter().filter(|c| c.engine == engine && c.imprint == imprint));
-    let mut engines = BTreeMap::new();
+pub(super) fn summary(cases: &[PoseRow], first_imprint: &str, first: RegistrationChoice) -> Summary {
+    let is_of = |case: &PoseRow, by: &str, imprint: &str| case.registration == by && case.imprint == imprint;
+    let of = |by: &str, imprint: &str| figures(cases.iter().filter(|case| is_of(case, by, imprint)));
+    let mut registrations = BTreeMap::new();
     for case in cases {
-        let key = format!("{}/{}", case.engine, case.imprint);
-        if !engines.contains_key(&key) {
-            let figures = of(&case.engine, case.imprint);
+        let key = format!("{}/{}", case.registration, case.imprint);
+        if !registrations.contains_key(&key) {
+            let figures = of(&case.registration, case.imprint);
             if case.imprint == first_imprint {
-                engines.insert(case.engine.clone(), figures.clone());
+                registrations.insert(case.registration.clone(), figures.clone());
             }
-            engines.insert(key, figures);
+            registrations.insert(key, figures);
         }
     }
-    Summary { first: of(&first_engine.to_string(), first_imprint), engines }
+    Summary { first: of(&first.to_string(), first_imprint), registrations }
 }
 
 pub(super) fn text(report: &Report) -> String {
@@ -140,7 +143,7 @@ pub(super) fn text(report: &Report) -> String {
             number(c.angle_deg),
             number(c.truth_deg),
             number(c.error_deg),
-            c.engine,
+            c.registration,
             c.imprint,
             c.mask,
             c.stop
@@ -160,7 +163,7 @@ pub(super) fn text(report: &Report) -> String {
         "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
         "registration/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
     );
-    for (key, f) in report.summary.engines.iter().filter(|(k, _)| k.contains('/')) {
+    for (key, f) in report.summary.registrations.iter().filter(|(k, _)| k.contains('/')) {
         let a = f.angles;
         text += &format!(
             "{key:<28} {:>5} {:>9} {:>9} {:>7.1} {:>7.1} {:>10}\n",

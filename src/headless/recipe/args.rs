@@ -13,7 +13,6 @@ use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::subject::{Mapping, RecipeChange};
 
 /// Models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -61,22 +60,18 @@ pub struct ModelArgs {
 }
 
 impl ModelArgs {
-    /// Arguments with what a subject of a comparison wants otherwise. A bundle is named by its folder, or as it calls
-    /// itself.
-    pub(in crate::headless) fn with(&self, wish: &RecipeChange) -> Self {
-        let mut args = self.clone();
-        if let Some(name) = &wish.bundle {
-            let found = self.found.get_or_init(|| bundles::find(&[]));
-            let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
-            args.bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
-        }
-        args.steps = wish.steps.or(args.steps);
-        args.seed = wish.seed.or(args.seed);
-        match wish.shift {
-            None => {}
-            Some(mapping) => args.mapping = MappingArgs::of(mapping),
-        }
-        args
+    /// Arguments with another generator, named by its folder, or as it calls itself.
+    pub(in crate::headless) fn with_generator(&self, name: &str) -> Self {
+        let found = self.found.get_or_init(|| bundles::find(&[]));
+        let named = found.bundles.iter().find(|b| b.kind == BundleKind::Generator && b.name == *name);
+        let bundle = Some(named.map_or_else(|| PathBuf::from(name), |bundle| bundle.origin.path()));
+        Self { bundle, ..self.clone() }
+    }
+
+    /// Arguments with the mapping that is there without options: for what names its own.
+    pub(in crate::headless) fn without_mapping(&self) -> Self {
+        let mapping = MappingArgs { shift: ShiftArg::Exact, fit_parts: CorrectionParts::ALL, stats: None };
+        Self { mapping, ..self.clone() }
     }
 }
 
@@ -137,16 +132,6 @@ enum ShiftArg {
 }
 
 impl MappingArgs {
-    fn of(mapping: Mapping) -> Self {
-        let (shift, fit_parts) = match mapping {
-            Mapping::Raw => (ShiftArg::Raw, CorrectionParts::ALL),
-            Mapping::Paper => (ShiftArg::Paper, CorrectionParts::ALL),
-            Mapping::Exact => (ShiftArg::Exact, CorrectionParts::ALL),
-            Mapping::Unfitted => (ShiftArg::Exact, CorrectionParts::NONE),
-        };
-        Self { shift, fit_parts, stats: None }
-    }
-
     /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
     pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
         if self.shift != ShiftArg::Refit && self.stats.is_some() {

@@ -27,6 +27,29 @@ use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::{load_tool, named_tool};
 
+/// The tool of a touch.
+pub(super) struct HeldTool {
+    pub(super) name: String,
+    pub(super) model: Arc<ToolModel>,
+}
+
+/// A touch that arrived, with what its result is called and depends on.
+#[derive(Clone, Copy)]
+pub(super) struct Arrived<'a> {
+    pub(super) ready: &'a Ready,
+    /// The name of its tool, where it has a CAD model.
+    pub(super) tool: Option<&'a str>,
+    /// When it was found whole.
+    pub(super) found: SystemTime,
+    /// When its reading began, and ended.
+    pub(super) start: Instant,
+    pub(super) read: Instant,
+    /// Path of its results, without an ending.
+    pub(super) stem: &'a Path,
+    pub(super) source: &'a Source,
+    pub(super) recipe: &'a Value,
+}
+
 /// The models, loaded once, and the tools met so far.
 pub(super) struct Worker<'a> {
     args: &'a WatchArgs,
@@ -41,7 +64,7 @@ pub(super) struct Worker<'a> {
 impl<'a> Worker<'a> {
     /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
     pub(super) fn new(args: &'a WatchArgs, rig: &Rig, stop: Cancel) -> anyhow::Result<Self> {
-        let registration = match args.engine.0.as_slice() {
+        let registration = match args.registration.0.as_slice() {
             [registration] => *registration,
             _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
         };
@@ -68,28 +91,16 @@ impl<'a> Worker<'a> {
     }
 
     /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
-    #[allow(clippy::too_many_arguments, reason = "one call site, and each is a part of the question")]
-    pub(super) fn work(
-        &mut self,
-        dataset: &Dataset,
-        sample: &Sample,
-        tool: Option<&str>,
-        labels: &PairLabels,
-        stem: &Path,
-        source: &Source,
-        recipe: &Value,
-        (ready, found, start): (&Ready, SystemTime, Instant),
-    ) -> anyhow::Result<Option<Done>> {
+    pub(super) fn work(&self, touch: Touch<'_>, arrived: Arrived<'_>) -> anyhow::Result<Option<Done>> {
+        let Arrived { ready, tool, found, start, read, stem, source, recipe } = arrived;
+        let sample = touch.sample;
         let since = |earlier: SystemTime, later: SystemTime| {
             later.duration_since(earlier).map_or(0.0, |d| d.as_secs_f64() * 1e3)
         };
         let ms = |from: Instant| from.elapsed().as_secs_f64() * 1e3;
-        let mut latency = Latency { found: since(ready.stamp.closed, found), load: ms(start), ..Latency::default() };
+        let load = (read - start).as_secs_f64() * 1e3;
+        let mut latency = Latency { found: since(ready.stamp.closed, found), load, ..Latency::default() };
 
-        let step = Instant::now();
-        let tool = self.tool_of(dataset, sample, tool);
-        let model = tool.as_ref().map(|(_, model)| &**model);
-        let touch = Touch { dataset, pair: ready.id, sample, tool: model, labels };
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
         let felt = match feel(touch, &self.recipe, Stage::Imprint, &self.models, &cx) {
             Err(_) if self.stop.is_cancelled() => return Ok(None),
@@ -98,15 +109,16 @@ impl<'a> Worker<'a> {
             }
             felt => felt?,
         };
-        latency.generate = ms(step);
+        latency.generate = ms(read);
         let step = Instant::now();
         let felt = felt.reach(touch, Stage::Mask, &self.models, &cx)?;
         latency.mask = ms(step);
         let step = Instant::now();
         let felt = felt.reach(touch, Stage::Pose, &self.models, &cx)?;
-        let (pose, no_pose) = match (&tool, felt.pose()) {
-            (Ok((name, _)), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
-            (Err(err), _) | (_, Err(err)) => (None, Some(err.why.clone())),
+        let (pose, no_pose) = match (tool, felt.pose()) {
+            (Some(name), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
+            (_, Err(err)) => (None, Some(err.why.clone())),
+            (None, Ok(_)) => (None, None),
         };
         let (contact, shift) = (felt.contact(), self.recipe.shift);
         latency.pose = ms(step);
@@ -115,7 +127,7 @@ impl<'a> Worker<'a> {
         let files = write::predictions(stem, &sample.rig, contact, &self.args.save)?;
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
-        let tile = compare::tile_of(dataset, ready.id, sample)?;
+        let tile = compare::tile_of(touch.dataset, touch.pair, sample)?;
         let drawn = |pad: PadId| Some((felt.predictions[pad].as_ref()?, shift));
         let mut done = Done {
             name: ready.name.clone(),
@@ -143,12 +155,12 @@ impl<'a> Worker<'a> {
     }
 
     /// The name and the CAD model of a touch's tool, or why it has no pose.
-    fn tool_of(
+    pub(super) fn tool_of(
         &mut self,
         dataset: &Dataset,
         sample: &Sample,
         name: Option<&str>,
-    ) -> Result<(String, Arc<ToolModel>), TaskError> {
+    ) -> Result<HeldTool, TaskError> {
         let fail = |why: String| TaskError::new("Pose", why);
         let name = name.ok_or_else(|| fail("the file's name says no tool; name it with --tool".into()))?;
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
@@ -159,7 +171,7 @@ impl<'a> Worker<'a> {
             self.tools.insert(name.to_owned(), Arc::new(model));
         }
         let model = self.tools.get(name).ok_or_else(|| fail(format!("no CAD model of {name}")))?;
-        Ok((name.to_owned(), model.clone()))
+        Ok(HeldTool { name: name.to_owned(), model: model.clone() })
     }
 }
 
@@ -190,7 +202,7 @@ fn tool_model(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result
     }
     let demo = Dataset::demo();
     let has_it = dataset.tool_mesh_file(name).is_some() || demo.tool_mesh(name).ok().flatten().is_none();
-    let (model, _) = load_tool(if has_it { dataset } else { &demo }, name)
+    let loaded = load_tool(if has_it { dataset } else { &demo }, name)
         .map_err(|err| anyhow::anyhow!("{err} Or name a file with --tool."))?;
-    Ok(model)
+    Ok(loaded.model)
 }

@@ -6,6 +6,7 @@ use eframe::egui::{
 };
 
 use crate::app::command::{DialCommand, LibraryCommand};
+use crate::app::dial;
 use crate::ui::cx::{Cx, side_color};
 use crate::ui::theme::{SMALL, medium};
 use touch2touch_core::dataset::PairId;
@@ -129,8 +130,8 @@ fn cell(
 ) {
     ui.spacing_mut().item_spacing = vec2(6.0, 2.0);
     let dialed = match point.value {
-        Some(value) => cx.state.is_dialed(value, point.in_force),
-        None => cx.state.dial_recipe() == sweep.in_force,
+        Some(value) => dial::is_dialed(cx.state, value, point.in_force),
+        None => dial::recipe(cx.state) == sweep.in_force,
     };
     ui.horizontal(|ui| {
         ui.set_width(width);
@@ -142,7 +143,7 @@ fn cell(
             let tip = "The best of these values: most pairs within 5°, then within 10°, then the least median";
             ui.label(RichText::new("best").size(SMALL).color(cx.p.good)).on_hover_text(tip);
         }
-        let Some(value) = point.value.filter(|value| !dialed && value.put(&cx.state.dial_recipe()).is_ok()) else {
+        let Some(value) = point.value.filter(|value| !dialed && value.put(&dial::recipe(cx.state)).is_ok()) else {
             return;
         };
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
@@ -332,7 +333,7 @@ pub(super) fn line(cx: &Cx<'_>, ui: &mut Ui, sweep: &Sweep, series: &Series) {
     let x = |at: usize| plot.left() + 10.0 + at as f32 / last * (plot.width() - 20.0);
     let y = |value: f64, top: f64| plot.bottom() - 3.0 - (value / top) as f32 * (plot.height() - 6.0);
     for (at, point) in series.points.iter().enumerate() {
-        if point.value.is_some_and(|value| cx.state.is_dialed(value, point.in_force)) {
+        if point.value.is_some_and(|value| dial::is_dialed(cx.state, value, point.in_force)) {
             painter.vline(x(at), plot.y_range(), Stroke::new(1.5, p.accent));
         }
     }

@@ -5,7 +5,9 @@ use eframe::egui::{self, RichText, vec2};
 use super::super::cx::Cx;
 use super::super::theme::caption;
 use crate::app::command::ExportCommand;
-use crate::app::export::ImportForm;
+use crate::app::keys::ImportForm;
+use crate::app::results;
+
 use crate::app::state::Lookup;
 
 /// The form, where it is open. It blocks nothing.
@@ -49,7 +51,7 @@ fn content(cx: &mut Cx<'_>, ui: &mut egui::Ui, form: &ImportForm) {
 
 /// Changes that the import would make; true where there are any.
 fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
-    let Some(key) = cx.state.import_plan_key() else { return false };
+    let Some(key) = results::import_plan_key(cx.state) else { return false };
     let mut line = |text: String, color| {
         ui.add(egui::Label::new(RichText::new(text).size(12.0).color(color)).wrap());
     };

@@ -7,6 +7,7 @@ use super::super::cx::Cx;
 use super::super::theme::caption;
 use crate::app::command::ExportCommand;
 use crate::app::export::Output;
+use crate::app::results;
 use crate::app::state::Lookup;
 use touch2touch_work::export::{ExportChoice, Which};
 use touch2touch_work::io::exchange::Format;
@@ -86,7 +87,7 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
 
 /// Division of the export; true where there is something to write.
 fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
-    let Some(key) = cx.state.mask_plan_key() else { return false };
+    let Some(key) = results::mask_plan_key(cx.state) else { return false };
     match cx.state.look(key) {
         Lookup::Ready(plan) | Lookup::Stale(plan) => {
             for line in plan.lines() {

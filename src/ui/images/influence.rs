@@ -3,6 +3,7 @@
 use eframe::egui::{Align2, Color32, ColorImage, FontId, Rect, Ui, pos2, vec2};
 
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::state::{Lookup, State};
 use crate::ui::cx::Cx;
 use crate::ui::widget::colorbar::gradient;
@@ -34,11 +35,11 @@ fn picture(influence: &Influence, values: &Grid<f32>) -> ColorImage {
 
 /// The colors over one finger's imprint, with their bar where the finger is the active one; else why there are none.
 pub(super) fn overlay(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: ImprintSource, finger: PadId) {
-    if !cx.state.shows_influence(source) {
+    if !results::shows_influence(cx.state, source) {
         return;
     }
     let active = finger == cx.state.selection.finger;
-    let why = match cx.state.influence(source) {
+    let why = match results::influence(cx.state, source) {
         Lookup::Failed(err) => {
             let hint = err.hint.as_ref().map_or(String::new(), |hint| format!(". {hint}"));
             Some(format!("{}{hint}", err.why))
@@ -52,7 +53,7 @@ pub(super) fn overlay(cx: &mut Cx<'_>, ui: &Ui, output: &CanvasOutput, source: I
         }
         return;
     }
-    let Some((key, influence)) = cx.state.shown_influence(source) else { return };
+    let Some((key, influence)) = results::shown_influence(cx.state, source) else { return };
     let Some(values) = &influence.pixels[finger] else { return };
     let slot = ("influence", source, finger);
     let drawn = cx.shared.textures.get(ui.ctx(), slot, &key, true, || (picture(influence, values), None));
@@ -101,7 +102,7 @@ fn bar(output: &CanvasOutput) {
 
 /// Influence of a pixel, for the status bar; empty where nothing is shown.
 pub(super) fn readout(state: &State, source: ImprintSource, finger: PadId, [x, y]: [usize; 2]) -> String {
-    let influence = state.shown_influence(source).filter(|_| state.shows_influence(source));
+    let influence = results::shown_influence(state, source).filter(|_| results::shows_influence(state, source));
     let value = influence.and_then(|(key, influence)| {
         let contact = state.results.clouds.get(&key.0.cloud)?.finger(finger).and_then(|cloud| {
             let index = cloud.at_pixel(x, y)?;

@@ -4,6 +4,7 @@ use eframe::egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, StrokeKind,
 
 use super::Memory;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::settings::MaskTool;
 use crate::ui::cx::Cx;
 use crate::ui::theme::CONTACT;
@@ -77,8 +78,8 @@ pub(super) fn show(
         painter: painter.clone(),
         panning: false,
     };
-    if let (true, Ok(mask)) = (cx.state.settings.mask_visible, cx.state.mask_in_force(source, finger)) {
-        let key = (&mask.version, cx.state.imprint_key(source, finger).ok());
+    if let (true, Ok(mask)) = (cx.state.settings.mask_visible, results::mask_in_force(cx.state, source, finger)) {
+        let key = (&mask.version, results::imprint_key(cx.state, source, finger).ok());
         let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask.mask));
         lens.segments(segments, Color32::from_black_alpha(140), 3.5);
         lens.segments(segments, CONTACT, 1.75);

@@ -5,6 +5,7 @@ use eframe::egui::{Color32, Key, Ui};
 use super::Memory;
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
+use crate::app::{labels, results};
 use crate::ui::cx::Cx;
 use crate::ui::theme::{CONTACT, GHOST, IGNORED, PROPOSED};
 use crate::ui::widget::image_canvas::CanvasOutput;
@@ -29,17 +30,17 @@ pub(super) fn mask(
     if !settings.mask_visible {
         return;
     }
-    let Ok(in_force) = cx.state.mask_in_force(source, finger) else { return };
-    let key: (&MaskVersion, _) = (&in_force.version, cx.state.imprint_key(source, finger).ok());
+    let Ok(in_force) = results::mask_in_force(cx.state, source, finger) else { return };
+    let key: (&MaskVersion, _) = (&in_force.version, results::imprint_key(cx.state, source, finger).ok());
     // Where nobody paints the data itself is what counts: the outline says enough.
-    let veiled = !settings.mask_outline && !cx.state.shows_influence(source);
+    let veiled = !settings.mask_outline && !results::shows_influence(cx.state, source);
     if veiled && cx.state.selection.panes.contains(&Pane::Masks) {
         let mask = in_force.mask;
         let slot = ("mask", source, finger);
         let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);
         output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
     }
-    if let Some(ignored) = cx.state.drawn_mask(source, finger).and_then(|hand| hand.marks.ignored()) {
+    if let Some(ignored) = results::drawn_mask(cx.state, source, finger).and_then(|hand| hand.marks.ignored()) {
         let slot = ("ignored", source, finger);
         let veil = || (mask_image(ignored, Color32::WHITE), None);
         let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
@@ -49,15 +50,15 @@ pub(super) fn mask(
     }
     if !settings.mask.gate.is_open() && cx.state.selection.panes.contains(&Pane::Masks) {
         let gate = serde_json::to_string(&settings.mask.gate).unwrap_or_default();
-        let key = (gate, key.1.clone(), cx.state.gate_is_known(source, finger));
-        let allowed = || cx.state.allowed(source, finger).ok().flatten();
+        let key = (gate, key.1.clone(), results::gate_is_known(cx.state, source, finger));
+        let allowed = || results::allowed(cx.state, source, finger).ok().flatten();
         let segments = memory
             .outlines
             .get(&("gate", source, finger), &key, || allowed().map(|allowed| outline(&allowed)).unwrap_or_default());
         output.segments(segments, Color32::from_gray(190), 1.0);
     }
-    if let Some(proposal) = cx.state.shown_proposal(source, finger) {
-        let key = cx.state.proposal_key(source, finger).ok();
+    if let Some(proposal) = results::shown_proposal(cx.state, source, finger) {
+        let key = results::proposal_key(cx.state, source, finger).ok();
         let slot = ("proposal", source, finger);
         let veil = || (mask_image(&proposal.mask, Color32::WHITE), None);
         let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
@@ -66,7 +67,7 @@ pub(super) fn mask(
         output.segments(segments, Color32::from_black_alpha(110), 2.5);
         output.segments(segments, PROPOSED, 1.25);
     }
-    if let Some(ghost) = cx.state.ghost(source).filter(|ghost| ghost.finger == finger) {
+    if let Some(ghost) = labels::ghost(cx.state, source).filter(|ghost| ghost.finger == finger) {
         let dashes = memory.outlines.get(&("ghost", source, finger), ghost.revision, || dashes(&outline(ghost.mask)));
         output.segments(dashes, Color32::from_black_alpha(140), 2.5);
         output.segments(dashes, GHOST, 1.5);

@@ -1,5 +1,6 @@
 //! Sources of proposed masks, and the proposal.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, Ui};
 use strum::IntoEnumIterator as _;
@@ -36,7 +37,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let shown = cx.state.proposes();
+        let shown = results::proposes(cx.state);
         let text = if shown { "Reject" } else { "Show" };
         cx.action_button(ui, if shown { Action::CancelJobs } else { Action::Propose }, text);
         if shown {
@@ -47,7 +48,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
             for_all(cx, ui);
         }
     });
-    if cx.state.proposes() {
+    if results::proposes(cx.state) {
         said(cx, ui);
         for_all(cx, ui);
     }
@@ -58,7 +59,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Button that proposes for every pair in the list, or the progress of that.
 fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
-    if let Some((ticket, task)) = cx.state.running(TaskKind::Propose) {
+    if let Some((ticket, task)) = cx.state.tasks.of_kind(TaskKind::Propose) {
         let tip = "Stop; the pairs that were done until then keep their masks";
         ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip)));
     } else {
@@ -72,8 +73,8 @@ fn for_all(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// Provenance of the proposal, or the reason why there is none.
 fn said(cx: &Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
-    let source = cx.state.worked_on(finger);
-    let (text, color) = match cx.state.proposal(source, finger) {
+    let source = results::worked_on(cx.state, finger);
+    let (text, color) = match results::proposal(cx.state, source, finger) {
         Lookup::Ready(proposal) => {
             let mut text =
                 format!("{}, {}: {}", cx.state.finger_name(finger), source.key(), proposal.provenance.text());

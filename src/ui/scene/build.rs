@@ -9,6 +9,7 @@ use super::{Memory, layers, other_side, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
+use crate::app::{labels, results};
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
@@ -102,7 +103,7 @@ fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
 
 /// Makes the CAD model for the renderer, where it is another one.
 pub(in crate::ui) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
-    let Some(tool) = cx.state.tool().shown() else { return };
+    let Some(tool) = results::tool(cx.state).shown() else { return };
     let Some(open) = &cx.state.library.open else { return };
     if held.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
         return;
@@ -125,7 +126,7 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         SceneLayer::Contact => CONTACT,
         SceneLayer::OtherContact => side_color(p, other_side(source)),
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
-        SceneLayer::Cad if cx.state.by_hand(source).is_some() => p.good,
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => p.good,
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
         SceneLayer::TrueCad => p.strong,
@@ -254,7 +255,7 @@ fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut 
     let look = cx.state.settings.scene.layer(SceneLayer::OtherContact);
     let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| look.shown) else { return };
     // What is of another pair is no comparison.
-    if cx.state.cloud_key(other) != Ok(Some(cloud.key.clone())) {
+    if results::cloud_key(cx.state, other) != Ok(Some(cloud.key.clone())) {
         return;
     }
     for (finger, [_, contact]) in cloud.fingers.entries() {
@@ -271,7 +272,7 @@ fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut 
 /// The point that was clicked.
 fn picked(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
     let point = cx.state.workbench.picked.filter(|picked| picked.source == source).and_then(|picked| {
-        let cloud = cx.state.cloud(source).ready()?.finger(picked.finger)?;
+        let cloud = results::cloud(cx.state, source).ready()?.finger(picked.finger)?;
         cloud.points.get(cloud.at_pixel(picked.pixel[0].into(), picked.pixel[1].into())?).copied()
     });
     if let Some(point) = point {
@@ -295,7 +296,7 @@ fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
 fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
     let state = cx.state;
     let pointed = state.selection.hover.and_then(|h| {
-        let cloud = state.cloud(source).ready()?.finger(h.finger)?;
+        let cloud = results::cloud(state, source).ready()?.finger(h.finger)?;
         let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
         cloud.points.get(cloud.at_pixel(x, y)?).copied()
     });
@@ -310,9 +311,9 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
     let state = cx.state;
     let mut models = Vec::new();
     // The step that is looked at, else what was registered.
-    let registered = steps::pose(cx, source).or_else(|| Some(state.pose(source).shown()?.grasp_from_object));
+    let registered = steps::pose(cx, source).or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object));
     let held = state.workbench.hand(source).map(|hand| hand.pose);
-    match (held.or_else(|| state.by_hand(source)), registered) {
+    match (held.or_else(|| results::by_hand(state, source)), registered) {
         (Some(pose), registered) => {
             models.push((SceneLayer::Cad, pose.to_affine()));
             models.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
@@ -322,11 +323,11 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
         }
         (None, None) => {}
     }
-    let other = state.pose(other_side(source)).ready().filter(|_| state.workbench.both_clouds);
+    let other = results::pose(state, other_side(source)).ready().filter(|_| state.workbench.both_clouds);
     models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
-    let truth = state.sample().ready().and_then(|sample| sample.grasp_from_object);
+    let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
     models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
-    let before = state.ghost(source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
+    let before = labels::ghost(state, source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
     let before = before.filter(|before| registered != Some(*before));
     models.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
     models
@@ -335,7 +336,7 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
 /// The model, shaded where the tool is and as outlines where else it could be.
 fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
     let state = cx.state;
-    let tool_now = state.tool().ready().map(|t| t.name.as_str());
+    let tool_now = results::tool(state).ready().map(|t| t.name.as_str());
     let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
     let settings = &state.settings.scene;
     for (layer, world_from_mesh) in models(cx, source, seconds) {

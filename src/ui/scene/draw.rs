@@ -5,6 +5,7 @@ use eframe::egui::{FontId, Ui, pos2, vec2};
 use super::{Memory, build, nearest};
 use crate::app::command::LabelsCommand;
 use crate::app::keys::ImprintSource;
+use crate::app::labels;
 use crate::app::labels::StrokeIn3d;
 use crate::app::settings::MaskTool;
 use crate::app::state::State;
@@ -52,7 +53,7 @@ pub(super) fn show(
     let (finger, radius_px) = match drawn.map(|(stroke, _)| (stroke.place.pad, stroke.drawing.tool)) {
         Some((pad, DrawTool::Brush { radius_px })) => (pad, radius_px),
         Some((pad, _)) => (pad, 0.0),
-        None => (meant.map_or(state.selection.finger, |(finger, _)| finger), state.brush_px(&sight, size_at)),
+        None => (meant.map_or(state.selection.finger, |(finger, _)| finger), labels::brush_px(state, &sight, size_at)),
     };
     let rect = output.response.rect;
     let painter = ui.painter_at(rect);

@@ -7,6 +7,7 @@ use glam::DVec3;
 use super::Memory;
 use crate::app::keys::{CloudKey, ImprintSource};
 use crate::app::settings::SceneLayer;
+use crate::app::{labels, results};
 use crate::ui::cx::Cx;
 
 /// Points as the renderer takes them, made once for a change.
@@ -22,9 +23,9 @@ pub(super) struct SceneGhost {
 /// Finds them where a change is shown and both clouds are there. Between clouds of other imprints nothing is compared.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let held = &mut memory.ghosts[source as usize];
-    let before = cx.state.ghost(source).and_then(|ghost| ghost.clouds);
+    let before = labels::ghost(cx.state, source).and_then(|ghost| ghost.clouds);
     let (Some((old, before)), Ok(Some(new)), Some(now)) =
-        (before, cx.state.cloud_key(source), cx.state.cloud(source).ready())
+        (before, results::cloud_key(cx.state, source), results::cloud(cx.state, source).ready())
     else {
         *held = None;
         return;

@@ -9,6 +9,7 @@ use glam::{DVec2, DVec3};
 use super::Memory;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::workbench::{SceneTool, WorkbenchCommand};
 use crate::gpu::guides::AXIS_COLORS;
 use crate::gpu::view::Camera;
@@ -194,13 +195,13 @@ fn dragged(camera: &Camera, size: [u32; 2], from: ManualPose, handle: Handle, be
 pub(super) fn show(cx: &mut Cx<'_>, ui: &Ui, memory: &mut Memory, source: ImprintSource, output: &SceneOutput) {
     let bench = &cx.state.workbench;
     let elsewhere = bench.hand.as_ref().is_some_and(|hand| hand.source != source);
-    if bench.tool != SceneTool::Pose || elsewhere || cx.state.tool().ready().is_none() {
+    if bench.tool != SceneTool::Pose || elsewhere || results::tool(cx.state).ready().is_none() {
         if memory.gizmo.holds(source) {
             memory.gizmo = Gizmo::default();
         }
         return;
     }
-    let pose = bench.hand(source).map_or_else(|| cx.state.manual_begins(source), |hand| hand.pose);
+    let pose = bench.hand(source).map_or_else(|| results::manual_begins(cx.state, source), |hand| hand.pose);
     let six_dof = bench.six_dof;
     let camera = memory.views[source as usize].camera;
     let ppp = ui.pixels_per_point();

@@ -5,6 +5,7 @@ use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 use super::overlay::SIDES;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::state::State;
 use crate::app::workbench::{Layer, ManualTry, SceneTool};
@@ -58,7 +59,7 @@ fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {
     if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
         return None;
     }
-    Some(bench.hand(source).map_or_else(|| state.manual_begins(source), |hand| hand.pose))
+    Some(bench.hand(source).map_or_else(|| results::manual_begins(state, source), |hand| hand.pose))
 }
 
 /// Height of the strip of the pose in hand, points; 0 where there is none.
@@ -156,5 +157,5 @@ fn costs(now: ManualCost, before: ManualCost) -> String {
 
 /// Difference of the planar part of a pose from the truth.
 pub(super) fn off_truth(state: &State, pose: ManualPose) -> Option<PoseDifference> {
-    Some(PoseDifference::between(pose.planar, state.truth()?))
+    Some(PoseDifference::between(pose.planar, results::truth(state)?))
 }

@@ -8,6 +8,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use super::{Memory, rgb};
 use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
+use crate::app::results;
 use crate::app::settings::{LayerLook, LayerSize};
 use crate::app::workbench::Layer;
 use crate::gpu::edges::EdgeStyle;
@@ -51,8 +52,9 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         return update_distances(cx, memory, source);
     }
     let held = &mut memory.layer_colors[source as usize];
-    let layers = cx.state.layers(source).ready();
-    let (Some(layers), Ok(Some(key)), Layer::Residuals | Layer::Reasons) = (layers, cx.state.pose_key(source), layer)
+    let layers = results::layers(cx.state, source).ready();
+    let (Some(layers), Ok(Some(key)), Layer::Residuals | Layer::Reasons) =
+        (layers, results::pose_key(cx.state, source), layer)
     else {
         *held = None;
         return;
@@ -78,7 +80,9 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
 /// Makes the colors of distances, where they are there.
 fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let held = &mut memory.layer_colors[source as usize];
-    let (Some(deviation), Ok(Some(key))) = (cx.state.deviation(source).ready(), cx.state.pose_key(source)) else {
+    let (Some(deviation), Ok(Some(key))) =
+        (results::deviation(cx.state, source).ready(), results::pose_key(cx.state, source))
+    else {
         *held = None;
         return;
     };
@@ -145,7 +149,7 @@ pub(in crate::ui) fn outline(world_from_mesh: DAffine3, color: Color32, look: La
 
 /// Observability of the registered pose of a side.
 fn observability<'a>(cx: &'a Cx<'_>, source: ImprintSource) -> Option<&'a Observability> {
-    cx.state.pose(source).shown()?.report.observability.as_ref()
+    results::pose(cx.state, source).shown()?.report.observability.as_ref()
 }
 
 /// The registered pose moved along its weakest direction at time `seconds`, while that is shown.

@@ -1,5 +1,6 @@
 //! The list of what a 3D view draws: what each color means, and switches for it; below it the bar of the color map.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::containers::menu::MenuButton;
 use eframe::egui::{
@@ -94,7 +95,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
     }
     if state.workbench.layer == Layer::Reasons
         && memory.layer_colors[source as usize].is_some()
-        && let Some(layers) = state.layers(source).ready()
+        && let Some(layers) = results::layers(state, source).ready()
     {
         // The reasons of the points that are drawn, with their counts.
         for reason in Reason::iter().filter(|r| !matches!(r, Reason::OutsideMask | Reason::InvalidDepth)) {
@@ -112,7 +113,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
 fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static str {
     match layer {
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
-        SceneLayer::Cad if cx.state.by_hand(source).is_some() => "CAD, accepted by hand",
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, accepted by hand",
         SceneLayer::TrueCad => "CAD, true pose",
         SceneLayer::Before => "CAD, before",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
@@ -220,7 +221,7 @@ fn colors(painter: &Painter, bar: Rect, map: ColorMap) {
 
 /// Bar of the residuals' colors, with the width of the kernel.
 fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) {
-    let Some(layers) = cx.state.layers(source).ready() else { return };
+    let Some(layers) = results::layers(cx.state, source).ready() else { return };
     let bar = bar(rect);
     colors(painter, bar, RESIDUAL_MAP);
     let end = units::mm(layers.range_m);

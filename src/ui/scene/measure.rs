@@ -6,6 +6,7 @@ use glam::DVec3;
 use super::{Memory, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
 use crate::ui::cx::Cx;
 use crate::ui::layers::reason_rgb;
@@ -95,10 +96,10 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
     let state = cx.state;
     let Some(cloud) = clouds.finger(picked.finger) else { return };
     let (x, y) = (usize::from(picked.pixel[0]), usize::from(picked.pixel[1]));
-    let imprint = state.imprint(source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
-    let camera = state.touch(picked.finger).ready().and_then(|t| t.camera());
+    let imprint = results::imprint(state, source, picked.finger).shown().and_then(|i| i.get(x, y).copied());
+    let camera = results::touch(state, picked.finger).ready().and_then(|t| t.camera());
     let depth = camera.and_then(|c| c.depth_reference.get(x, y).copied()).zip(imprint).map(|(r, i)| r - i);
-    let layer = state.layers(source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
+    let layer = results::layers(state, source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
     let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));
     let fit = layer.and_then(|(_, fit)| fit);
     let lines = [

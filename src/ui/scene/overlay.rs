@@ -8,6 +8,7 @@ use super::build::{AXIS, axes_origin};
 use super::legend;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
+use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::state::Absent;
 use crate::gpu::guides;
@@ -34,13 +35,13 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: Imprin
 
 /// Angle and figures of the step shown, where that is not the registered pose.
 pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, Color32, String)> {
-    let shown = cx.state.inspected_in(source)?;
+    let shown = results::inspected_in(cx.state, source)?;
     if shown.is_last() && cx.state.inspect.start.is_none() && shown.run == shown.inspection.report().winner {
         return None;
     }
     let angle = units::wrap_angle(-shown.step.grasp_from_object.theta_rad);
     let (mut text, mut color) = (units::text_deg(angle), cx.p.strong);
-    if let Some(truth) = cx.state.truth() {
+    if let Some(truth) = results::truth(cx.state) {
         let truth = units::wrap_angle(-truth.theta_rad);
         let error = units::angle_error(angle, truth);
         text += &format!(" (true {}, error {})", units::text_deg(truth), units::text_deg(error));

@@ -6,8 +6,9 @@ use eframe::egui::{Align2, Color32, FontId, Rect, Ui, pos2, vec2};
 use glam::{DAffine3, DVec3};
 
 use super::Memory;
-use crate::app::inspect::{Inspected, Inspection};
-use crate::app::keys::ImprintSource;
+use crate::app::inspect::Inspected;
+use crate::app::keys::{ImprintSource, Inspection};
+use crate::app::results;
 use crate::app::settings::SceneLayer;
 use crate::app::workbench::Layer;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
@@ -43,13 +44,13 @@ pub(super) struct StepLines {
 
 /// The pose at which the step shown has the CAD model, if the time machine looks at this side.
 pub(super) fn pose(cx: &Cx<'_>, source: ImprintSource) -> Option<PlanarPose> {
-    cx.state.inspected_in(source).map(|shown| shown.step.grasp_from_object)
+    results::inspected_in(cx.state, source).map(|shown| shown.step.grasp_from_object)
 }
 
 /// Makes the lines of the step shown, once per step.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
-    let Some(Inspected { inspection, run, at, step }) = cx.state.inspected_in(source) else { return };
-    let Some(tool) = cx.state.tool().ready() else { return };
+    let Some(Inspected { inspection, run, at, step }) = results::inspected_in(cx.state, source) else { return };
+    let Some(tool) = results::tool(cx.state).ready() else { return };
     let dark = *cx.p == DARK;
     let same = |l: &StepLines| Arc::ptr_eq(&l.of, inspection) && (l.run, l.at, l.dark) == (run, at, dark);
     if memory.step_lines.as_ref().is_some_and(same) {
@@ -79,7 +80,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
 /// The lines of a side, if they are to be drawn.
 fn lines<'a>(cx: &Cx<'_>, memory: &'a Memory, source: ImprintSource) -> Option<&'a StepLines> {
     let on = cx.state.inspect.lines || cx.state.workbench.layer == Layer::Correspondences;
-    let shown = cx.state.inspected_in(source).filter(|_| on)?;
+    let shown = results::inspected_in(cx.state, source).filter(|_| on)?;
     memory.step_lines.as_ref().filter(|l| Arc::ptr_eq(&l.of, shown.inspection))
 }
 
@@ -109,7 +110,7 @@ pub(super) fn add(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &m
 
 /// Number and pose of the pins of a side.
 fn pins(cx: &Cx<'_>, source: ImprintSource) -> impl Iterator<Item = (usize, PlanarPose)> {
-    let pins = cx.state.pins().into_iter().enumerate();
+    let pins = cx.state.inspect.pins_of(cx.state.pair_key()).into_iter().enumerate();
     pins.filter_map(move |(i, pin)| pin.filter(|p| p.source == source).map(|p| (i, p.grasp_from_object)))
 }
 

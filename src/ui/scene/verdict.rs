@@ -1,5 +1,6 @@
 //! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
 
+use crate::app::results;
 use crate::app::settings::prefer;
 use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
@@ -20,10 +21,10 @@ use touch2touch_work::verdict::Verdict;
 const HEIGHT: f32 = 22.0;
 /// True where there is no pose because the mask has too few contact points.
 fn lacks_contact(state: &State, source: ImprintSource) -> bool {
-    match state.pose(source) {
+    match results::pose(state, source) {
         Lookup::Absent(Absent::NoContact) => true,
         Lookup::Failed(_) => {
-            state.cloud(source).ready().is_some_and(|clouds| clouds.contact_points().len() < MIN_POINTS)
+            results::cloud(state, source).ready().is_some_and(|clouds| clouds.contact_points().len() < MIN_POINTS)
         }
         _ => false,
     }
@@ -55,7 +56,7 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
         }
     }
     // The CAD model is in another unit: it is said in which, and that is all.
-    let units = match cx.state.pose(source) {
+    let units = match results::pose(cx.state, source) {
         Lookup::Failed(err) => err.units.clone(),
         _ => None,
     };
@@ -90,14 +91,14 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
     if let Some((text, color, details)) = step_text(cx, source) {
         return (text, color, vec![details]);
     }
-    let (text, color, mut details) = match state.pose(source) {
+    let (text, color, mut details) = match results::pose(state, source) {
         Lookup::Ready(pose) | Lookup::Stale(pose) => {
-            let verdict = Verdict::of(pose, state.truth());
+            let verdict = Verdict::of(pose, results::truth(state));
             let mut text = match verdict.findings.is_empty() {
                 false => format!("{} · {}", units::text_deg(pose.angle_rad), verdict.text()),
                 true => format!("{} · residual {}", units::text_deg(pose.angle_rad), units::text_mm(pose.rms_m)),
             };
-            if state.provisional_pose(source).is_some() {
+            if results::provisional_pose(state, source).is_some() {
                 text += " · being proved…";
             }
             let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
@@ -109,13 +110,13 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
         Lookup::Absent(absent) => (format!("No pose: {}", lower_first(absent)), cx.p.weak, Vec::new()),
     };
     let mut text = text;
-    if let Some(pose) = state.by_hand(source) {
+    if let Some(pose) = results::by_hand(state, source) {
         text = format!("By hand: {} · {text}", hands::place_text(pose));
         if let Some(off) = hands::off_truth(state, pose) {
             details.push(difference("The pose by hand", "off the truth", off));
         }
     }
-    if let Some(apart) = state.sides_apart() {
+    if let Some(apart) = results::sides_apart(state) {
         details.push(difference("Measured and predicted", "apart", apart));
     }
     (text, color, details)

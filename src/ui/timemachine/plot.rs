@@ -5,7 +5,9 @@ use eframe::egui::{
 };
 
 use super::table::root_mm;
-use crate::app::inspect::{InspectCommand, Inspected, Inspection};
+use crate::app::inspect::InspectCommand;
+use crate::app::inspect::Inspected;
+use crate::app::keys::Inspection;
 use crate::ui::cx::Cx;
 use crate::ui::theme::{Palette, mix};
 use touch2touch_core::align::TraceStep;
@@ -202,9 +204,9 @@ fn curve(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize, shown: boo
 }
 
 fn pins(cx: &Cx<'_>, painter: &Painter, plot: &Plot<'_>) {
-    for (i, pin) in cx.state.pins().into_iter().enumerate() {
+    for (i, pin) in cx.state.inspect.pins_of(cx.state.pair_key()).into_iter().enumerate() {
         let Some(pin) = pin else { continue };
-        let here = pin.source == cx.state.inspect.source && pin.engine == cx.state.settings.pose_engine;
+        let here = pin.source == cx.state.inspect.source && pin.registration == cx.state.settings.registration;
         let step = plot.inspection.step(pin.run, pin.at).filter(|s| s.grasp_from_object == pin.grasp_from_object);
         if let (true, Some(step)) = (here, step) {
             let at = plot.cost_at(pin.at, step);

@@ -5,6 +5,7 @@ use eframe::egui::{self, Align2, Color32, FontId, Role, Sense, Ui, WidgetInfo, p
 use super::pose_text;
 use crate::app::command::Command;
 use crate::app::inspect::{InspectCommand, Inspected, Pin};
+use crate::app::results;
 use crate::ui::cx::Cx;
 use crate::ui::scene;
 use crate::ui::theme::{SMALL, caption};
@@ -41,8 +42,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     ui.spacing_mut().item_spacing.y = 0.0;
     let step = shown.step;
     let now = column(step.grasp_from_object, Some(step.cost_m2));
-    let truth = cx.state.truth();
-    let pins = cx.state.pins();
+    let truth = results::truth(cx.state);
+    let pins = cx.state.inspect.pins_of(cx.state.pair_key());
     let mut columns: Vec<(&str, Color32, StepFigures)> = vec![("now", cx.p.strong, now)];
     if let Some(truth) = truth {
         columns.push(("− true", cx.p.truth, minus(now, column(truth, None))));
@@ -56,7 +57,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         let of = |p: Pin| column(p.grasp_from_object, Some(p.cost_m2));
         let mut difference = minus(of(b), of(a));
         // Costs of different kernels are not of one kind.
-        if a.kernel_m != b.kernel_m || a.engine != b.engine {
+        if a.kernel_m != b.kernel_m || a.registration != b.registration {
             difference[3] = None;
         }
         columns.push(("B − A", cx.p.strong, difference));
@@ -141,8 +142,8 @@ fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, StepFigures)],
             let response = ui.interact(place, ui.scope_id().with(("unpin", pin)), Sense::click());
             response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Let pin {name} go")));
             let about = pins[pin].map_or(String::new(), |p| {
-                let engine = p.engine.label();
-                format!("{}: {engine}, start {}, step {}. Click to let it go", p.source.name(), p.run + 1, p.at)
+                let registration = p.registration.label();
+                format!("{}: {registration}, start {}, step {}. Click to let it go", p.source.name(), p.run + 1, p.at)
             });
             if response.on_hover_text(about).clicked() {
                 cx.push(Command::Inspect(InspectCommand::Unpin(pin)));

@@ -93,8 +93,8 @@ fn made(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
         let bundle = state.library.bundle(&key.bundle)?;
         Some(RecipeChange {
             bundle: Some(bundle.name.clone()),
-            steps: Some(key.steps),
-            seed: Some(key.seed),
+            steps: Some(key.config.steps),
+            seed: Some(key.config.seed),
             shift: None,
         })
     };

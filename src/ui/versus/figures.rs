@@ -3,6 +3,7 @@
 use eframe::egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 
 use super::{Letter, color};
+use crate::app::results;
 use crate::app::settings::Versus;
 use crate::ui::cx::Cx;
 use crate::ui::theme::SMALL;
@@ -88,17 +89,19 @@ pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
         }
     };
     row(0, "", cx.p.weak, columns.iter().map(|column| column.name().to_owned()).collect(), cx.p.weak);
-    let poses = [&versus.a, &versus.b].map(|subject| state.subject_pose(subject));
+    let poses = [&versus.a, &versus.b].map(|subject| results::subject_pose(state, subject));
     for (line, letter) in [(1, Letter::A), (2, Letter::B)] {
         let subject = letter.of(versus);
         let against = (*subject != Subject::Measured)
-            .then(|| state.subjects_compared(subject, &Subject::Measured, finger).ready())
+            .then(|| results::subjects_compared(state, subject, &Subject::Measured, finger).ready())
             .flatten();
         let angle = poses[line - 1].map_or("–".into(), angle);
         let texts = columns.iter().map(|column| column.text(against, &angle)).collect();
         row(line, &format!("{letter:?}"), color(cx.p, versus, letter), texts, cx.p.text);
     }
-    let apart = (versus.a != versus.b).then(|| state.subjects_compared(&versus.a, &versus.b, finger).ready()).flatten();
+    let apart = (versus.a != versus.b)
+        .then(|| results::subjects_compared(state, &versus.a, &versus.b, finger).ready())
+        .flatten();
     let turned = match poses {
         [Some(a), Some(b)] => format!("{:+.1}", units::wrap_angle(a.angle_rad - b.angle_rad).to_degrees()),
         _ => "–".into(),

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::{Letter, color};
 use crate::app::keys::{CloudDifferenceKey, CloudKey, DatasetSeq};
+use crate::app::results;
 use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
@@ -85,11 +86,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
 /// Why there is nothing to draw.
 fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let state = cx.state;
-    if let Some(absent) = state.seed_pose_absent() {
+    if let Some(absent) = results::seed_pose_absent(state) {
         return super::absent_text(cx, ui, absent);
     }
     for subject in [&versus.a, &versus.b] {
-        let lookup = state.subject(subject, state.selection.finger);
+        let lookup = results::subject(state, subject, state.selection.finger);
         if lookup.shown().is_none() {
             return super::instead(cx, ui, lookup);
         }
@@ -100,7 +101,7 @@ fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
 /// Makes what the renderer needs, where it changed.
 fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
     for (held, letter) in space.clouds.iter_mut().zip([Letter::A, Letter::B]) {
-        let points = cx.state.subject_points(letter.of(versus));
+        let points = results::subject_points(cx.state, letter.of(versus));
         let same_pair = |key: &CloudKey| key.place().map(|(pair, _)| pair) == cx.state.pair_key();
         match points {
             Some((key, _)) if held.as_ref().is_some_and(|held| held.key == key) => {}
@@ -113,7 +114,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
             None => *held = None,
         }
     }
-    let apart = cx.state.subjects_apart(&versus.a, &versus.b).filter(|_| versus.mode == VersusMode::Apart);
+    let apart = results::subjects_apart(cx.state, &versus.a, &versus.b).filter(|_| versus.mode == VersusMode::Apart);
     match (apart, &space.apart) {
         (None, _) => space.apart = None,
         (Some((key, _)), Some((held, ..))) if *held == key => {}
@@ -184,7 +185,7 @@ fn models(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool, scene: &mu
     let Some(held) = &space.mesh else { return };
     let cad = cx.state.settings.scene.layer(SceneLayer::Cad);
     for letter in [Letter::A, Letter::B] {
-        let Some(pose) = cx.state.subject_pose(letter.of(versus)) else { continue };
+        let Some(pose) = results::subject_pose(cx.state, letter.of(versus)) else { continue };
         if (flipped && letter == Letter::A) || !cad.shown {
             continue;
         }
@@ -226,7 +227,7 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: ef
     };
     if apart {
         line("A, colored by its distance to B".into(), cx.p.text);
-        if let Some((_, difference)) = cx.state.subjects_apart(&versus.a, &versus.b) {
+        if let Some((_, difference)) = results::subjects_apart(cx.state, &versus.a, &versus.b) {
             let rms = units::text_mm(difference.contact_rms_m);
             line(format!("contact points: {rms} (root mean square)"), cx.p.text);
         }

@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 use std::sync::Arc;
-use touch2touch::app::settings::prefer;
 
 use glam::{DVec3, Mat4};
 use proptest::prelude::*;
@@ -21,20 +20,20 @@ use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, Output};
 use touch2touch::app::inspect::BasinColor;
+use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Request, Revision, ShiftMode,
-    TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, StrokeIn3d};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
-use touch2touch::app::results::ambiguity::AmbiguityKey;
-use touch2touch::app::results::{Computed, Preview};
 use touch2touch::app::services::{Followed, Services as _};
+use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource,
     MaskTool, SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
 };
+use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::train::{Train, TrainForm};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
@@ -100,7 +99,7 @@ fn touch() -> impl Strategy<Value = TouchKey> {
 fn recipe() -> impl Strategy<Value = PredictionKey> {
     let recipe = |(touch, seed)| {
         let config = GenerateConfig { steps: 20, seed, ..GenerateConfig::default() };
-        PredictionKey::new(touch, "gen".into(), EngineChoice::Auto, &config)
+        PredictionKey { touch, bundle: "gen".into(), config, runtime: EngineChoice::Auto }
     };
     (touch(), 40u64..50).prop_map(recipe)
 }
@@ -231,7 +230,7 @@ fn change() -> impl Strategy<Value = Change> {
             })
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
-        1 => registration().prop_map(|v| prefer(move |s| s.pose_engine = v)),
+        1 => registration().prop_map(|v| prefer(move |s| s.registration = v)),
         1 => any_of::<EngineChoice>().prop_map(|v| prefer(move |s| s.runtime = v)),
         1 => person.prop_map(|v| prefer(move |s| s.person = v.clone())),
         1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),

@@ -1,5 +1,7 @@
 //! The samplers: [`sample`] runs DDIM, DDPM or DPM-Solver++(2M) over any [`Denoiser`].
 
+use std::cmp::Ordering;
+use std::hash::{Hash, Hasher};
 use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
@@ -49,8 +51,9 @@ impl Sampler {
     }
 }
 
-/// The choices of one generation. Together with the input and the bundle it determines the result.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The choices of one generation. Together with the input and the bundle it determines the result, and is part of its key:
+/// numbers are compared by their bits, only that 0 and -0 mean the same.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct GenerateConfig {
     /// Sampling steps, 1 to the schedule's training steps.
     pub steps: u32,
@@ -66,6 +69,41 @@ pub struct GenerateConfig {
     /// [`super::Guided`]); the sampler itself only passes it on.
     #[serde(default = "no_guidance")]
     pub guidance: f64,
+}
+
+impl GenerateConfig {
+    /// All of it as whole numbers, which have an order.
+    fn bits(&self) -> (u32, u64, Sampler, u64, Spacing, u64) {
+        let Self { steps, eta, seed, sampler, spacing, guidance } = *self;
+        // + 0.0 turns -0 into 0.
+        (steps, seed, sampler, (eta + 0.0).to_bits(), spacing, (guidance + 0.0).to_bits())
+    }
+}
+
+impl PartialEq for GenerateConfig {
+    fn eq(&self, other: &Self) -> bool {
+        self.bits() == other.bits()
+    }
+}
+
+impl Eq for GenerateConfig {}
+
+impl PartialOrd for GenerateConfig {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for GenerateConfig {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.bits().cmp(&other.bits())
+    }
+}
+
+impl Hash for GenerateConfig {
+    fn hash<H: Hasher>(&self, state: &mut H) {
+        self.bits().hash(state);
+    }
 }
 
 impl Default for GenerateConfig {

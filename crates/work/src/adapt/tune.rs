@@ -14,7 +14,7 @@ use crate::infer::kept_key::input_digest;
 use crate::io::digest::hex;
 use crate::job::JobCx;
 use crate::predict::Generating;
-use crate::tuning::{KeptRun, Look, Runs, steps_within};
+use crate::tuning::{KeptRun, Look, RunName, Runs, TuningTask, steps_within};
 use touch2touch_core::fit::{FitPair, closed_form};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::postprocess::Correction;
@@ -54,15 +54,16 @@ pub(super) fn tune(
     let count = parts.iter().max().map_or(0, |most| most + 1);
     let kept = KeptRun::of(setup.unfinished.as_deref(), &digest(setup, generating, touches));
     let start = source.start(source.placement(corrections));
+    let task = TuningTask { what: WHAT, fail, kept: &kept, cx };
     let config = Config { seed: generating.config.seed, ..Config::default() };
     let steps = match tuning {
         Tuning::Steps(steps) => steps,
-        Tuning::Within(time) => steps_within((time, STEPPING), count + 1, (WHAT, fail), (&kept, cx), || {
+        Tuning::Within(time) => steps_within(time, STEPPING, count + 1, task, || {
             Tuner::new(&start, with_simulated(real.clone()), config.clone())
         })?,
     };
     let config = Config { steps: steps as usize, ..config };
-    let mut runs = Runs::new((WHAT, fail), (&kept, cx), steps, count + 1);
+    let mut runs = Runs::new(task, steps, count + 1);
     let mut left_out: Vec<Option<DepthMap>> = vec![None; touches.len()];
     for part in 0..count {
         let others: Vec<usize> = (0..touches.len()).filter(|&i| parts[i] != part).collect();
@@ -140,7 +141,7 @@ impl Run<'_> {
 fn predictions(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Vec<Vec<f32>>, TaskError> {
     let file = format!("{}.left-out", run.file);
     let pixels = run.pairs.first().map_or(0, |pair| pair.imprint.len());
-    if let Some(bytes) = runs.kept.read(&file).filter(|bytes| bytes.len() == 4 * pixels * run.held.len()) {
+    if let Some(bytes) = runs.task.kept.read(&file).filter(|bytes| bytes.len() == 4 * pixels * run.held.len()) {
         runs.skip(&run.file, &run.name, UNIT);
         let values: Vec<f32> = bytes.chunks_exact(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         return Ok(values.chunks(pixels.max(1)).map(<[f32]>::to_vec).collect());
@@ -148,11 +149,11 @@ fn predictions(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Ve
     let tuner = tuner(runs, run, config)?;
     let mut made = Vec::with_capacity(run.held.len());
     for part in run.queries().chunks(BATCH) {
-        runs.cx.check(WHAT)?;
+        runs.task.cx.check(WHAT)?;
         made.extend(tuner.predict(part).map_err(fail)?);
     }
     let bytes: Vec<u8> = made.iter().flatten().flat_map(|v: &f32| v.to_le_bytes()).collect();
-    runs.kept.write(&file, &bytes);
+    runs.task.kept.write(&file, &bytes);
     runs.forget(&run.file);
     Ok(made)
 }
@@ -164,7 +165,11 @@ fn tuner(runs: &mut Runs<'_>, run: &Run<'_>, config: &Config) -> Result<Tuner, T
         None => Tuner::new(&run.start, run.pairs.clone(), config.clone()),
     };
     let times = if run.held.is_empty() { 0 } else { LOOKS };
-    runs.finish((&run.file, &run.name), begin, &Look { unit: UNIT, times, at: &|tuner| look(tuner, run) })
+    runs.finish(
+        RunName { file: &run.file, name: &run.name },
+        begin,
+        &Look { unit: UNIT, times, at: &|tuner| look(tuner, run) },
+    )
 }
 
 /// PSNR on some of the touches that were left out, as they are, dB.

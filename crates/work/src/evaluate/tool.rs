@@ -116,7 +116,7 @@ impl<'a> Tool<'a> {
                 let why = err.hint.map_or(err.why.clone(), |hint| format!("{} ({hint})", err.why));
                 skipped.push(Skipped { what: name.into(), method: String::new(), why });
             };
-            load_tool(dataset, name).map(|(model, _)| model).map_err(skip).ok()
+            load_tool(dataset, name).map(|loaded| loaded.model).map_err(skip).ok()
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();

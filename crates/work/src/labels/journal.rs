@@ -96,6 +96,22 @@ impl Change {
         *self == Self::default()
     }
 
+    /// Makes labels what they are after it.
+    pub fn apply_to(&self, labels: &mut PairLabels) {
+        for (place, [_, after]) in &self.masks {
+            labels.put(place, after.clone());
+        }
+        if let Some([_, after]) = self.review {
+            labels.review = after;
+        }
+        if let Some([_, after]) = &self.note {
+            labels.note.clone_from(after);
+        }
+        for (of, [_, after]) in &self.accepted {
+            labels.put_accepted(of, *after);
+        }
+    }
+
     /// The way back.
     #[must_use]
     pub fn inverse(mut self) -> Self {
@@ -217,11 +233,7 @@ impl Line {
 ///
 /// Only as far as it leads to the labels as they are: where another program changed them, what came before is history,
 /// and nothing that can be undone.
-pub(super) fn fold<'a>(
-    lines: impl Iterator<Item = &'a [u8]>,
-    labels: &PairLabels,
-    rig: &Rig,
-) -> (Vec<Past>, Vec<Past>) {
+pub(super) fn fold<'a>(lines: impl Iterator<Item = &'a [u8]>, labels: &PairLabels, rig: &Rig) -> JournalHistory {
     let (mut done, mut undone): (Vec<Past>, Vec<Past>) = (Vec::new(), Vec::new());
     for line in lines {
         let Some((act, past)) = serde_json::from_slice::<Line>(line).ok().and_then(|line| line.read(rig)) else {
@@ -248,7 +260,7 @@ pub(super) fn fold<'a>(
     let kept = done.iter().rev().take_while(|past| {
         let fits = past.change.leads_to(&now);
         if fits {
-            apply(&mut now, &past.change.clone().inverse());
+            past.change.clone().inverse().apply_to(&mut now);
         }
         fits
     });
@@ -258,26 +270,11 @@ pub(super) fn fold<'a>(
     let kept = undone.iter().rev().take_while(|past| {
         let fits = past.change.clone().inverse().leads_to(&now);
         if fits {
-            apply(&mut now, &past.change);
+            past.change.apply_to(&mut now);
         }
         fits
     });
     let first = undone.len() - kept.count();
     undone.drain(..first);
-    (done, undone)
-}
-
-fn apply(labels: &mut PairLabels, change: &Change) {
-    for (place, [_, after]) in &change.masks {
-        labels.put(place, after.clone());
-    }
-    if let Some([_, after]) = change.review {
-        labels.review = after;
-    }
-    if let Some([_, after]) = &change.note {
-        labels.note.clone_from(after);
-    }
-    for (of, [_, after]) in &change.accepted {
-        labels.put_accepted(of, *after);
-    }
+    JournalHistory { done, undone, problem: None }
 }

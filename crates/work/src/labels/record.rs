@@ -80,11 +80,18 @@ pub(super) fn parse(bytes: &[u8]) -> Vec<Record> {
     bytes.split(|&b| b == b'\n').filter_map(|line| serde_json::from_slice(line).ok()).collect()
 }
 
-/// Lines of a journal, and how many of them cannot be understood.
-pub(super) fn count(bytes: &[u8]) -> (usize, usize) {
+/// Number of a journal's lines, and of those that cannot be understood.
+#[derive(Debug, PartialEq)]
+pub(super) struct Lines {
+    pub(super) all: usize,
+    pub(super) unread: usize,
+}
+
+/// Counts the lines of a journal.
+pub(super) fn count(bytes: &[u8]) -> Lines {
     let lines = || bytes.split(|&b| b == b'\n').filter(|line| !line.trim_ascii().is_empty());
     let unread = lines().filter(|line| serde_json::from_slice::<Record>(line).is_err());
-    (lines().count(), unread.count())
+    Lines { all: lines().count(), unread: unread.count() }
 }
 
 #[cfg(test)]
@@ -96,9 +103,9 @@ mod tests {
         let text = br#"{"unix_s":7,"person":"Anna","act":"do","name":"lasso","masks":[{"finger":"right","of":"measured","before":null,"after":{"size":[2,2],"runs":[4],"base":"Threshold 5.00 mm","later":1}}],"review":["todo","in_progress"],"accepted":[null,null]}
 {"unix_s":9,"person":"","act":"undo","name":"lasso","masks":[{"finger":"right","of":"measured","before":{"size":[2,2],"runs":[4],"base":""},"after":null},{"finger":"left","of":"measured","before":null,"after":{"width":2,"height":1,"runs":[2],"layers":[{"kind":"grown"},{"kind":"hand","person":"Anna"}],"layer_runs":[[0,2]]}}],"accepted":[null,null]}
 {"unix_s":1"#;
-        assert_eq!(count(b"{\"of\": \"something else\"}\n\n"), (1, 1));
+        assert_eq!(count(b"{\"of\": \"something else\"}\n\n"), Lines { all: 1, unread: 1 });
         let found = parse(text);
-        assert_eq!((found.len(), count(text)), (2, (3, 1)));
+        assert_eq!((found.len(), count(text)), (2, Lines { all: 3, unread: 1 }));
         assert_eq!((found[0].unix_s, found[0].person.as_str(), found[0].act), (7, "Anna", Act::Do));
         assert_eq!(found[0].masks[0].after.as_ref().unwrap().provenance().text(), "Threshold 5.00 mm");
         assert_eq!(found[0].review, Some([Review::Todo, Review::InProgress]));

@@ -137,7 +137,7 @@ impl Labels {
             };
             let by = Signed::now(deed);
             for (place, hand) in &labels.masks {
-                by.write_mask(&store, (name, place), Some(hand)).map_err(fail)?;
+                by.write_mask(&store, name, place, Some(hand)).map_err(fail)?;
             }
             store.save_review(name, &stored_review(labels)).map_err(fail)?;
             let line = Line::new(deed, &Change::between(&before, labels), &dataset.rig, by.person, by.unix_s);

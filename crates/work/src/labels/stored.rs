@@ -170,8 +170,8 @@ impl Labels {
         let Ok(store) = &*self.store else { return JournalHistory::default() };
         // Without a journal there is nothing to take back; that it cannot be read is all that is wrong then.
         let bytes = store.journal(name).unwrap_or_default();
-        let (done, undone) = journal::fold(bytes.split(|&b| b == b'\n'), labels, store.rig());
-        JournalHistory { done, undone, problem: self.journal_problem(name) }
+        let past = journal::fold(bytes.split(|&b| b == b'\n'), labels, store.rig());
+        JournalHistory { problem: self.journal_problem(name), ..past }
     }
 
     /// Records of the journal of a pair, the oldest first; none where there is no journal.
@@ -191,7 +191,7 @@ impl Labels {
         match store.journal(name) {
             Err(err) => Some(store_error(&what, &err)),
             Ok(bytes) => {
-                let (lines, unread) = record::count(&bytes);
+                let record::Lines { all: lines, unread } = record::count(&bytes);
                 let file = store.journal_file(name);
                 let why = format!("{unread} of {} cannot be understood ({})", counted(lines, "line"), file.display());
                 let hint = "They were cut short, or are of something else: what they say was done cannot be taken back. \
@@ -227,7 +227,7 @@ impl Labels {
                 *old = there;
                 merged.put(place, new.clone());
             }
-            by.write_mask(store, (name, place), new.as_ref()).map_err(fail)?;
+            by.write_mask(store, name, place, new.as_ref()).map_err(fail)?;
         }
         if before.review != labels.review || before.accepted != labels.accepted || before.note != labels.note {
             store.save_review(name, &stored_review(labels)).map_err(fail)?;
@@ -267,7 +267,8 @@ impl Signed {
     pub(super) fn write_mask(
         &self,
         store: &MaskStore,
-        (name, place): (&str, &MaskPlace),
+        name: &str,
+        place: &MaskPlace,
         mask: Option<&DrawnMask>,
     ) -> Result<(), StoreError> {
         let stored = mask.map(|hand| StoredMask {

@@ -96,13 +96,13 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
         let Some(entry) = dataset.index.get(pair) else { continue };
         cx.progress(done as u64, total as u64, &entry.name);
         let tool = entry.tool.as_ref().map(|name| {
-            let tool = tools.entry(name.clone()).or_insert_with(|| load_tool(dataset, name).map(|(tool, _)| tool));
+            let tool = tools.entry(name.clone()).or_insert_with(|| load_tool(dataset, name).map(|loaded| loaded.model));
             tool.as_ref()
         });
         let no_tool = TaskError::new(WHAT, "no tool is named, so there is no CAD model");
         let tool = tool.unwrap_or(Err(&no_tool));
         let job = ProposalBatch { dataset, all: &labels, setup, models, cx };
-        let one = caught(|| job.one((pair, &entry.name), tool, &mut batch));
+        let one = caught(|| job.one(pair, &entry.name, tool, &mut batch));
         match one.unwrap_or_else(|message| Err(TaskError::panicked(WHAT, &message))) {
             Ok(()) => {}
             Err(err) if err.is_cancelled() => {
@@ -132,7 +132,8 @@ struct ProposalBatch<'a> {
 impl ProposalBatch<'_> {
     fn one(
         self,
-        (pair, name): (PairId, &str),
+        pair: PairId,
+        name: &str,
         tool: Result<&ToolModel, &TaskError>,
         batch: &mut Batch,
     ) -> Result<(), TaskError> {
@@ -151,7 +152,7 @@ impl ProposalBatch<'_> {
         if pads.is_empty() {
             return Err(TaskError::new(WHAT, "there is no such imprint"));
         }
-        let proposals = propose((touch, all), &felt, &pads, &setup.propose, models)?;
+        let proposals = propose(touch, all, &felt, &pads, &setup.propose, models)?;
         let (mut new, mut how) = (0, Vec::new());
         for (pad, proposal) in proposals {
             let proposal = match proposal {

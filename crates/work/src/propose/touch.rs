@@ -5,10 +5,11 @@ use super::super::feel::{Felt, Touch};
 use super::super::job::JobCx;
 use super::super::labels::{Labels, MaskPlace};
 use super::super::models::Models;
+use super::super::on_pad::OnPad;
 use super::super::recipe::{Recipe, Stage};
 use super::{
-    Proposal, ProposalSource, Side, WHAT, automatic, cad_distances, carried_across, carried_from_pair, carries_from,
-    grown, near_cad,
+    CadAt, OtherPair, Proposal, ProposalSource, Side, Takes, WHAT, automatic, cad_distances, carried_across,
+    carried_from_pair, carries_from, grown, hand_pose, near_cad,
 };
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
@@ -39,7 +40,8 @@ pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
 /// # Errors
 /// The reason that holds for all of them: what the source lacks.
 pub fn propose(
-    (touch, all): (Touch<'_>, &Labels),
+    touch: Touch<'_>,
+    all: &Labels,
     felt: &Felt,
     pads: &[PadId],
     setup: &ProposeSetup,
@@ -58,12 +60,12 @@ pub fn propose(
     let near = |at: CadPose, pose: ManualPose| {
         let tool = touch.tool.map_err(Clone::clone)?;
         each(&|pad, imprint| {
-            let distances = cad_distances((imprint, setup.recipe.imprint), (sample, pad), tool, pose)?;
+            let distances = cad_distances(imprint, setup.recipe.imprint, OnPad { sample, pad }, tool, pose)?;
             Ok(near_cad(&distances, setup.recipe.mask.cad_distance_m, at))
         })
     };
-    match setup.source {
-        ProposalSource::Automatic => {
+    match setup.source.takes() {
+        Takes::AutomaticMask => {
             let made = reach(&Recipe { hand: false, ..setup.recipe.clone() }, Stage::Mask)?;
             let made = made.contact();
             each(&|pad, _| {
@@ -71,28 +73,26 @@ pub fn propose(
                 Ok(automatic(one.clone(), &made.recipe, made.model.as_deref().unwrap_or_default()))
             })
         }
-        ProposalSource::CadTruth => {
+        Takes::CadModel(CadAt::Truth) => {
             let truth = sample.grasp_from_object.ok_or_else(|| lacks("the true pose of this pair is not known"))?;
             near(CadPose::Truth, truth.into())
         }
-        ProposalSource::CadRegistered => {
+        Takes::CadModel(CadAt::Registered) => {
             let felt = reach(&setup.recipe, Stage::Pose)?;
             let found = felt.pose().map_err(Clone::clone)?.grasp_from_object;
             near(CadPose::Registered(found), found.into())
         }
-        ProposalSource::CadHand => {
-            let accepted = labels.accepted(&of).filter(|accepted| accepted.by_hand);
-            let pose = setup.pose.or(accepted.map(|accepted| accepted.pose));
-            let pose = pose.ok_or_else(|| {
+        Takes::CadModel(CadAt::Hand) => {
+            let pose = hand_pose(setup.pose, labels.accepted(&of)).ok_or_else(|| {
                 lacks("nobody set the pose of this pair by hand").with_hint("Set it first, or name it with --pose.")
             })?;
             near(CadPose::Nudged(pose), pose)
         }
-        ProposalSource::Grow => each(&|pad, imprint| {
+        Takes::DrawnMask => each(&|pad, imprint| {
             let place = MaskPlace { pad, of: of.clone() };
             grown(imprint, labels.drawn(&place, imprint))
         }),
-        ProposalSource::Carry => {
+        Takes::OtherPair => {
             let reviews = all.reviews().states;
             let review = |name: &str| reviews.get(name).copied().unwrap_or_default();
             let from = setup.carry_from.or_else(|| carries_from(&touch.dataset.index, touch.pair, review));
@@ -102,9 +102,10 @@ pub fn propose(
             let name = &touch.dataset.index.get(from).ok_or_else(|| lacks("there is no such pair"))?.name;
             let other = touch.dataset.load(from).map_err(|err| TaskError::from_error(WHAT, &err))?;
             let other_labels = all.load(name)?;
-            each(&|pad, imprint| carried_from_pair(name, (&other, &other_labels), Side { sample, pad, imprint }))
+            let from = OtherPair { name, sample: &other, labels: &other_labels };
+            each(&|pad, imprint| carried_from_pair(from, Side { sample, pad, imprint }))
         }
-        ProposalSource::OtherFinger => {
+        Takes::OtherPad => {
             let (rig, felt) = (&touch.dataset.rig, reach(&setup.recipe, Stage::Mask)?);
             let found = felt.contact();
             each(&|pad, imprint| {
@@ -113,7 +114,7 @@ pub fn propose(
                     return Err(lacks("the other finger has no mask"));
                 };
                 let from = Side { sample, pad: other, imprint: there };
-                carried_across(&rig.pad_key(other), (from, &mask.mask), Side { sample, pad, imprint })
+                carried_across(&rig.pad_key(other), from, &mask.mask, Side { sample, pad, imprint })
             })
         }
     }

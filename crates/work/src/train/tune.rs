@@ -19,7 +19,7 @@ use crate::io::digest::hex;
 use crate::io::files;
 use crate::io::memory::peak_mib;
 use crate::job::JobCx;
-use crate::tuning::{KeptRun, Look, Runs, Tuning, steps_within};
+use crate::tuning::{KeptRun, Look, RunName, Runs, Tuning, TuningTask, steps_within};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::agreement;
 
@@ -48,14 +48,13 @@ pub(super) fn tune(
     let (spec, start) = open(setup)?;
     let touches: Vec<MaskTouch> = gathered.learned.iter().map(|drawn| drawn.touch(&spec.input)).collect();
     let kept = KeptRun::of(setup.unfinished.as_deref(), &digest(setup, &gathered));
+    let task = TuningTask { what: WHAT, fail, kept: &kept, cx };
     let config = MaskConfig { seed: setup.choice.seed, ..MaskConfig::default() };
     let steps = match setup.tuning {
         Tuning::Steps(steps) => steps,
         Tuning::Within(time) => {
-            let left = (time.saturating_sub(begin.elapsed()), STEPPING);
-            steps_within(left, 1, (WHAT, fail), (&kept, cx), || {
-                MaskTuner::new(&start, touches.clone(), config.clone())
-            })?
+            let left = time.saturating_sub(begin.elapsed());
+            steps_within(left, STEPPING, 1, task, || MaskTuner::new(&start, touches.clone(), config.clone()))?
         }
     };
     let config = MaskConfig { steps: steps as usize, ..config };
@@ -71,8 +70,9 @@ pub(super) fn tune(
         None => MaskTuner::new(&start, touches.clone(), config.clone()),
     };
     let times = if looked_at.is_empty() { 0 } else { LOOKS };
-    let mut runs = Runs::new((WHAT, fail), (&kept, cx), steps, 1);
-    let tuner = runs.finish((FILE, "the mask model"), begun, &Look { unit: "Dice", times, at: &look })?;
+    let mut runs = Runs::new(task, steps, 1);
+    let run = RunName { file: FILE, name: "the mask model" };
+    let tuner = runs.finish(run, begun, &Look { unit: "Dice", times, at: &look })?;
     let curves = runs.curves;
     let mut held_out = Vec::with_capacity(gathered.held.len());
     for part in gathered.held.chunks(BATCH) {

@@ -13,6 +13,26 @@ const TIMED: u32 = 2;
 /// Time between two moments at which a run is kept.
 const KEPT_EVERY: Duration = Duration::from_secs(20);
 
+/// Task that runs are for, and who keeps and watches them.
+#[derive(Clone, Copy)]
+pub(crate) struct TuningTask<'a> {
+    /// The name of the task.
+    pub(crate) what: &'static str,
+    /// Says what is wrong with a run.
+    pub(crate) fail: fn(Error) -> TaskError,
+    pub(crate) kept: &'a KeptRun,
+    pub(crate) cx: &'a JobCx,
+}
+
+/// Names of a run.
+#[derive(Clone, Copy)]
+pub(crate) struct RunName<'a> {
+    /// By its files.
+    pub(crate) file: &'a str,
+    /// By people.
+    pub(crate) name: &'a str,
+}
+
 /// A look at what a run has not seen.
 pub(crate) struct Look<'a, T> {
     /// Unit of its value, e.g. `dB`.
@@ -28,10 +48,7 @@ type Curves = [Vec<[f64; 2]>; 2];
 
 /// The runs one after the other, with what is kept and shown of them.
 pub(crate) struct Runs<'a> {
-    pub(crate) kept: &'a KeptRun,
-    pub(crate) cx: &'a JobCx,
-    what: &'static str,
-    fail: fn(Error) -> TaskError,
+    pub(crate) task: TuningTask<'a>,
     /// Steps of each.
     steps: usize,
     /// Steps of all runs.
@@ -44,16 +61,11 @@ pub(crate) struct Runs<'a> {
 }
 
 impl<'a> Runs<'a> {
-    /// So many runs of so many steps, of the task `what`; `fail` says what is wrong with one.
-    pub(crate) fn new(
-        (what, fail): (&'static str, fn(Error) -> TaskError),
-        (kept, cx): (&'a KeptRun, &'a JobCx),
-        steps: u32,
-        count: usize,
-    ) -> Self {
+    /// So many runs of so many steps.
+    pub(crate) fn new(task: TuningTask<'a>, steps: u32, count: usize) -> Self {
         let total = u64::from(steps) * count as u64;
         let begin = Instant::now();
-        Self { kept, cx, what, fail, steps: steps as usize, total, done: 0, begin, made: 0, curves: Vec::new() }
+        Self { task, steps: steps as usize, total, done: 0, begin, made: 0, curves: Vec::new() }
     }
 
     /// Takes a run as made, because what came of it is kept.
@@ -63,29 +75,28 @@ impl<'a> Runs<'a> {
         self.curves.extend(named(name, unit, &curves));
     }
 
-    /// A run from where it stands to its end. `file` is what its files are called, `name` what people call it; `begin` has a
-    /// state where one was kept.
+    /// A run from where it stands to its end; `begin` has a state where one was kept.
     pub(crate) fn finish<T: Descent>(
         &mut self,
-        (file, name): (&str, &str),
+        RunName { file, name }: RunName<'_>,
         begin: impl Fn(Option<&[u8]>) -> Tuned<T>,
         look: &Look<'_, T>,
     ) -> Result<T, TaskError> {
-        let resumed = self.kept.read(&state_file(file)).and_then(|state| begin(Some(&state)).ok());
+        let resumed = self.task.kept.read(&state_file(file)).and_then(|state| begin(Some(&state)).ok());
         let (mut tuner, mut curves) = match resumed {
             Some(tuner) => (tuner, self.kept_curves(file)),
-            None => (begin(None).map_err(self.fail)?, Curves::default()),
+            None => (begin(None).map_err(self.task.fail)?, Curves::default()),
         };
         self.done += tuner.steps_done() as u64;
         let every = (tuner.steps() / look.times.max(1)).max(1);
         let mut last_kept = Instant::now();
         while tuner.steps_done() < tuner.steps() {
-            if self.cx.cancel.is_cancelled() || last_kept.elapsed() > KEPT_EVERY {
+            if self.task.cx.cancel.is_cancelled() || last_kept.elapsed() > KEPT_EVERY {
                 self.keep(file, &tuner, &curves);
-                self.cx.check(self.what)?;
+                self.task.cx.check(self.task.what)?;
                 last_kept = Instant::now();
             }
-            let report = tuner.step().map_err(self.fail)?;
+            let report = tuner.step().map_err(self.task.fail)?;
             (self.done, self.made) = (self.done + 1, self.made + 1);
             curves[0].push([report.step as f64, f64::from(report.loss)]);
             if report.step.is_multiple_of(every) && look.times > 0 {
@@ -94,22 +105,22 @@ impl<'a> Runs<'a> {
             self.show(name, look.unit, &curves, report.step);
         }
         self.curves.extend(named(name, look.unit, &curves));
-        self.kept.write(&curves_file(file), &serde_json::to_vec(&curves).unwrap_or_default());
+        self.task.kept.write(&curves_file(file), &serde_json::to_vec(&curves).unwrap_or_default());
         Ok(tuner)
     }
 
     /// Forgets the state of a run, because what came of it is kept.
     pub(crate) fn forget(&self, file: &str) {
-        self.kept.remove(&state_file(file));
+        self.task.kept.remove(&state_file(file));
     }
 
     fn keep(&self, file: &str, tuner: &impl Descent, curves: &Curves) {
-        self.kept.write(&state_file(file), &tuner.to_bytes());
-        self.kept.write(&curves_file(file), &serde_json::to_vec(curves).unwrap_or_default());
+        self.task.kept.write(&state_file(file), &tuner.to_bytes());
+        self.task.kept.write(&curves_file(file), &serde_json::to_vec(curves).unwrap_or_default());
     }
 
     fn kept_curves(&self, file: &str) -> Curves {
-        let bytes = self.kept.read(&curves_file(file)).unwrap_or_default();
+        let bytes = self.task.kept.read(&curves_file(file)).unwrap_or_default();
         serde_json::from_slice(&bytes).unwrap_or_default()
     }
 
@@ -119,7 +130,7 @@ impl<'a> Runs<'a> {
             left if left > 90.0 => format!("{:.0} min left", left / 60.0),
             left => format!("{left:.0} s left"),
         };
-        self.cx.show(Progress {
+        self.task.cx.show(Progress {
             done: self.done,
             total: self.total,
             text: format!("tuning {name}: step {step} of {}, about {left}", self.steps),
@@ -144,10 +155,10 @@ fn named(name: &str, unit: &'static str, [loss, looks]: &Curves) -> impl Iterato
 /// Number of steps of each of some runs that fit into a time, of which the share `stepping` goes into steps: a few are
 /// made and thrown away. A run that goes on keeps the number it began with.
 pub(crate) fn steps_within<T: Descent>(
-    (time, stepping): (Duration, f64),
+    time: Duration,
+    stepping: f64,
     runs: usize,
-    (what, fail): (&'static str, fn(Error) -> TaskError),
-    (kept, cx): (&KeptRun, &JobCx),
+    TuningTask { what, fail, kept, cx }: TuningTask<'_>,
     tuner: impl FnOnce() -> Tuned<T>,
 ) -> Result<u32, TaskError> {
     const FILE: &str = "steps";

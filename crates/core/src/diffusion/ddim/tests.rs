@@ -375,3 +375,14 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
     let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
     assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Guidance(_))));
 }
+
+#[test]
+fn choices_are_keys() {
+    let of = |eta, guidance| GenerateConfig { eta, guidance, ..GenerateConfig::default() };
+    assert_eq!(of(0.0, 1.0), of(-0.0, 1.0));
+    assert_eq!(of(f64::NAN, 1.0), of(f64::NAN, 1.0), "a key finds itself");
+    let mut keys = [of(0.5, 2.0), of(f64::NAN, 1.0), of(-0.0, 1.0), of(0.5, 1.0)];
+    keys.sort();
+    assert_eq!(keys, [of(0.0, 1.0), of(0.5, 1.0), of(0.5, 2.0), of(f64::NAN, 1.0)]);
+    assert_eq!(std::collections::HashSet::from([of(0.0, 1.0), of(-0.0, 1.0), of(0.5, 1.0)]).len(), 2);
+}

@@ -1,0 +1,221 @@
+//! The contents of what is taken away: figures, pairs, cases.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use serde::{Deserialize, Serialize};
+use strum::IntoEnumIterator as _;
+
+use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
+use super::super::pane::Pane;
+use super::super::state::State;
+use super::super::state::settings::Settings;
+use super::super::{recipe, results};
+use touch2touch_core::contact::MaskBasis;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::case::CaseSetup;
+use touch2touch_work::cloud::Clouds;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::figure::{FigureSetup, FigureTheme, note};
+use touch2touch_work::mask::made_of;
+use touch2touch_work::pair_files::{PairFile, PairParts, write};
+use touch2touch_work::pose::PoseResult;
+use touch2touch_work::recipe::{ModelName, Recipe};
+use touch2touch_work::tool::NamedTool;
+
+/// The view of the studio on a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct CaseView {
+    /// The preferences, with the arrangement of the panes.
+    pub settings: Settings,
+    /// The camera of 3D views, in the window's own format.
+    pub camera: String,
+    /// The active finger.
+    pub finger: PadId,
+    /// True where all fingers were shown.
+    pub both_fingers: bool,
+}
+
+/// The export of the selected pair for other programs, gathered for a job.
+#[derive(Clone, Debug)]
+pub struct PairExport {
+    name: String,
+    source: ImprintSource,
+    prediction: Option<String>,
+    rig: Arc<Rig>,
+    clouds: Arc<Clouds>,
+    mask: String,
+    registration: RegistrationChoice,
+    pose: Option<Arc<PoseResult>>,
+    truth: Option<PlanarPose>,
+    tool: Option<Arc<NamedTool>>,
+}
+
+impl PairExport {
+    /// Writes the files that there can be: without a pose only the cloud.
+    ///
+    /// # Errors
+    /// As [`write()`].
+    pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+        let files: Vec<PairFile> =
+            PairFile::iter().filter(|file| *file == PairFile::Cloud || self.pose.is_some()).collect();
+        let parts = PairParts {
+            name: &self.name,
+            source: self.source,
+            prediction: self.prediction.as_deref(),
+            rig: &self.rig,
+            clouds: &self.clouds,
+            mask: &self.mask,
+            registration: self.registration,
+            pose: self.pose.as_deref(),
+            truth: self.truth,
+            tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
+        };
+        write(&parts, &files, folder)
+    }
+}
+
+/// A pair of a figure with the predictions that it needs.
+pub(crate) type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
+
+/// The parts of the open case that cannot be made again on this machine, in sentences.
+pub fn case_lacks(state: &State) -> Vec<String> {
+    let case = state.library.open.as_ref().and_then(|open| open.source.case());
+    // Which models are here is not known at once.
+    let Some((_, case, _)) = case.filter(|_| !state.export.predict) else { return Vec::new() };
+    let lacks = |model: &&ModelName| state.library.bundle(&model.id).is_none();
+    let generator = case.recipe.generator.as_ref().map(|(model, _)| model);
+    let imprints = generator.filter(lacks).map(|model| {
+        let name = &model.name;
+        format!("Predicted imprints are shown as the case holds them: its generator {name} is not on this machine.")
+    });
+    let masks = case.recipe.mask_model.as_ref().filter(lacks).map(|model| {
+        let name = &model.name;
+        format!("Masks are made another way than in the case: its mask model {name} is not on this machine.")
+    });
+    imprints.into_iter().chain(masks).collect()
+}
+
+/// The setup of the figure that the form describes, before anything is drawn.
+pub(crate) fn figure_setup(state: &State) -> FigureSetup {
+    let form = &state.export.form;
+    let pairs = match form.first {
+        Some(n) => state.library.order.iter().copied().take(n).collect(),
+        None => state.selection.pair.into_iter().collect(),
+    };
+    let fingers = if form.both_fingers { state.rig().pad_list() } else { vec![state.selection.finger] };
+    let look = state.settings.figure_look(form.panes.clone(), form.error_m, form.theme, f64::from(form.scale));
+    with_note(state, FigureSetup { pairs, fingers, shift: state.settings.shift, look, note: String::new() })
+}
+
+/// One pane of the selected pair, with the fingers that it shows.
+pub(crate) fn picture_setup(state: &State, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
+    let shown = state.fingers();
+    let fingers = state.rig().pads().filter(|finger| shown.contains(finger)).collect();
+    let scale = f64::from(scale.unwrap_or(1));
+    let look = state.settings.figure_look(vec![pane.in_figure()?], error_m, FigureTheme::Light, scale);
+    let pairs = vec![state.selection.pair?];
+    Some(with_note(state, FigureSetup { pairs, fingers, shift: state.settings.shift, look, note: String::new() }))
+}
+
+fn with_note(state: &State, setup: FigureSetup) -> FigureSetup {
+    let recipes = figure_recipes(state, &setup);
+    let mut said: Vec<String> = Vec::new();
+    for (recipe, bundle) in recipes.iter().flat_map(|(_, list)| list) {
+        let text = note(&bundle.name, &recipe.config, setup.shift);
+        if !said.contains(&text) {
+            said.push(text);
+        }
+    }
+    // Pairs whose shown predictions were made in different ways are said so, not listed.
+    let note = match said.as_slice() {
+        [] => String::new(),
+        [one] => one.clone(),
+        several => format!("{} and {} other ways", several[0], several.len() - 1),
+    };
+    FigureSetup { note, ..setup }
+}
+
+/// The predictions that a figure shows: the one shown for a touch, else what the settings would make of it.
+pub(crate) fn figure_recipes(state: &State, setup: &FigureSetup) -> Recipes {
+    let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
+    let Some(open) = state.library.open.as_ref().filter(|_| predicted) else { return Vec::new() };
+    let of = |pair: &PairId| {
+        let touches = setup.fingers.iter().map(|finger| open.key(*pair).finger(*finger));
+        let recipes = touches.filter_map(|touch| {
+            let recipe = results::shown(state, touch).cloned().or_else(|| recipe::prediction(state, touch))?;
+            let bundle = state.library.bundle(&recipe.bundle)?.clone();
+            Some((recipe, bundle))
+        });
+        (*pair, recipes.collect())
+    };
+    setup.pairs.iter().map(of).collect()
+}
+
+/// The sources of the contact masks of a cloud, as the verbs say them.
+fn masks_made_of(state: &State, cloud: &CloudKey) -> String {
+    let source = state.settings.mask.choice.source.key();
+    let keys = cloud.parts.iter().flatten().filter_map(|(imprint, version)| match version.as_ref()? {
+        MaskVersion::Hand(_) => Some(MaskBasis::Hand.key(source)),
+        MaskVersion::Auto(recipe) => {
+            let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
+            Some(state.results.masks.get(&key)?.basis.key(recipe.source().key()))
+        }
+    });
+    made_of(keys.collect(), source)
+}
+
+/// The export of the selected pair; `None` while its cloud is not there.
+pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
+    let cloud = results::cloud_key(state, source).ok()??;
+    let pose = results::pose_key(state, source).ok().flatten().and_then(|key| state.results.poses.get(&key)).cloned();
+    let recipe =
+        state.rig().pads().find_map(|pad| results::chosen(state, pad)).filter(|_| source == ImprintSource::Predicted);
+    let prediction = recipe.map(|recipe| {
+        let shift = state.settings.shift.label().to_lowercase();
+        format!("{} · {shift}", state.library.made_with(recipe))
+    });
+    Some(PairExport {
+        name: state.pair_name().to_owned(),
+        source,
+        prediction,
+        rig: state.rig(),
+        clouds: state.results.clouds.get(&cloud)?.clone(),
+        mask: masks_made_of(state, &cloud),
+        registration: state.settings.registration,
+        pose,
+        truth: results::sample(state).ready()?.grasp_from_object,
+        tool: results::tool_key(state).ok().and_then(|key| state.results.tools.get(&key)).cloned(),
+    })
+}
+
+/// The contents of a case of the selected pair; `camera` is where 3D views look from, as the window says it.
+pub(crate) fn case_setup(state: &State, camera: &str) -> Option<CaseSetup> {
+    let pair = state.selection.pair?;
+    let chosen = results::chosen(state, state.selection.finger)
+        .or_else(|| state.rig().pads().find_map(|pad| results::chosen(state, pad)));
+    let generator = chosen.and_then(|key| Some((state.library.bundle(&key.bundle)?.clone().into(), key.config)));
+    // What is of the person stays with the person.
+    let settings = state.settings.clone().of_person(&Settings::default());
+    let view = CaseView {
+        settings,
+        camera: camera.to_owned(),
+        finger: state.selection.finger,
+        both_fingers: state.selection.both_fingers,
+    };
+    Some(CaseSetup {
+        pair,
+        recipe: Recipe { generator, ..recipe::in_force(state, ImprintSource::Measured) },
+        labels: state.document.pair(state.pair_name()).cloned().unwrap_or_default(),
+        view: serde_json::to_value(view).ok(),
+    })
+}
+
+/// True where a figure of the open pairs can be drawn.
+pub(crate) fn can_draw(state: &State) -> bool {
+    let open = state.library.open.as_ref();
+    open.is_some_and(|open| open.source.as_dataset().is_some()) && state.entry().is_some()
+}

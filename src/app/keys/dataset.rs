@@ -1,0 +1,185 @@
+//! Keys of what is of a whole data set, or of a pair before anything is made of it.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::super::keys::{Bits, DatasetSeq, Key, PairKey, Revision};
+use super::super::scores::ScoreTable;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::export::{ExportChoice, Plan};
+use touch2touch_work::import::Import;
+use touch2touch_work::label_stats::LabelStats;
+use touch2touch_work::labels::{JournalHistory, PairLabels};
+use touch2touch_work::tool::NamedTool;
+use touch2touch_work::train::{TrainChoice, TrainPlan};
+
+impl Key for PairKey {
+    type Value = Sample;
+
+    fn bytes(sample: &Sample) -> usize {
+        sample.bytes()
+    }
+}
+
+/// The small picture of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ThumbnailKey(pub PairKey);
+
+impl Key for ThumbnailKey {
+    type Value = DepthMap;
+
+    fn bytes(picture: &DepthMap) -> usize {
+        picture.len() * 4
+    }
+}
+
+/// A tool of a data set.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ToolKey {
+    /// The opening of the data set.
+    pub dataset: DatasetSeq,
+    /// The name.
+    pub name: Arc<str>,
+}
+
+impl Key for ToolKey {
+    type Value = NamedTool;
+
+    fn bytes(tool: &NamedTool) -> usize {
+        let mesh = tool.model.mesh.vertices.len() * 24 + tool.model.mesh.triangles.len() * 12;
+        // The registration's field and tree are of the mesh's order, at least a few MB.
+        8 * mesh + (4 << 20)
+    }
+}
+
+/// The labels stored for a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LabelsKey {
+    /// The pair.
+    pub pair: PairKey,
+    /// True where the labels of a second time are meant.
+    pub repeat: bool,
+}
+
+impl Key for LabelsKey {
+    type Value = Read;
+}
+
+/// Labels as they were read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Read {
+    pub(crate) labels: PairLabels,
+    /// The gestures of earlier runs.
+    pub(crate) told: JournalHistory,
+}
+
+/// Everything that decides what is counted.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct LabelStatsKey {
+    pub(crate) dataset: DatasetSeq,
+    /// Pairs that the data set has by now.
+    pub(crate) pairs: usize,
+    /// The number of times that review states were written.
+    pub(crate) marks: u64,
+    /// Whose repeats.
+    pub(crate) person: String,
+    /// The share of the pairs that come back, percent.
+    pub(crate) repeats_percent: Bits,
+}
+
+impl Key for LabelStatsKey {
+    type Value = LabelStats;
+
+    fn bytes(stats: &LabelStats) -> usize {
+        512 * stats.pairs.len() + 128 * stats.tools.len()
+    }
+}
+
+/// Everything that decides which scores are there.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ScoresKey {
+    pub(crate) dataset: DatasetSeq,
+    /// Pairs that the data set has by now.
+    pub(crate) pairs: usize,
+    /// The setup of the scoring, as text.
+    pub(crate) setup: String,
+    /// The number of times that scores were computed.
+    pub(crate) round: u64,
+}
+
+impl Key for ScoresKey {
+    type Value = ScoreTable;
+
+    fn bytes(table: &ScoreTable) -> usize {
+        table.bytes()
+    }
+}
+
+/// The plan of an export, of what is drawn and marked now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct MaskPlanKey {
+    /// The data set.
+    pub dataset: DatasetSeq,
+    /// The choices.
+    pub choice: ExportChoice,
+    /// The last change of the document.
+    pub revision: Revision,
+}
+
+impl Key for MaskPlanKey {
+    type Value = Plan;
+
+    fn bytes(plan: &Plan) -> usize {
+        plan.total() * 128
+    }
+}
+
+/// The plan of an import, over what is drawn and marked now.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ImportPlanKey {
+    /// The data set.
+    pub dataset: DatasetSeq,
+    /// The import that is asked about.
+    pub form: ImportForm,
+    /// The last change of the document.
+    pub revision: Revision,
+}
+
+impl Key for ImportPlanKey {
+    type Value = Import;
+
+    fn bytes(plan: &Import) -> usize {
+        (plan.changed.len() + plan.unmatched.len() + plan.refused.len()) * 128
+    }
+}
+
+/// An import of masks that is asked about: what it would change is said before anything changes.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ImportForm {
+    /// The folder or file.
+    pub from: PathBuf,
+    /// True where what was painted by hand is replaced as well.
+    pub over_drawn: bool,
+    /// The number of the asking: files may be others than at the one before.
+    pub(in crate::app) asked: u64,
+}
+
+/// The plan of a training, on what is drawn and marked now.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TrainPlanKey {
+    /// The data set.
+    pub dataset: DatasetSeq,
+    /// The division into pairs to learn from and pairs that are left out.
+    pub choice: TrainChoice,
+    /// The last change of the document.
+    pub revision: Revision,
+}
+
+impl Key for TrainPlanKey {
+    type Value = TrainPlan;
+
+    fn bytes(plan: &TrainPlan) -> usize {
+        (plan.masks() + plan.held_out[0]) * 256
+    }
+}

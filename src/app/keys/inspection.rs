@@ -1,0 +1,115 @@
+//! [`Inspection`]: a recorded registration, made ready to be looked through.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::super::keys::{Key, RegistrationChoice, RunKey};
+use touch2touch_core::align::{AlignReport, TraceStep};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::inspect::Counterparts;
+use touch2touch_core::pose::ToolModel;
+use touch2touch_work::pose::PoseResult;
+
+/// The steps of a recorded registration.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct InspectionKey(pub RunKey);
+
+impl Key for InspectionKey {
+    type Value = Inspection;
+
+    fn bytes(inspection: &Inspection) -> usize {
+        inspection.bytes()
+    }
+}
+
+/// A recorded registration with what its steps are looked at with.
+#[derive(Clone, Debug)]
+pub struct Inspection {
+    /// The recorded registration.
+    pub result: Arc<PoseResult>,
+    /// The contact points that were offered, meters, grasp frame.
+    pub points: Vec<DVec3>,
+    /// The counterparts that the points are compared with.
+    pub counterparts: Counterparts,
+    /// Per start the positions of its steps in the trace.
+    runs: Vec<Vec<usize>>,
+}
+
+impl Inspection {
+    /// From a recorded registration, the contact points it was offered, and what they were compared with.
+    pub fn new(
+        result: Arc<PoseResult>,
+        points: Vec<DVec3>,
+        tool: &ToolModel,
+        registration: RegistrationChoice,
+    ) -> Self {
+        let report = &result.report;
+        let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
+        for (i, step) in report.trace.iter().enumerate() {
+            if step.run >= runs.len() {
+                runs.resize(step.run + 1, Vec::new());
+            }
+            runs[step.run].push(i);
+        }
+        Self { result, points, counterparts: Counterparts::new(tool, registration.by), runs }
+    }
+
+    /// The registration's report with its trace.
+    pub fn report(&self) -> &AlignReport {
+        &self.result.report
+    }
+
+    /// Starts there are.
+    pub fn num_runs(&self) -> usize {
+        self.runs.len()
+    }
+
+    /// Steps of a start, the applied start included.
+    pub(crate) fn num_steps(&self, run: usize) -> usize {
+        self.runs.get(run).map_or(0, Vec::len)
+    }
+
+    /// The steps of a start, in order.
+    pub fn steps(&self, run: usize) -> impl Iterator<Item = &TraceStep> + '_ {
+        self.runs.get(run).into_iter().flatten().filter_map(|&i| self.report().trace.get(i))
+    }
+
+    /// A step of a start; beyond the end its last.
+    pub fn step(&self, run: usize, at: usize) -> Option<&TraceStep> {
+        let steps = self.runs.get(run)?;
+        self.report().trace.get(*steps.get(at.min(steps.len().checked_sub(1)?))?)
+    }
+
+    /// The pose that a start was asked to begin at, `grasp_from_object`.
+    pub fn requested(&self, run: usize) -> Option<PlanarPose> {
+        self.report().runs.get(run).map(|r| r.start)
+    }
+
+    /// The pose it began at, `grasp_from_object`: not always the one asked for.
+    pub fn applied(&self, run: usize) -> Option<PlanarPose> {
+        self.steps(run).next().map(|s| s.grasp_from_object)
+    }
+
+    /// The continuation after a step, in words: the reason to stop at the last one.
+    pub fn what_next(&self, run: usize, at: usize) -> String {
+        let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
+            return "no step was recorded".into();
+        };
+        if at >= last {
+            return self.report().runs.get(run).map_or_else(|| self.report().stop.to_string(), |r| r.stop.to_string());
+        }
+        match self.step(run, at + 1) {
+            Some(next) if next.kernel_m != here.kernel_m => {
+                format!("this kernel is done; the next is {:.2} mm wide", next.kernel_m * 1e3)
+            }
+            Some(next) if next.points != here.points => format!("goes on with {} points", next.points),
+            _ => "still moving".into(),
+        }
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        self.points.len() * 24 + self.report().trace.len() * 8 + (100 << 10)
+    }
+}

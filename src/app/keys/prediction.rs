@@ -1,0 +1,95 @@
+//! Keys of raw predictions, by who asks for them.
+
+use std::sync::Arc;
+
+use super::super::keys::{Key, TouchKey};
+use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::ensemble::seeds;
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::job::PreviewPicture;
+use touch2touch_work::prediction::Prediction;
+use touch2touch_work::recipe::Recipe;
+
+/// Everything that decides a prediction.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PredictionKey {
+    /// The touch whose GelSlim image is the condition.
+    pub touch: TouchKey,
+    /// The bundle's identity (its digest): a changed bundle is another recipe.
+    pub bundle: Arc<str>,
+    /// The choices of the generation.
+    pub config: GenerateConfig,
+    /// The model runtime: two of them round differently.
+    pub runtime: EngineChoice,
+}
+
+impl PredictionKey {
+    /// The key of a touch by a recipe; `None` where that has no generator.
+    pub fn of(touch: TouchKey, recipe: &Recipe) -> Option<Self> {
+        let (model, config) = recipe.generator.as_ref()?;
+        Some(Self { touch, bundle: model.id.clone(), config: *config, runtime: recipe.engine })
+    }
+
+    /// The keys that differ from it in their seeds alone: `count` of them, from its own on.
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
+        seeds(self.config.seed, count).into_iter().map(|seed| self.with_seed(seed)).collect()
+    }
+
+    /// The key that differs in its seed alone.
+    #[must_use]
+    pub fn with_seed(&self, seed: u64) -> Self {
+        Self { config: GenerateConfig { seed, ..self.config }, ..self.clone() }
+    }
+}
+
+impl Key for PredictionKey {
+    type Value = Prediction;
+
+    fn bytes(prediction: &Prediction) -> usize {
+        prediction.raw.channels.iter().map(|c| c.len() * 4).sum()
+    }
+}
+
+/// A prediction with one of several seeds.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct SeedKey(pub PredictionKey);
+
+impl Key for SeedKey {
+    type Value = Prediction;
+}
+
+/// The predictions of a touch that lie on the disk from before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct StoredKey(pub TouchKey);
+
+impl Key for StoredKey {
+    type Value = Keyed;
+}
+
+/// Predictions with their keys.
+pub(crate) type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;
+
+/// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct PrefetchKey(pub PredictionKey);
+
+impl Key for PrefetchKey {
+    type Value = Prediction;
+}
+
+/// A prediction that is compared with something.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ComparedKey(pub PredictionKey);
+
+impl Key for ComparedKey {
+    type Value = Prediction;
+}
+
+/// A prediction as it looks on the way.
+#[derive(Clone, Debug)]
+pub struct Preview {
+    /// The key of what is being made.
+    pub recipe: PredictionKey,
+    /// The picture.
+    pub picture: PreviewPicture,
+}

@@ -1,0 +1,91 @@
+//! Keys of proposals.
+
+use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, Revision};
+use touch2touch_core::grid::Grid;
+use touch2touch_core::label::CadPose;
+use touch2touch_core::manual::ManualPose;
+use touch2touch_work::propose::Proposal;
+
+/// The place where the CAD model lies.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum CadPlace {
+    /// At the true pose.
+    Truth,
+    /// At a registered one.
+    Registered(Box<PoseKey>),
+    /// The place where a hand holds it: the bits of its six numbers.
+    Hand([u64; 6]),
+}
+
+impl CadPlace {
+    /// The place where a hand holds it.
+    pub(crate) fn hand(pose: ManualPose) -> Self {
+        let ManualPose { planar, x_m, pitch_rad, yaw_rad } = pose;
+        Self::Hand([planar.theta_rad, planar.y_m, planar.z_m, x_m, pitch_rad, yaw_rad].map(f64::to_bits))
+    }
+}
+
+/// The distances of an imprint's points from the CAD model.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct DistancesKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// The place where the model lies.
+    pub at: CadPlace,
+}
+
+impl Key for DistancesKey {
+    type Value = Distances;
+
+    fn bytes(found: &Distances) -> usize {
+        found.grid.len() * 8
+    }
+}
+
+/// The distances, and where the model was.
+#[derive(Clone, Debug)]
+pub struct Distances {
+    /// Meters, negative inside; see [`propose::cad_distances`].
+    pub grid: Grid<f64>,
+    /// The pose of the model.
+    pub at: CadPose,
+}
+
+/// The inputs of a proposal.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum ProposalInputs {
+    /// An automatic mask.
+    Automatic(MaskRecipe),
+    /// The pixels within a distance of the CAD model.
+    Cad(CadPlace, Bits),
+    /// The strokes, by the revision of the mask.
+    Grow(Revision),
+    /// The mask of another pair, by its revision where it is known.
+    Carry(PairKey, Option<Revision>),
+    /// The other finger's mask in force.
+    Across(ImprintKey, MaskVersion),
+}
+
+/// A proposal for one imprint.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct ProposalKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// The inputs.
+    pub of: ProposalInputs,
+}
+
+impl ProposalKey {
+    /// The automatic mask of the imprint by a recipe.
+    pub(crate) fn automatic(&self, recipe: &MaskRecipe) -> MaskKey {
+        MaskKey { imprint: self.imprint.clone(), recipe: recipe.clone() }
+    }
+}
+
+impl Key for ProposalKey {
+    type Value = Proposal;
+
+    fn bytes(found: &Proposal) -> usize {
+        found.mask.len()
+    }
+}

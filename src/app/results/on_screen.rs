@@ -1,0 +1,82 @@
+//! The needs of the panes on screen, as far as they decide what is computed.
+
+use super::super::keys::{ImprintSource, PredictionKey};
+use super::super::pane::Demand;
+use super::super::state::State;
+use super::super::state::workbench::Layer;
+use super::super::{recipe, results};
+use touch2touch_core::rig::PadId;
+use touch2touch_work::propose::{CadAt, Takes};
+
+/// The need of the cloud of an imprint: true where the 3D views and what lies beside them need it (with its pose), and
+/// whether it is needed at all.
+pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) {
+    let other = source.other();
+    let layers = state.needs(Demand::Layers) && state.workbench.side == source;
+    let both = state.workbench.both_clouds && state.needs(Demand::Scene(other));
+    let scene = layers || both || state.needs(Demand::Scene(source)) || state.needs(Demand::Poses);
+    let inspected = state.inspect.source == source && (state.needs(Demand::Steps) || state.needs(Demand::Basin));
+    let scene = scene || proposes_at_pose(state, source) || shows_influence(state, source);
+    (scene, scene || inspected)
+}
+
+/// True where a proposal is shown over the masks.
+pub fn proposes(state: &State) -> bool {
+    state.selection.proposing && state.needs(Demand::Masks)
+}
+
+/// True where the proposal needs the pose of an imprint.
+pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
+    proposes(state)
+        && state.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
+        && results::worked_on(state, state.selection.finger) == source
+}
+
+/// True where the influence of the pixels is shown over an imprint.
+pub(crate) fn shows_influence(state: &State, source: ImprintSource) -> bool {
+    state.selection.influence && state.needs(Demand::Imprint(source))
+}
+
+/// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or
+/// pose of them (unless the settings say otherwise).
+pub(crate) fn fingers_to_generate(state: &State) -> Vec<PadId> {
+    let (_, cloud) = shows_cloud(state, ImprintSource::Predicted);
+    if cloud && state.settings.generate.both_fingers {
+        return state.rig().pad_list();
+    }
+    let mut fingers = state.fingers();
+    if !state.settings.generate.both_fingers {
+        fingers.truncate(1);
+    }
+    fingers
+}
+
+/// The recipe that a run of seeds belongs to: that of the first finger, of the pair on screen.
+pub(crate) fn seeds_of(state: &State) -> Option<PredictionKey> {
+    state.rig().pads().find_map(|pad| recipe::prediction(state, state.touch_key(pad)?))
+}
+
+/// True where the seeds that are missing are made, while their pane is on screen.
+pub(crate) fn seeds_asked(state: &State) -> bool {
+    state.seeds.every || (state.seeds.asked.is_some() && state.seeds.asked == seeds_of(state))
+}
+
+/// True where something on screen shows a step of an imprint's registration.
+pub(crate) fn shows_steps(state: &State, source: ImprintSource) -> bool {
+    let lines = state.workbench.layer == Layer::Correspondences && state.needs(Demand::Scene(source));
+    state.inspect.source == source && (lines || state.needs(Demand::Steps))
+}
+
+/// True where something on screen shows the layers of an imprint.
+pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
+    let bench = &state.workbench;
+    let in_scene = state.needs(Demand::Scene(source))
+        && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
+            || bench.picked.is_some_and(|picked| picked.source == source));
+    in_scene || (state.needs(Demand::Layers) && bench.side == source)
+}
+
+/// True where a 3D view shows the distances between an imprint and the model.
+pub(crate) fn shows_deviation(state: &State, source: ImprintSource) -> bool {
+    state.workbench.layer == Layer::Distance && state.needs(Demand::Scene(source))
+}

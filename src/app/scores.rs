@@ -1,0 +1,120 @@
+//! [`ScoreTable`]: the scores that are kept of the pairs of a data set, as lists and pictures show them.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
+
+use touch2touch_core::dataset::{Index, PairId};
+use touch2touch_core::evaluation::{GraspScore, Metric, Scores};
+use touch2touch_work::queue::Queue;
+
+/// The scores of the pairs of a data set by each source.
+#[derive(Debug, Default)]
+pub struct ScoreTable {
+    /// The measured imprints first, where they are scored; each has scores.
+    pub sources: Vec<SourceScores>,
+    /// The queue of pairs that are worth a look first.
+    pub queue: Queue,
+}
+
+/// The scores of the pairs by one source.
+#[derive(Debug)]
+pub struct SourceScores {
+    /// The name.
+    pub name: Arc<str>,
+    /// True where these are the measured imprints themselves.
+    pub upper_bound: bool,
+    /// Pairs that were scored.
+    pub scored: usize,
+    /// By pair.
+    grasps: Vec<Option<GraspScore>>,
+    /// The metrics that some pair has, each with the badness beyond which a value is among the worst tenth, and beyond
+    /// which among the next two.
+    metrics: BTreeMap<Metric, [f64; 2]>,
+}
+
+/// The standing of a value among those of all pairs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Grade {
+    /// Among the better seven tenths.
+    Fine,
+    /// Among the three worst tenths.
+    Poor,
+    /// Among the worst tenth.
+    Worst,
+}
+
+impl SourceScores {
+    /// The name without what is said in parentheses.
+    pub fn short(&self) -> &str {
+        self.name.split(" (").next().unwrap_or(&self.name)
+    }
+
+    /// The metrics that some pair has.
+    pub fn metrics(&self) -> impl Iterator<Item = Metric> {
+        self.metrics.keys().copied()
+    }
+
+    /// True where some pair has a metric.
+    pub fn has(&self, metric: Metric) -> bool {
+        self.metrics.contains_key(&metric)
+    }
+
+    /// A metric of a pair; `None` where it was not scored.
+    pub fn value(&self, pair: PairId, metric: Metric) -> Option<f64> {
+        self.grasps.get(pair.0 as usize)?.as_ref()?.metric(metric)
+    }
+
+    /// The standing of a value of a metric among those of all pairs.
+    pub(crate) fn standing(&self, metric: Metric, value: f64) -> Grade {
+        let bad = metric.badness(value);
+        match self.metrics.get(&metric) {
+            _ if value.is_nan() => Grade::Worst,
+            Some([worst, _]) if bad > *worst => Grade::Worst,
+            Some([_, poor]) if bad > *poor => Grade::Poor,
+            _ => Grade::Fine,
+        }
+    }
+}
+
+impl ScoreTable {
+    /// Of the pairs of an index, by name.
+    pub fn new(index: &Index, scores: Vec<Scores>) -> Self {
+        let queue = Queue::of(index, &scores);
+        let places: BTreeMap<&str, usize> = index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
+        let source = |scores: Scores| {
+            let mut grasps = vec![None; index.pairs.len()];
+            for mut grasp in scores.grasps {
+                // Nobody looks at these, and they are most of it.
+                grasp.images.iter_mut().for_each(|image| image.features = Vec::new());
+                if let Some(place) = places.get(grasp.pair.as_str()) {
+                    grasps[*place] = Some(grasp);
+                }
+            }
+            let metrics = Metric::iter().filter_map(|metric| {
+                let values = grasps.iter().flatten().filter_map(|grasp| grasp.metric(metric));
+                let mut badness: Vec<f64> = values.map(|value| metric.badness(value)).collect();
+                badness.sort_by(f64::total_cmp);
+                let at = |tenths: usize| badness.get((badness.len() * tenths / 10).checked_sub(1)?).copied();
+                (!badness.is_empty()).then(|| (metric, [9, 7].map(|tenths| at(tenths).unwrap_or(f64::INFINITY))))
+            });
+            let (name, upper_bound, metrics) = (scores.method.as_str().into(), scores.upper_bound, metrics.collect());
+            let scored = grasps.iter().flatten().count();
+            SourceScores { name, upper_bound, scored, grasps, metrics }
+        };
+        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect(), queue }
+    }
+
+    /// Bytes that it holds, about.
+    pub(in crate::app) fn bytes(&self) -> usize {
+        let queued: usize = self.queue.pairs.iter().map(|queued| 64 + 32 * queued.parts.len()).sum();
+        queued + self.sources.iter().map(|source| source.grasps.len() * 768).sum::<usize>()
+    }
+
+    /// The source of a name, or whose name has a word in it, whatever its case.
+    pub fn source(&self, name: &str) -> Option<&SourceScores> {
+        let part = |source: &&SourceScores| source.name.to_lowercase().contains(&name.to_lowercase());
+        self.sources.iter().find(|source| *source.name == *name).or_else(|| self.sources.iter().find(part))
+    }
+}

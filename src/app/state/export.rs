@@ -1,0 +1,121 @@
+//! The choices of a figure before it is drawn, and of what else is taken away.
+
+use super::super::keys::{ImportForm, ImprintSource};
+use super::super::pane::Pane;
+use touch2touch_work::export::ExportChoice;
+use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
+use touch2touch_work::io::case_file;
+
+/// Pairs of the list that a figure may take.
+pub(crate) const MOST_PAIRS: usize = 50;
+/// Scales that are offered.
+pub(crate) const SCALES: [u8; 4] = [1, 2, 4, 8];
+
+/// The choices of a person about the next figure. Not kept between runs of the program.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FigureForm {
+    /// The number of pairs of the list, from the first; `None` = the selected pair alone.
+    pub first: Option<usize>,
+    /// True where all fingers get a row; else only the active one.
+    pub both_fingers: bool,
+    /// The columns.
+    pub panes: Vec<FigurePane>,
+    /// Pixels of a PNG per pixel of an imprint.
+    pub scale: u8,
+    /// Ground and ink.
+    pub theme: FigureTheme,
+    /// Half the range of the colors of errors, meters.
+    pub error_m: f32,
+}
+
+impl Default for FigureForm {
+    fn default() -> Self {
+        let look = FigureLook::default();
+        Self {
+            first: Some(4),
+            both_fingers: false,
+            panes: look.panes,
+            scale: 2,
+            theme: FigureTheme::Light,
+            error_m: look.error_m,
+        }
+    }
+}
+
+impl FigureForm {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.first = self.first.map(|n| n.clamp(1, MOST_PAIRS));
+        self.scale = self.scale.clamp(SCALES[0], SCALES[3]);
+        self.error_m = touch2touch_core::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
+        self.panes.sort_unstable();
+        self.panes.dedup();
+        self
+    }
+}
+
+/// The room's state.
+#[derive(Clone, Debug, Default)]
+pub struct ExportState {
+    /// True where the form is open.
+    pub asking: bool,
+    /// The contents of the form.
+    pub form: FigureForm,
+    /// True where the form of an export of masks is open.
+    pub asking_masks: bool,
+    /// The contents of the form.
+    pub masks: ExportChoice,
+    /// The import of masks that is asked about.
+    pub importing: Option<ImportForm>,
+    /// The number of imports that were asked about.
+    pub(in crate::app) imports: u64,
+    /// True where the prediction of a case that was opened is still to be made.
+    pub predict: bool,
+}
+
+/// Something to be written once the place is chosen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Output {
+    /// The figure that the form describes.
+    Figure,
+    /// One pane as a picture.
+    Picture {
+        /// The pane.
+        pane: Pane,
+        /// Pixels per pixel of an imprint; `None` for an SVG.
+        scale: Option<u8>,
+        /// Half the range of the colors of errors, meters.
+        error_m: f32,
+    },
+    /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
+    Pair(ImprintSource),
+    /// The selected pair with everything that its results depend on.
+    Case,
+    /// Masks for training, as the form says, into a folder.
+    Masks,
+}
+
+impl Output {
+    /// The request, as the title of a dialog.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Figure => "Save the figure (.png or .svg)",
+            Self::Case => "Save the case (.t2tcase)",
+            Self::Masks => "Export masks to a folder",
+            Self::Pair(_) => "Export cloud, pose and mesh to a folder",
+            Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
+            Self::Picture { scale: None, .. } => "Save the picture (.svg)",
+        }
+    }
+
+    /// The name that a file is offered under; `None` where a folder is asked for.
+    pub fn file_name(self) -> Option<String> {
+        match self {
+            Self::Figure => Some("figure.png".into()),
+            Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
+            Self::Case => Some(format!("case.{}", case_file::ENDING)),
+            Self::Pair(_) | Self::Masks => None,
+        }
+    }
+}

@@ -1,0 +1,544 @@
+//! The preferences of a person. Kept between runs; never part of undo.
+
+pub mod scene;
+pub mod versus;
+
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use super::super::action::{Action, Bindings};
+use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
+use super::super::pane::Workspace;
+use super::library::Place;
+use scene::SceneLook;
+use touch2touch_core::colormap;
+use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
+use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
+use touch2touch_core::postprocess::RefitShift;
+use touch2touch_core::units::clamp_or;
+use touch2touch_work::bundles::BundleInfo;
+use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::labels::system_person;
+pub use touch2touch_work::mask::{MaskChoice, MaskSource};
+pub use touch2touch_work::propose::ProposalSource;
+use touch2touch_work::repeats;
+use versus::Versus;
+
+/// The version of the settings file: a file of another version is set aside and defaults are used.
+pub(crate) const SETTINGS_VERSION: u32 = 1;
+/// The number of recent places that are kept.
+pub(crate) const MAX_RECENT: usize = 12;
+/// Brush radii that can be chosen, pixels.
+pub(crate) const BRUSH_RADIUS_PX: std::ops::RangeInclusive<f32> = 0.5..=40.0;
+/// Sizes of clean-ups, millimeters.
+pub(crate) const CLEAN_MM: std::ops::RangeInclusive<f32> = 0.1..=20.0;
+/// Denoising steps that can be chosen.
+pub(crate) const STEPS: std::ops::RangeInclusive<u32> = 1..=1000;
+
+/// Largest budget of kept predictions, MiB: a terabyte.
+pub(crate) const MAX_CACHE_MIB: u32 = 1 << 20;
+
+/// All preferences.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// [`SETTINGS_VERSION`] of the program that wrote it.
+    pub version: u32,
+    /// Colors of the window.
+    pub theme: Theme,
+    /// Scale of the whole window, 1 = the system's.
+    pub ui_zoom: f32,
+    /// The color range of imprints, shared by all panes.
+    pub range: ColorRange,
+    /// The color map of imprints.
+    #[serde(alias = "colour_map")]
+    pub color_map: ColorMap,
+    /// The mapping of predictions to meters.
+    pub shift: ShiftMode,
+    /// The last statistics made for a refit shift, to be chosen again.
+    pub refit: Option<RefitShift>,
+    /// The generator.
+    pub generate: GenerateSettings,
+    /// The mask tools.
+    pub mask: MaskSettings,
+    /// The registration.
+    #[serde(rename = "pose_engine")]
+    pub registration: RegistrationChoice,
+    /// The runtime that runs models.
+    pub runtime: EngineChoice,
+    /// The budget of the predictions kept on the disk, MiB; 0 keeps none.
+    pub cache_mib: u32,
+    /// Who labels; empty: whom the system says.
+    pub person: String,
+    /// The share of the pairs that the person marked done that come back unannounced, percent; 0 switches that off.
+    pub repeats_percent: f32,
+    /// True where the 3D views of prediction and measurement move together.
+    pub cameras_linked: bool,
+    /// The look of the 3D views.
+    pub scene: SceneLook,
+    /// The comparison of each workspace.
+    pub versus: std::collections::BTreeMap<Workspace, Versus>,
+    /// True where the mask is drawn over imprints.
+    pub mask_visible: bool,
+    /// True where only the outline of the mask is drawn.
+    pub mask_outline: bool,
+    /// The opacity of the mask, 0..1.
+    pub mask_opacity: f32,
+    /// True where the GelSlim's window is drawn on bubble images.
+    pub footprint_visible: bool,
+    /// True where mask, points and pose before the last change of a mask stay visible until the next.
+    pub ghosts: bool,
+    /// True where the hint of the first start was dismissed.
+    pub hint_dismissed: bool,
+    /// The places that were opened before, newest first.
+    pub recent: Vec<Place>,
+    /// The arrangement of the panes per workspace, in the window's own format (validated by it).
+    pub layouts: std::collections::BTreeMap<String, String>,
+    /// The workspace in front.
+    pub workspace: Workspace,
+    /// The keys of actions.
+    pub keys: Bindings,
+    /// Folders with further model bundles.
+    pub bundle_folders: Vec<PathBuf>,
+    /// The screen when the window was closed.
+    pub last: Last,
+}
+
+/// The screen when the window was closed: shown again when the same place is opened next.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Last {
+    /// The open data set.
+    pub place: Option<Place>,
+    /// The name of the pair.
+    pub pair: String,
+    /// The number of the active finger.
+    pub finger: usize,
+    /// True where both fingers were shown.
+    pub both_fingers: bool,
+    /// The cameras of the 3D views, in the window's own format; empty = fitted.
+    pub cameras: [String; 2],
+    /// The pane that filled the window, in the window's own format; empty = none.
+    pub maximized: String,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            version: SETTINGS_VERSION,
+            theme: Theme::Dark,
+            ui_zoom: 1.0,
+            range: ColorRange::default(),
+            color_map: ColorMap::Viridis,
+            shift: ShiftMode::default(),
+            refit: None,
+            generate: GenerateSettings::default(),
+            mask: MaskSettings::default(),
+            registration: RegistrationChoice::default(),
+            runtime: EngineChoice::default(),
+            cache_mib: 512,
+            person: String::new(),
+            repeats_percent: (100.0 * repeats::SHARE) as f32,
+            cameras_linked: true,
+            scene: SceneLook::default(),
+            versus: std::collections::BTreeMap::new(),
+            mask_visible: true,
+            mask_outline: false,
+            mask_opacity: 0.35,
+            footprint_visible: true,
+            ghosts: true,
+            hint_dismissed: false,
+            recent: Vec::new(),
+            layouts: std::collections::BTreeMap::new(),
+            workspace: Workspace::Inspect,
+            keys: Bindings::default(),
+            bundle_folders: Vec::new(),
+            last: Last::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// The comparison in the workspace in front.
+    pub fn versus_mut(&mut self) -> &mut Versus {
+        self.versus.entry(self.workspace).or_default()
+    }
+
+    /// These preferences, with what is of the person and the machine as `person` has it: a case brings none of that.
+    #[must_use]
+    pub(crate) fn of_person(self, person: &Self) -> Self {
+        Self {
+            theme: person.theme,
+            ui_zoom: person.ui_zoom,
+            recent: person.recent.clone(),
+            bundle_folders: person.bundle_folders.clone(),
+            cache_mib: person.cache_mib,
+            person: person.person.clone(),
+            repeats_percent: person.repeats_percent,
+            hint_dismissed: person.hint_dismissed,
+            keys: person.keys.clone(),
+            last: person.last.clone(),
+            ..self
+        }
+    }
+
+    /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.version = SETTINGS_VERSION;
+        self.ui_zoom = clamp_or(self.ui_zoom, 0.5, 4.0, default.ui_zoom);
+        self.mask_opacity = clamp_or(self.mask_opacity, 0.0, 1.0, default.mask_opacity);
+        if !self.range.is_valid() {
+            self.range = default.range;
+        }
+        self.generate = self.generate.validated();
+        self.mask = self.mask.validated();
+        self.scene = self.scene.validated();
+        self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
+        self.repeats_percent = clamp_or(self.repeats_percent, 0.0, 100.0, default.repeats_percent);
+        self.person = self.person.chars().filter(|c| !c.is_control()).take(80).collect();
+        self.recent.truncate(MAX_RECENT);
+        self
+    }
+
+    /// Who labels: the name in the preferences, else whom the system says; empty where nobody knows.
+    pub fn labeler(&self) -> String {
+        let named = Some(self.person.trim()).filter(|name| !name.is_empty());
+        named.map(str::to_owned).or_else(system_person).unwrap_or_default()
+    }
+
+    /// Who labels; `None` where nobody knows.
+    pub(in crate::app) fn known_labeler(&self) -> Option<String> {
+        Some(self.labeler()).filter(|name| !name.is_empty())
+    }
+
+    /// The comparison in the workspace in front.
+    pub fn compared(&self) -> Versus {
+        self.versus.get(&self.workspace).cloned().unwrap_or_default()
+    }
+
+    /// The look of figures, in the colors of the panes.
+    pub(in crate::app) fn figure_look(
+        &self,
+        panes: Vec<FigurePane>,
+        error_m: f32,
+        theme: FigureTheme,
+        scale: f64,
+    ) -> FigureLook {
+        let (range, window) = (self.range, self.footprint_visible);
+        let map = match self.color_map {
+            ColorMap::Viridis => colormap::ColorMap::Viridis,
+            ColorMap::Gray => colormap::ColorMap::Gray,
+        };
+        FigureLook {
+            panes,
+            map,
+            range: colormap::Range { lo: range.min_m, hi: range.max_m },
+            error_m,
+            theme,
+            window,
+            scale,
+        }
+    }
+}
+
+/// Colors of the window.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum Theme {
+    /// Light on dark.
+    #[default]
+    Dark,
+    /// Dark on light.
+    Light,
+}
+
+/// The range of imprint depths that the color map spans, shared by all panes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ColorRange {
+    /// Depth of the first color, meters.
+    pub min_m: f32,
+    /// Depth of the last color, meters.
+    pub max_m: f32,
+    /// True where the range stays when another sample is shown. Unlocked, each new selection sets it.
+    pub locked: bool,
+}
+
+impl Default for ColorRange {
+    /// 0..18 mm: a 10 mm press tents up to that depth.
+    fn default() -> Self {
+        Self { min_m: 0.0, max_m: 0.018, locked: true }
+    }
+}
+
+impl ColorRange {
+    /// True where colors can be looked up with it.
+    pub(crate) fn is_valid(self) -> bool {
+        self.min_m.is_finite() && self.max_m.is_finite() && self.min_m < self.max_m
+    }
+}
+
+/// Color maps for depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum ColorMap {
+    /// Perceptually uniform, dark blue to yellow, readable by color-blind eyes.
+    #[default]
+    Viridis,
+    /// Gray.
+    Gray,
+}
+
+impl ColorMap {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Viridis => "Viridis",
+            Self::Gray => "Gray",
+        }
+    }
+}
+
+/// The generator's settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct GenerateSettings {
+    /// The bundle's name; `None` takes the first generator found.
+    pub bundle: Option<String>,
+    /// The choice of the steps; `None` takes the numbers below.
+    pub preset: Option<Preset>,
+    /// Denoising steps.
+    pub steps: u32,
+    /// Seed of the noise.
+    pub seed: u64,
+    /// True where generating again keeps the seed.
+    pub seed_locked: bool,
+    /// The sampler.
+    pub sampler: Sampler,
+    /// DDIM's noise share, 0..1.
+    pub eta: f64,
+    /// The training steps visited.
+    pub spacing: Spacing,
+    /// Scale of the guidance, for bundles trained for it; 1 is none.
+    pub guidance: f64,
+    /// A picture on the way after so many steps, and after the first; 0 = none.
+    pub preview_every: u32,
+    /// True where both fingers are generated (the pose needs both); else only the one selected.
+    pub both_fingers: bool,
+    /// True where the pair on screen is predicted without being asked, where that costs little.
+    pub by_itself: bool,
+}
+
+impl Default for GenerateSettings {
+    fn default() -> Self {
+        Self {
+            bundle: None,
+            // What the bundle recommends; the numbers below are where somebody who chooses himself starts.
+            preset: Some(Preset::Default),
+            steps: 10,
+            seed: 42,
+            seed_locked: true,
+            sampler: Sampler::Ddim,
+            eta: 0.0,
+            spacing: Spacing::Trailing,
+            guidance: 1.0,
+            preview_every: 4,
+            both_fingers: true,
+            by_itself: true,
+        }
+    }
+}
+
+impl GenerateSettings {
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        self.steps = self.steps.clamp(*STEPS.start(), *STEPS.end());
+        self.eta = clamp_or(self.eta, 0.0, 1.0, 0.0);
+        self.guidance = clamp_or(self.guidance, *GUIDANCE.start(), *GUIDANCE.end(), 1.0);
+        self.preview_every = self.preview_every.min(*STEPS.end());
+        self
+    }
+
+    /// The choices of one generation with a bundle.
+    pub fn config(&self, bundle: &BundleInfo) -> GenerateConfig {
+        let own = GenerateConfig {
+            steps: self.steps,
+            eta: self.eta,
+            seed: self.seed,
+            sampler: self.sampler,
+            spacing: self.spacing,
+            guidance: self.guidance,
+        };
+        match (self.preset, &bundle.generator) {
+            (Some(preset), Some(g)) => {
+                GenerateConfig { seed: self.seed, ..preset.config(g.defaults, g.training_steps) }
+            }
+            // Without the training for it a scale means nothing, whatever was chosen for another bundle.
+            (None, Some(g)) if !g.guided => GenerateConfig { guidance: 1.0, ..own },
+            _ => own,
+        }
+    }
+
+    /// The choices with the numbers that `preset` or the bundle stand for, so that they can be changed one by one.
+    #[must_use]
+    pub fn spelt_out(&self, bundle: Option<&BundleInfo>) -> Self {
+        let Some(config) = bundle.map(|bundle| self.config(bundle)) else { return self.clone() };
+        Self {
+            steps: config.steps,
+            eta: config.eta,
+            sampler: config.sampler,
+            spacing: config.spacing,
+            guidance: config.guidance,
+            ..self.clone()
+        }
+    }
+
+    /// True where the numbers that a preset stands for are the same.
+    pub(crate) fn same_numbers(&self, other: &Self) -> bool {
+        let numbers = |s: &Self| (s.steps, s.sampler, s.spacing, s.eta.to_bits(), s.guidance.to_bits());
+        numbers(self) == numbers(other)
+    }
+}
+
+/// The mask tools' settings.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct MaskSettings {
+    /// The tool in hand.
+    pub tool: MaskTool,
+    /// The tool before it.
+    pub last_tool: MaskTool,
+    /// The paint of the tools; the eraser frees pixels.
+    pub paint: Paint,
+    /// Radius of brush and eraser, image pixels.
+    pub radius_px: f32,
+    /// By how much the depth may differ that the wand takes, meters.
+    pub wand_m: f32,
+    /// The points that a drawing in 3D reaches.
+    pub layers: Layers,
+    /// Size of the clean-ups that have one, millimeters.
+    pub clean_mm: f32,
+    /// The gate that says where a hand may change a mask.
+    pub gate: Gate,
+    /// The source of proposals.
+    pub proposal: ProposalSource,
+    /// True where accepting a proposal replaces what was painted by hand as well.
+    pub over_drawn: bool,
+    /// The choice of the masks that nobody drew.
+    #[serde(flatten)]
+    pub choice: MaskChoice,
+    /// The mask bundle's name; `None` takes the first found.
+    pub bundle: Option<String>,
+}
+
+impl Default for MaskSettings {
+    fn default() -> Self {
+        Self {
+            tool: MaskTool::Brush,
+            last_tool: MaskTool::Eraser,
+            paint: Paint::Contact,
+            radius_px: 4.0,
+            wand_m: 0.0005,
+            layers: Layers::default(),
+            clean_mm: 1.0,
+            gate: Gate::default(),
+            proposal: ProposalSource::default(),
+            over_drawn: false,
+            choice: MaskChoice::default(),
+            bundle: None,
+        }
+    }
+}
+
+impl MaskSettings {
+    /// The drawing tool in hand and what it makes of the pixels; `None` where it draws nothing.
+    pub fn drawing(&self) -> Option<(DrawTool, Paint)> {
+        let paint = if self.tool == MaskTool::Eraser { Paint::Free } else { self.paint };
+        Some((self.tool.row(self).draws?, paint))
+    }
+
+    /// A clean-up of a kind with the size that is set.
+    pub fn clean_up(&self, kind: CleanKind) -> CleanUp {
+        CleanUp { kind, size_mm: self.clean_mm.into() }
+    }
+
+    /// Numbers brought into range.
+    #[must_use]
+    pub fn validated(mut self) -> Self {
+        let default = Self::default();
+        self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
+        self.wand_m = clamp_or(self.wand_m, 1e-5, 0.05, default.wand_m);
+        self.clean_mm = clamp_or(self.clean_mm, *CLEAN_MM.start(), *CLEAN_MM.end(), default.clean_mm);
+        self.gate.depth_m = self.gate.depth_m.map(|[lo, hi]| {
+            let [lo, hi] = [lo, hi].map(|m| clamp_or(m, -0.1, 0.1, 0.0));
+            [lo.min(hi), lo.max(hi)]
+        });
+        self.gate.cad_m = self.gate.cad_m.map(|m| clamp_or(m, 0.0, 0.05, default.choice.cad_distance_m));
+        let (choice, default) = (&mut self.choice, default.choice);
+        choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
+        choice.probability = choice.probability.filter(|p| (0.0..=1.0).contains(p));
+        choice.top_percent = clamp_or(choice.top_percent, 0.0, 100.0, default.top_percent);
+        choice.cad_distance_m = clamp_or(choice.cad_distance_m, 0.0, 0.05, default.cad_distance_m);
+        self
+    }
+}
+
+/// A tool: what the pointer does on a mask.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum MaskTool {
+    /// Adds.
+    #[default]
+    Brush,
+    /// Removes.
+    Eraser,
+    /// Adds what a drawn line encloses.
+    Lasso,
+    /// Adds what lines between clicks enclose.
+    Polygon,
+    /// Adds a rectangle.
+    Rectangle,
+    /// Adds what is connected and about as deep.
+    Wand,
+    /// Moves the image.
+    Pan,
+}
+
+/// A row of the table of tools.
+pub struct ToolRow {
+    /// The name on screen.
+    pub name: &'static str,
+    /// The action that takes the tool in hand.
+    pub action: Action,
+    /// The tool that it draws with; `None` = none.
+    pub draws: Option<DrawTool>,
+    /// The words for its use; empty for a tool with a number, which stands in their place.
+    pub hint: &'static str,
+}
+
+impl MaskTool {
+    /// The table: a tool with its numbers.
+    pub fn row(self, mask: &MaskSettings) -> ToolRow {
+        let row = |name, action, draws, hint| ToolRow { name, action, draws, hint };
+        let brush = Some(DrawTool::Brush { radius_px: mask.radius_px });
+        let wand = Some(DrawTool::Wand { tolerance_m: mask.wand_m });
+        let corner = "Corner by corner; the first closes it";
+        match self {
+            Self::Brush => row("Brush", Action::Brush, brush, ""),
+            Self::Eraser => row("Eraser", Action::Eraser, brush, ""),
+            Self::Lasso => row("Lasso", Action::Lasso, Some(DrawTool::Lasso), "Around it in one line"),
+            Self::Polygon => row("Polygon", Action::Polygon, Some(DrawTool::Polygon), corner),
+            Self::Rectangle => {
+                row("Rectangle", Action::RectangleTool, Some(DrawTool::Rectangle), "From corner to corner")
+            }
+            Self::Wand => row("Wand", Action::Wand, wand, ""),
+            Self::Pan => row("Pan", Action::PanTool, None, "Moves the picture, draws nothing"),
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! The two sides of a comparison, and how they are shown.
+
+use serde::{Deserialize, Serialize};
+use strum::EnumIter;
+
+use touch2touch_work::subject::Subject;
+
+/// The way in which two imprints are held against each other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum VersusMode {
+    /// A at the left, B at the right.
+    #[default]
+    Side,
+    /// A at the left of a line that is dragged, B at the right of it.
+    Wipe,
+    /// A minus B.
+    Difference,
+    /// Both clouds in 3D.
+    Clouds,
+    /// The cloud of A in 3D, colored by how far it lies from that of B.
+    Apart,
+}
+
+impl VersusMode {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Side => "Side",
+            Self::Wipe => "Wipe",
+            Self::Difference => "A - B",
+            Self::Clouds => "3D",
+            Self::Apart => "3D A - B",
+        }
+    }
+
+    /// The tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Side => "A at the left, B at the right",
+            Self::Wipe => "A at the left of a line that can be dragged, B at the right of it",
+            Self::Difference => "A minus B in millimeters: blue where A is shallower, red where it is deeper",
+            Self::Clouds => "The contact points of both in 3D, with the model at the pose of each",
+            Self::Apart => "The points of A in 3D, colored by their distance to the surface of B in millimeters",
+        }
+    }
+
+    /// True where it is a 3D view.
+    pub fn is_3d(self) -> bool {
+        matches!(self, Self::Clouds | Self::Apart)
+    }
+}
+
+/// Two imprints that are compared, and how.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Versus {
+    /// One.
+    pub a: Subject,
+    /// The other.
+    pub b: Subject,
+    /// The way.
+    pub mode: VersusMode,
+}
+
+impl Default for Versus {
+    fn default() -> Self {
+        Self { a: Subject::shown(), b: Subject::Measured, mode: VersusMode::default() }
+    }
+}
+
+impl Versus {
+    /// A in place of B and the other way round.
+    #[must_use]
+    pub fn swapped(self) -> Self {
+        Self { a: self.b, b: self.a, mode: self.mode }
+    }
+}

@@ -1,0 +1,237 @@
+//! The workbench: what the 3D panes show besides cloud and model, and what a hand does in them.
+//!
+//! Everything here lasts as long as the window. What a person decides with it (an accepted pose) is the document's.
+
+use glam::DVec3;
+use strum::EnumIter;
+
+use super::super::keys::{ImprintSource, PairKey, RunKey};
+use touch2touch_core::manual::{ManualCost, ManualPose};
+use touch2touch_core::rig::{PadId, Rig};
+
+/// The coloring of the contact points in 3D.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum Layer {
+    /// One color.
+    #[default]
+    None,
+    /// The distance of each from the model.
+    Residuals,
+    /// The fate of each in the registration.
+    Reasons,
+    /// The signed distance of each from the model, negative inside, and the same on the model's surface.
+    Distance,
+    /// Lines to the model.
+    Correspondences,
+}
+
+impl Layer {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "None",
+            Self::Residuals => "Residuals",
+            Self::Reasons => "Reasons",
+            Self::Distance => "Distance",
+            Self::Correspondences => "Lines",
+        }
+    }
+
+    /// The tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::None => "Contact points in one color",
+            Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
+            Self::Reasons => "Contact points colored by what became of them in the registration",
+            Self::Distance => {
+                "Contact points and the model's surface colored by their signed distance, in millimeters: blue inside, red outside"
+            }
+            Self::Correspondences => "Lines from contact points to the model",
+        }
+    }
+}
+
+/// The effect of a click in a 3D pane.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum SceneTool {
+    /// Reads a point.
+    #[default]
+    Look,
+    /// Moves the tool.
+    Pose,
+    /// Measures between two points.
+    Distance,
+    /// Measures at the second of three points.
+    Angle,
+    /// Draws on the masks of the points, with the mask tool in hand.
+    Paint,
+}
+
+impl SceneTool {
+    /// Points that make a measurement.
+    pub fn marks(self) -> usize {
+        match self {
+            Self::Look | Self::Pose | Self::Paint => 0,
+            Self::Distance => 2,
+            Self::Angle => 3,
+        }
+    }
+}
+
+/// The axis that a cutting plane stands on, grasp frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
+pub enum SectionAxis {
+    /// x: the closing axis, from finger to finger.
+    #[default]
+    Closing,
+    /// y: across.
+    Lateral,
+    /// z: along the tool.
+    Tool,
+}
+
+impl SectionAxis {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Closing => "x, finger to finger",
+            Self::Lateral => "y, across",
+            Self::Tool => "z, along the tool",
+        }
+    }
+
+    /// The unit vector, grasp frame.
+    pub fn unit(self) -> DVec3 {
+        match self {
+            Self::Closing => DVec3::X,
+            Self::Lateral => DVec3::Y,
+            Self::Tool => DVec3::Z,
+        }
+    }
+}
+
+/// A plane that cuts the 3D views open: what lies beyond it along its axis is not drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Section {
+    /// The axis it stands on.
+    pub axis: SectionAxis,
+    /// The position on the axis, meters.
+    pub at_m: f64,
+    /// True where what lies before it is left out instead.
+    pub flipped: bool,
+}
+
+/// The farthest that a plane can stand from the middle of the grasp, meters.
+pub(crate) const SECTION_REACH_M: f64 = 0.06;
+
+/// A point that was clicked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Picked {
+    /// Of which imprint.
+    pub source: ImprintSource,
+    /// Of which finger.
+    pub finger: PadId,
+    /// The raw bubble pixel.
+    pub pixel: [u16; 2],
+}
+
+/// A pose being set by hand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ManualTry {
+    /// The pair.
+    pub pair: PairKey,
+    /// The imprint it is set for.
+    pub source: ImprintSource,
+    /// The pose, `grasp_from_object`.
+    pub pose: ManualPose,
+    /// The pose where it began.
+    pub began: ManualPose,
+    /// The cost; `None` while cloud or model are not there.
+    pub cost: Option<ManualCost>,
+    /// The cost where it began.
+    pub began_cost: Option<ManualCost>,
+    /// The registration from here that is being computed.
+    pub icp: Option<RunKey>,
+    /// The registration that put it where it is, if one did and nothing moved it since.
+    pub from_icp: Option<RunKey>,
+}
+
+/// The workbench: what the 3D panes do and show besides.
+#[derive(Clone, Debug)]
+pub struct Workbench {
+    /// The coloring of the contact points.
+    pub layer: Layer,
+    /// True where the tool is moved along its weakest direction.
+    pub animate_weakest: bool,
+    /// True where each 3D pane shows the clouds of both imprints.
+    pub both_clouds: bool,
+    /// The plane that cuts the 3D views open.
+    pub section: Option<Section>,
+    /// The effect of a click.
+    pub tool: SceneTool,
+    /// True where the tool can leave the plane.
+    pub six_dof: bool,
+    /// The side that the pointer was over last: what the panes beside the 3D views are about.
+    pub side: ImprintSource,
+    /// The pose being set.
+    pub hand: Option<ManualTry>,
+    /// The point clicked last.
+    pub picked: Option<Picked>,
+    /// Points of the measurement, meters, grasp frame, and the side they were clicked in.
+    pub marks: Vec<(ImprintSource, DVec3)>,
+}
+
+impl Default for Workbench {
+    fn default() -> Self {
+        Self {
+            layer: Layer::None,
+            animate_weakest: false,
+            both_clouds: false,
+            section: None,
+            tool: SceneTool::Look,
+            six_dof: false,
+            side: ImprintSource::Measured,
+            hand: None,
+            picked: None,
+            marks: Vec::new(),
+        }
+    }
+}
+
+impl Workbench {
+    /// Forgets what was of the pair: another one is shown.
+    pub(in crate::app) fn leave_pair(&mut self) {
+        self.hand = None;
+        self.picked = None;
+        self.marks.clear();
+    }
+
+    /// The pose being set for one imprint.
+    pub fn hand(&self, source: ImprintSource) -> Option<&ManualTry> {
+        self.hand.as_ref().filter(|hand| hand.source == source)
+    }
+}
+
+/// A finger's row, or the joint one, of the table of poses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PoseOf {
+    /// From one finger alone.
+    Finger(PadId),
+    /// From all together.
+    Joint,
+}
+
+impl PoseOf {
+    /// The name on screen.
+    pub fn name(self, rig: &Rig) -> String {
+        match self {
+            Self::Finger(finger) => format!("{} finger", rig.pad_name(finger)),
+            Self::Joint => "Joint".into(),
+        }
+    }
+
+    /// All rows of a rig's table.
+    pub fn all(rig: &Rig) -> Vec<Self> {
+        rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
+    }
+}

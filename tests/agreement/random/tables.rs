@@ -1,0 +1,149 @@
+//! What is said of a whole data set: statistics of its predictions, dials, and the order of its masks.
+
+use std::collections::BTreeSet;
+
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{DialCommand, EvaluateCommand};
+use touch2touch::app::dial::DialPairs;
+use touch2touch::app::{recipe, results};
+use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_work::queue::QueueBy;
+use touch2touch_work::recipe::Stage;
+use touch2touch_work::sweep::Dial;
+
+use super::*;
+
+/// A value without what no two runs share.
+fn without(mut value: Value, keys: &[&str]) -> Value {
+    let map = value.as_object_mut().unwrap();
+    keys.iter().for_each(|key| drop(map.remove(*key)));
+    value
+}
+
+/// The only file below a folder.
+fn only_file(folder: &Path) -> Value {
+    let files: Vec<_> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let [file] = &files[..] else { panic!("{files:?}") };
+    serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap()
+}
+
+#[test]
+pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same() {
+    let home = tempfile::tempdir().unwrap();
+    let mut draws = Draws::new(7);
+    let (mut counts, mut shifted) = (Vec::new(), Vec::new());
+    // The demo has 96 pairs, which take minutes.
+    for mut both in Both::places(home.path()).skip(1) {
+        both.show(&[Pane::Predicted, Pane::Error, Pane::Metrics]);
+        let recipe = draws.posed();
+        put(&mut both.studio, &recipe);
+        let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Prediction).list();
+        both.studio.send(PredictCommand::Refit.into());
+        assert!(matches!(both.studio.state.settings.shift, ShiftMode::Refit(_)), "{:?}", both.studio.state.log.entries);
+        let shown = only_file(&both.home.parent().unwrap().join("studio/statistics"));
+        let begin = ["stats", &both.path, "--out", &both.at("statistics.json")].map(str::to_owned);
+        let said = both.run(&begin.into_iter().chain(words).collect::<Vec<_>>()).unwrap();
+        let file: Value = serde_json::from_slice(&std::fs::read(both.at("statistics.json")).unwrap()).unwrap();
+        // Apart from the time of day.
+        let shown = without(shown, &["made"]);
+        counts.push(same(&shown, &without(file, &["made"]), &format!("{recipe:?}")));
+        same(&shown, &without(said, &["made", "file", "failed", "gain", "offset_m"]), "what the verb says");
+        // Predictions by it are the same, too.
+        both.predict(&Recipe { shift: both.studio.state.settings.shift, ..recipe.clone() }, 1);
+        let said = both.said(Pane::Generate).unwrap();
+        let mut count = 0;
+        for finger in both.studio.state.rig().pads() {
+            let Some(found) = results::comparison(&both.studio.state, finger).ready() else { continue };
+            let name = both.studio.state.finger_name(finger);
+            let row = said["pairs"].as_array().unwrap().iter().find(|row| row["finger"] == *name).unwrap();
+            count += same(&written(&found.psnr_db), &row["psnr_db"], &format!("{name}, {recipe:?}"));
+            count += same(&written(&found.ssim), &row["ssim"], &format!("{name}, {recipe:?}"));
+        }
+        shifted.push(count);
+    }
+    compared(&counts, 14);
+    compared(&shifted, 2);
+}
+
+#[test]
+pub(in crate::agreement) fn a_random_dial_over_a_random_recipe_is_the_same_in_the_pane_and_by_the_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let mut draws = Draws::new(8);
+    let (mut counts, mut dials) = (Vec::new(), BTreeSet::new());
+    for mut both in Both::places(home.path()).take(2) {
+        let mut count = 0;
+        both.show(&[Pane::Dial]);
+        both.studio.send(DialCommand::Over(DialPairs::Spread(2)).into());
+        for dial in Dial::iter() {
+            put(&mut both.studio, &draws.posed());
+            both.studio.send(DialCommand::Choose(dial).into());
+            let ends = match dial {
+                Dial::Threshold => [draws.one(3.0..5.0), draws.one(5.0..8.0)],
+                Dial::Probability | Dial::Trim => [draws.one(0.1..0.3), draws.one(0.3..0.8)],
+                Dial::Gate => [draws.one(0.5..1.0), draws.one(1.0..3.0)],
+                Dial::Shift => [0.0; 2],
+            };
+            both.studio.send(DialCommand::Range(ends, 2).into());
+            both.studio.send(DialCommand::Predictions(draws.of(&[true, true, false]) || dial == Dial::Shift).into());
+            both.studio.state.dial.result = None;
+            let said = both.said(Pane::Dial);
+            both.studio.send(DialCommand::Start.into());
+            let what =
+                format!("{dial:?} {ends:?}, {:?}", recipe::in_force(&both.studio.state, ImprintSource::Predicted));
+            match (&both.studio.state.dial.result, said) {
+                (Some(shown), Ok(said)) => {
+                    let shown = without(written(&**shown), &["seconds"]);
+                    count += same(&shown, &without(said, &["seconds"]), &what);
+                    dials.insert(format!("{dial:?}"));
+                }
+                // Such as a gate of a registration that has none.
+                (None, Err(_)) => {}
+                (shown, said) => panic!("{what}: {shown:?} is shown, {said:?} is said"),
+            }
+        }
+        counts.push(count);
+    }
+    compared(&counts, 100);
+    assert!(dials.len() >= 4, "{dials:?}");
+}
+
+#[test]
+pub(in crate::agreement) fn a_random_recipe_orders_the_masks_the_same_in_the_list_and_by_the_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let mut draws = Draws::new(9);
+    let mut counts = Vec::new();
+    let mut both = Both::open(Place::Path(lab_folder(home.path())), home.path());
+    both.show(&[Pane::Browser]);
+    for _ in 0..2 {
+        put(&mut both.studio, &draws.posed());
+        both.studio.send(EvaluateCommand::Rank.into());
+        let mut count = 0;
+        for by in QueueBy::iter() {
+            both.studio.send(LibraryCommand::SetUncertainBy(by).into());
+            let begin = ["masks", "queue", &both.path, "--by", by.key()].map(str::to_owned);
+            let words =
+                recipe::in_force(&both.studio.state, ImprintSource::Measured).until(Stage::Pose).words(Stage::Pose);
+            let said = both.run(&begin.into_iter().chain(words.list()).collect::<Vec<_>>()).unwrap();
+            let state = &both.studio.state;
+            let lines: Vec<_> = state
+                .library
+                .order
+                .iter()
+                .map(|id| {
+                    let queued = state.table.scores.queue.get(*id).expect("it is ranked");
+                    let why = queued.reason(by).map_or_else(String::new, |part| part.text());
+                    serde_json::json!([state.library.entry(*id).unwrap().name, queued.overall, why])
+                })
+                .collect();
+            let verb: Vec<_> = said["pairs"]
+                .as_array()
+                .unwrap()
+                .iter()
+                .map(|line| serde_json::json!([line["pair"], line["overall"], line["why"]]))
+                .collect();
+            count += same(&written(&lines), &verb.into(), &format!("{by:?}"));
+        }
+        counts.push(count);
+    }
+    compared(&counts, 3);
+}
