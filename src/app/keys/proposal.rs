@@ -45,7 +45,7 @@ impl Key for DistancesKey {
 /// The distances, and where the model was.
 #[derive(Clone, Debug)]
 pub struct Distances {
-    /// Meters, negative inside; see [`propose::cad_distances`].
+    /// Meters, negative inside; see [`touch2touch_work::propose::cad_distances`].
     pub grid: Grid<f64>,
     /// The pose of the model.
     pub at: CadPose,
