@@ -20,12 +20,14 @@ pub mod correspond;
 mod directions;
 pub mod icp;
 mod influence;
+pub mod joint;
 pub mod lab_icp;
+mod lanes;
 mod observability;
 mod planar;
 pub mod reason;
 pub mod refine;
-mod register;
+pub(crate) mod register;
 mod search;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -45,7 +47,8 @@ pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
 pub(crate) use refine::RefineConfig;
-pub use register::{Ask, Register, Scene};
+pub use joint::{JointConfig, JointFit};
+pub use register::{Ask, Contacts, PadImage, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///
@@ -380,6 +383,8 @@ pub struct AlignReport {
     pub within_prior: bool,
     /// How well the points determine the pose; `None` if the engine had no field to tell from.
     pub observability: Option<Observability>,
+    /// How the membrane was used, from the registration that uses it.
+    pub joint: Option<JointFit>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,
     /// Per-iteration states of all runs; empty unless recorded.

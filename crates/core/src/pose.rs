@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{AlignError, AlignReport, Ask, Directions, Register, Scene, icp};
+use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Register, Scene, icp};
 use super::frames::PlanarPose;
 
 mod choice;
@@ -109,18 +109,18 @@ impl Registration {
     }
 }
 
-/// Contact points (grasp frame, meters) to the tool's pose: what every caller ends in. `record` keeps per-iteration
+/// Contact points (grasp frame, meters), with the images of the membranes where they are known, to the tool's pose: what every caller ends in. `record` keeps per-iteration
 /// states, per-point residuals and the distances both ways.
 ///
 /// # Errors
 /// [`AlignError`] for too few points or none near the tool.
-pub fn register(
-    points: &[DVec3],
+pub fn register<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     engine: impl Into<RegistrationChoice>,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), points, tool, Ask { record, ..Ask::default() })
+    register_with(&*engine.into().method(), contacts, tool, Ask { record, ..Ask::default() })
 }
 
 /// The same from one start, `grasp_from_object`, instead of the engine's own.
@@ -141,13 +141,13 @@ pub(crate) fn register_from(
 ///
 /// # Errors
 /// As [`register`], and for settings that make no sense.
-pub fn register_with(
+pub fn register_with<'a>(
     registration: &dyn Register,
-    points: &[DVec3],
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     ask: Ask<'_>,
 ) -> Result<AlignReport, AlignError> {
-    let scene = Scene::new(points);
+    let scene = Scene::new(contacts);
     let mut report = registration.run(&scene, tool, ask)?;
     if ask.record {
         report.directions = Directions::at(scene.yz(), &icp::silhouette(tool), report.grasp_from_object);

@@ -7,7 +7,7 @@
 
 use glam::DVec2;
 
-use super::relax::{Field, Problem};
+use crate::relax::{Field, Problem};
 use super::{GelSlimConfig, rig};
 use crate::catalog::ToolSpec;
 use crate::frames::PlanarPose;

@@ -10,7 +10,7 @@
 
 use glam::DVec2;
 
-use super::relax::{Field, Problem};
+use crate::relax::{Field, Problem};
 use super::{BubbleConfig, MEMBRANE_STEP_M};
 use crate::catalog::ToolSpec;
 use crate::frames::PlanarPose;
