@@ -20,14 +20,14 @@ pub mod correspond;
 mod directions;
 pub mod icp;
 mod influence;
-pub mod joint;
+mod joint;
 pub mod lab_icp;
 mod lanes;
 mod observability;
 mod planar;
 pub mod reason;
 pub mod refine;
-pub(crate) mod register;
+mod register;
 mod search;
 #[cfg(test)]
 pub(crate) mod testing;
@@ -42,12 +42,12 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
+pub use joint::{Basis, JointConfig, JointFit, MaskWeight};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
 pub(crate) use refine::RefineConfig;
-pub use joint::{JointConfig, JointFit};
 pub use register::{Ask, Contacts, PadImage, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.

@@ -4,10 +4,10 @@ use glam::DVec2;
 
 use super::template::BandField;
 use crate::align::ANGLE_SCALE_M;
+use crate::align::TraceStep;
 use crate::align::batch::{Cloud, State, Sums};
 use crate::align::lanes::{LANES, Lattice};
 use crate::align::search::{Cost, Progress};
-use crate::align::TraceStep;
 use crate::field::DistanceField;
 use crate::tent::STEP_M;
 

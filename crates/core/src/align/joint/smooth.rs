@@ -3,18 +3,18 @@
 use crate::relax::Field;
 
 /// Deviations, meters.
-pub(super) const SIGMAS_M: [f64; 7] = [0.5e-3, 0.7e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 8e-3];
+const SIGMAS_M: [f64; 6] = [0.7e-3, 1e-3, 1.5e-3, 2e-3, 3e-3, 8e-3];
 /// Nodes of the fine grid from one node to the next of the grid that a width is kept on.
-const STRIDES: [usize; 7] = [1, 1, 1, 1, 2, 2, 4];
+const STRIDES: [usize; 6] = [1, 1, 1, 2, 2, 4];
 
 /// A band of lengths: positions in [`SIGMAS_M`] of the narrower and the wider Gaussian, whose difference it is.
 pub(super) type Band = [usize; 2];
-/// Bands, coarse to fine.
-pub(super) const BANDS: [Band; 4] = [[3, 6], [2, 5], [1, 4], [0, 3]];
+/// Bands, coarse to fine. A finer one is pixel noise on real cameras.
+pub(super) const BANDS: [Band; 3] = [[2, 5], [1, 4], [0, 3]];
 
 /// An image under Gaussians of all widths. Outside it is zero.
 pub(super) struct Smooth {
-    fields: [Field; 7],
+    fields: [Field; SIGMAS_M.len()],
 }
 
 impl Smooth {
@@ -22,20 +22,19 @@ impl Smooth {
     pub(super) fn new(image: &Field, step_m: f64) -> Self {
         let mut before = 0.0;
         let mut stride = 1;
-        let mut last: Option<Field> = None;
-        let fields = std::array::from_fn(|i| {
+        let mut fields: [Field; SIGMAS_M.len()] = std::array::from_fn(|_| Field::filled(0, 0, 0.0));
+        for i in 0..SIGMAS_M.len() {
             // Gaussians add up by their squares: each is made of the one before.
             let sigma = (SIGMAS_M[i].powi(2) - before).sqrt();
             before = SIGMAS_M[i].powi(2);
-            if STRIDES[i] != stride {
+            let from = if i == 0 { image } else { &fields[i - 1] };
+            fields[i] = if STRIDES[i] == stride {
+                blurred(from, sigma / (step_m * stride as f64))
+            } else {
                 stride *= 2;
-                last = last.take().map(|field| field.thinned());
-            }
-            let from = last.as_ref().unwrap_or(image);
-            let field = blurred(from, sigma / (step_m * stride as f64));
-            last = Some(field.clone());
-            field
-        });
+                blurred(&from.thinned(), sigma / (step_m * stride as f64))
+            };
+        }
         Self { fields }
     }
 

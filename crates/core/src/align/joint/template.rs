@@ -14,8 +14,8 @@ use crate::tool::ToolModel;
 const CURVATURE: std::ops::RangeInclusive<f64> = 8.0..=400.0;
 /// Templates are made for so many curvatures between one and twice it.
 const STEPS: f64 = 4.0;
-/// By how much the skirt beside a tool bends more than the free membrane: the air that the tool displaces.
-const MORE: f64 = 1.15;
+/// Templates are made for floors so far apart, meters.
+const FLOOR_M: f64 = 0.5e-3;
 
 /// A band of a membrane's height over the y-z plane of the object frame, meters.
 pub(super) struct BandField {
@@ -29,20 +29,23 @@ pub(super) type Template = [BandField; BANDS.len()];
 
 /// The templates of a tool, by step of curvature and side. `None` where the tool has nothing on that side.
 #[derive(Default)]
-struct Templates(Mutex<BTreeMap<(i32, bool), Option<Arc<Template>>>>);
+struct Templates(Mutex<BTreeMap<(i32, i32, bool), Option<Arc<Template>>>>);
 
 /// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane whose free
 /// height has the Laplacian `curvature` (1/m). Made at the first request and kept with the tool.
-pub(super) fn template(tool: &ToolModel, side: f64, curvature: f64) -> Option<Arc<Template>> {
+pub(super) fn template(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Arc<Template>> {
     let step = (STEPS * curvature.clamp(*CURVATURE.start(), *CURVATURE.end()).log2()).round();
-    let key = (step as i32, side > 0.0);
+    let floor = (floor_m.clamp(0.0, 0.05) / FLOOR_M).round();
+    let key = (step as i32, floor as i32, side > 0.0);
     let kept = tool.derived(|_| Templates::default());
     let mut kept = kept.0.lock().unwrap_or_else(PoisonError::into_inner);
-    kept.entry(key).or_insert_with(|| made(tool, side, MORE * (step / STEPS).exp2()).map(Arc::new)).clone()
+    kept.entry(key).or_insert_with(|| made(tool, side, (step / STEPS).exp2(), floor * FLOOR_M).map(Arc::new)).clone()
 }
 
-fn made(tool: &ToolModel, side: f64, curvature: f64) -> Option<Template> {
-    let sheet = tent(&heights(&tool.mesh, side)?, curvature);
+fn made(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Template> {
+    let mut heights = heights(&tool.mesh, side)?;
+    heights.field.values.iter_mut().for_each(|height| *height = (*height - floor_m as f32).max(0.0));
+    let sheet = tent(&heights, curvature);
     let smooth = Smooth::new(&sheet.field, STEP_M);
     let (columns, rows) = (sheet.field.columns, sheet.field.rows);
     Some(BANDS.map(|[narrow, wide]| {
