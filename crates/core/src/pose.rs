@@ -37,6 +37,8 @@ pub enum Registration {
     DistanceField,
     /// The same with a proof by branch and bound.
     Certified,
+    /// The membranes' images against the tent over the tool, and the mask.
+    Joint,
     /// The lab's planar point-to-point loop.
     LabIcp,
     /// Point to point on the silhouette.
@@ -66,6 +68,7 @@ impl Registration {
         match self {
             Self::DistanceField => "ICP (distance field)",
             Self::Certified => "ICP (distance field), certified",
+            Self::Joint => "Joint (membrane and mask)",
             Self::LabIcp => "ICP (paper)",
             Self::PlanarPointToPoint => "ICP point-point, planar",
             Self::PlanarPointToPlane => "ICP point-plane, planar",
@@ -83,6 +86,9 @@ impl Registration {
             Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
             Self::Certified => {
                 "The default's answer with a proof: branch and bound, no pose of the prior is 2 % better"
+            }
+            Self::Joint => {
+                "The whole membrane against the sheet that the tool would lift, with the mask as a weaker term: for bad masks"
             }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
             Self::PlanarPointToPoint => {

@@ -78,7 +78,7 @@ impl Default for JointConfig {
             weight: MaskWeight { scouts: 0.1, answer: 0.02, noise_m: 0.075e-3, range: [0.02, 0.3], agrees: 0.1 },
             max_iterations: 20,
             close: 0.15,
-            explained: 0.15,
+            explained: 0.05,
             record: false,
         }
     }
