@@ -34,7 +34,7 @@ pub fn basin_map(
 
 /// Whether the registration compares with the silhouette's field rather than with model points.
 pub(crate) fn uses_field(engine: Registration) -> bool {
-    matches!(engine, Registration::DistanceField | Registration::Certified)
+    matches!(engine, Registration::DistanceField | Registration::Certified | Registration::Joint)
 }
 
 /// What contact points are compared with at any step of a run, prepared once per tool.

@@ -130,3 +130,72 @@ fn bending(sheet: &Field, load: f32) -> Field {
     }
     more
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::testing::{cross, cuboid};
+
+    /// The same equation by plain sweeps, until nothing moves.
+    fn slow(heights: &Sheet, curvature: f64) -> Field {
+        let mut field = Field::filled(heights.field.columns, heights.field.rows, 0.0);
+        let free = vec![true; field.values.len()];
+        for _ in 0..8 {
+            let more = bending(&field, -curvature as f32);
+            let problem = Problem {
+                obstacle: &heights.field,
+                free: &free,
+                load: -curvature as f32,
+                more: Some(&more),
+                stiffness: 0.0,
+                step: STEP_M as f32,
+            };
+            problem.relax(&mut field, 600);
+        }
+        field
+    }
+
+    #[test]
+    fn few_sweeps_are_enough() {
+        let heights = heights(&cross(), -1.0).unwrap();
+        for curvature in [20.0, 60.0] {
+            let (fast, slow) = (tent(&heights, curvature).field, slow(&heights, curvature));
+            let error = |(a, b): (&f32, &f32)| (a - b).abs();
+            let worst = fast.values.iter().zip(&slow.values).map(error).fold(0.0, f32::max);
+            assert!(worst < 1.5e-4, "{curvature}: {worst}");
+            assert!(fast.values.iter().zip(&heights.field.values).all(|(sheet, height)| sheet >= height));
+        }
+    }
+
+    #[test]
+    fn the_skirt_of_a_low_wall_is_a_parabola() {
+        let (height, curvature) = (5e-4, 20.0);
+        let wall = cuboid(DVec3::ZERO, DVec3::new(height, 0.004, 0.06));
+        let sheet = tent(&heights(&wall, 1.0).unwrap(), curvature);
+        let reach = (2.0 * height / curvature).sqrt();
+        let row = ((0.0 - sheet.origin.y) / STEP_M).round() as usize;
+        for column in 0..sheet.field.columns {
+            let y = (sheet.origin.x + column as f64 * STEP_M).abs() - 0.004;
+            let expected = if y <= 0.0 { height } else { 0.5 * curvature * (reach - y).max(0.0).powi(2) };
+            let found = f64::from(sheet.field.values[row * sheet.field.columns + column]);
+            assert!((found - expected).abs() < 4e-5, "{y}: {found} {expected}");
+        }
+    }
+
+    #[test]
+    fn each_side_has_its_own_heights_and_what_is_broken_none() {
+        let block = cuboid(DVec3::new(0.002, 0.01, 0.0), DVec3::new(0.003, 0.004, 0.006));
+        let top = |side| heights(&block, side).unwrap().field.values.iter().copied().fold(0.0, f32::max);
+        assert!((top(1.0) - 0.005).abs() < 1e-7 && (top(-1.0) - 0.001).abs() < 1e-7);
+        assert!(heights(&TriMesh::default(), 1.0).is_none());
+        let far = cuboid(DVec3::new(0.0, 1.0, 0.0), DVec3::splat(0.01));
+        assert!(heights(&far, 1.0).is_none());
+        let mut broken = block.clone();
+        broken.vertices.iter_mut().for_each(|v| v.y = f64::NAN);
+        broken.triangles.push([0, 1, 99]);
+        assert!(heights(&broken, 1.0).is_none());
+        let huge = cuboid(DVec3::ZERO, DVec3::splat(1e9));
+        let sheet = tent(&heights(&huge, 1.0).unwrap(), 20.0);
+        assert!(sheet.field.values.len() < 250_000 && sheet.field.values.iter().all(|v| v.is_finite()));
+    }
+}

@@ -27,12 +27,16 @@ pub(super) struct BandField {
 /// The bands of one side of a tool, in the order of [`BANDS`].
 pub(super) type Template = [BandField; BANDS.len()];
 
-/// The templates of a tool, by step of curvature and side. `None` where the tool has nothing on that side.
+/// Step of curvature, step of floor, and the side.
+type Key = (i32, i32, bool);
+
+/// The templates of a tool. `None` where the tool has nothing on that side.
 #[derive(Default)]
-struct Templates(Mutex<BTreeMap<(i32, i32, bool), Option<Arc<Template>>>>);
+struct Templates(Mutex<BTreeMap<Key, Option<Arc<Template>>>>);
 
 /// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane whose free
-/// height has the Laplacian `curvature` (1/m). Made at the first request and kept with the tool.
+/// height has the Laplacian `curvature` (1/m) and which reaches the plane `floor_m` over the middle plane, over which heights
+/// count. Made at the first request (some 20 ms) and kept with the tool.
 pub(super) fn template(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Arc<Template>> {
     let step = (STEPS * curvature.clamp(*CURVATURE.start(), *CURVATURE.end()).log2()).round();
     let floor = (floor_m.clamp(0.0, 0.05) / FLOOR_M).round();
