@@ -5,12 +5,15 @@ use std::sync::Arc;
 use super::super::keys::RegistrationChoice;
 use super::super::workbench::state::PoseOf;
 use super::cloud::CloudKey;
+use super::imprint::Imprint;
 use super::tool::ToolKey;
 use super::{Absent, Computed, Computes, ImprintSource, Job, Lane, Lookup, SharedServices, State, Wanted};
-use touch2touch_core::align::Ask;
+use touch2touch_core::align::{Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
-use touch2touch_work::cloud::Clouds;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::cloud::{Clouds, images};
+use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::{PoseResult, pose};
 use touch2touch_work::tool::NamedTool;
 
@@ -31,25 +34,48 @@ pub(crate) struct Registered {
     pub(crate) tool: Arc<NamedTool>,
     /// The true pose, `grasp_from_object`, where it is known.
     pub(crate) truth: Option<PlanarPose>,
+    sample: Arc<Sample>,
+    /// Of the fingers that have a mask.
+    imprints: PerPad<Imprint>,
+}
+
+impl Registered {
+    /// Registers it.
+    ///
+    /// # Errors
+    /// As [`pose`].
+    pub(crate) fn pose(&self, engine: RegistrationChoice, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
+        let points = self.clouds.contact_points();
+        let imprints = self.imprints.as_ref().map(|imprint| imprint?.get().ok());
+        let images = images(&self.sample, &imprints);
+        let contacts = Contacts { points: &points, images: &images };
+        pose(contacts, &self.tool.model, &*engine.method(), ask, self.truth)
+    }
 }
 
 impl PoseKey {
     /// The job that registers it.
     fn registering(&self, state: &State, ask: Ask<'static>) -> Option<Job<PoseResult>> {
-        let (Registered { clouds, tool, truth }, engine) = (self.find(state)?, self.engine);
-        Some(Job::new(Lane::Compute, "Pose", move |_| {
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
-        }))
+        let (registered, engine) = (self.find(state)?, self.engine);
+        Some(Job::new(Lane::Compute, "Pose", move |_| registered.pose(engine, ask)))
     }
 
     /// What is registered; `None` if it is not there.
     pub(crate) fn find(&self, state: &State) -> Option<Registered> {
         let (pair, _) = self.cloud.place()?;
         let tool = ToolKey { dataset: pair.dataset, name: self.tool.clone() };
+        let felt = self.cloud.parts.entries().filter(|(_, (_, mask))| mask.is_some());
+        let mut imprints = PerPad::default();
+        for (finger, (imprint, _)) in felt {
+            imprints[finger] = Some(imprint.find(state)?);
+        }
+        let sample = state.results.samples.get(&pair)?.clone();
         Some(Registered {
             clouds: state.results.clouds.get(&self.cloud)?.clone(),
             tool: state.results.tools.get(&tool)?.clone(),
-            truth: state.results.samples.get(&pair)?.grasp_from_object,
+            truth: sample.grasp_from_object,
+            sample,
+            imprints,
         })
     }
 }

@@ -1,10 +1,10 @@
 //! Registrations with everything recorded: every step, and what became of every point.
 
 use super::super::keys::PoseBits;
-use super::pose::{PoseKey, Registered};
+use super::pose::PoseKey;
 use super::{Computes, ImprintSource, Job, Lane, SharedServices, State};
 use touch2touch_core::align::Ask;
-use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::pose::PoseResult;
 
 /// A registration with everything recorded: every step, and what became of every point.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -19,11 +19,11 @@ impl Computes for RunKey {
     type Value = PoseResult;
 
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        let Registered { clouds, tool, truth } = self.pose.find(state)?;
+        let registered = self.pose.find(state)?;
         let (engine, start) = (self.pose.engine, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            pose(&clouds.contact_points(), &tool.model, &*engine.method(), ask, truth)
+            registered.pose(engine, ask)
         }))
     }
 
