@@ -44,6 +44,8 @@ pub struct JointConfig {
     pub max_iterations: usize,
     /// Costs this close, as a share, do not tell two ends apart.
     pub close: f64,
+    /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
+    pub doubtful: f64,
     /// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
     pub explained: f64,
     /// Keep per-iteration states and per-point residuals.
@@ -78,6 +80,7 @@ impl Default for JointConfig {
             weight: MaskWeight { scouts: 0.1, answer: 0.02, noise_m: 0.075e-3, range: [0.02, 0.3], agrees: 0.1 },
             max_iterations: 20,
             close: 0.15,
+            doubtful: 0.3,
             explained: 0.05,
             record: false,
         }
@@ -91,8 +94,8 @@ pub enum Basis {
     /// Membrane and mask together.
     #[strum(to_string = "membrane and mask")]
     Both,
-    /// The membrane alone: the mask is next to empty.
-    #[strum(to_string = "membrane alone: the mask is next to empty")]
+    /// The membrane alone: the mask is next to empty, or contradicts it.
+    #[strum(to_string = "membrane alone: the mask is next to empty or contradicts it")]
     Membrane,
     /// The mask alone, because there is no image of a membrane with its camera.
     #[strum(to_string = "mask alone: no depth image with a camera")]
@@ -144,10 +147,17 @@ impl Register for JointConfig {
         if scene.images().is_empty() {
             return by_mask(JointFit::by_mask(Basis::NoImage));
         }
-        let Some(problem) = Problem::new(scene, tool, &config)? else {
+        let Some(mut problem) = Problem::new(scene, tool, &config)? else {
             return by_mask(JointFit::by_mask(Basis::NoZone));
         };
-        let answer = problem.solve();
+        let mut answer = problem.solve();
+        if answer.fit.explained < config.doubtful && problem.forget_mask() {
+            // A bad mask can lead all scouts away from what the membrane shows plainly.
+            let alone = problem.solve();
+            if alone.fit.explained > answer.fit.explained + config.explained {
+                answer = alone;
+            }
+        }
         if answer.fit.explained < config.explained {
             return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
         }

@@ -171,6 +171,11 @@ impl<'a> Problem<'a> {
         Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite }))
     }
 
+    /// Leaves the mask out from now on; whether there was one.
+    pub(super) fn forget_mask(&mut self) -> bool {
+        self.mask.take().is_some()
+    }
+
     /// The images as a stage compares them.
     fn patches(&self, stage: usize) -> Patches<'_> {
         let band = stage.min(BANDS.len() - 1);
