@@ -36,7 +36,7 @@ struct Templates(Mutex<BTreeMap<Key, Option<Arc<Template>>>>);
 
 /// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane whose free
 /// height has the Laplacian `curvature` (1/m) and which reaches the plane `floor_m` over the middle plane, over which heights
-/// count. Made at the first request (some 20 ms) and kept with the tool.
+/// count. Made at the first request (25 to 65 ms) and kept with the tool.
 pub(super) fn template(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Arc<Template>> {
     let step = (STEPS * curvature.clamp(*CURVATURE.start(), *CURVATURE.end()).log2()).round();
     let floor = (floor_m.clamp(0.0, 0.05) / FLOOR_M).round();
