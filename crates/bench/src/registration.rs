@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use anyhow::Context as _;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
@@ -15,15 +15,18 @@ use super::front::{self, Axis, FrontPoint, Picture};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
 use touch2touch::headless::says;
-use touch2touch::headless::{JsonArgs, LimitArgs, at_least_one};
+use touch2touch::headless::{JsonArgs, LimitArgs, ModelArgs, at_least_one};
 use touch2touch::headless::{Output, VerbResult};
-use touch2touch_core::align::{AlignError, AlignReport, icp};
+use touch2touch_core::align::{AlignError, AlignReport, Contacts, PadImage, icp};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
+use touch2touch_core::grid::Mask;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel, register};
+use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
 use touch2touch_work::canvas;
+use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::atomic;
 use touch2touch_work::io::cases::{Case, CaseSet};
 use touch2touch_work::pairs;
@@ -43,9 +46,11 @@ pub(super) struct RegistrationArgs {
     /// Only these engines, separated by commas.
     #[arg(long, value_delimiter = ',')]
     engines: Vec<Registration>,
-    /// Contact masks to register.
-    #[arg(long, value_enum, default_value_t = Masks::Spoilt)]
+    /// Contact masks to register: `spoilt` (as a learned mask has them), `clean`, `unet` (by the mask model), `threshold=MM`.
+    #[arg(long, default_value_t = Masks::Spoilt)]
     masks: Masks,
+    #[command(flatten)]
+    model: ModelArgs,
     #[command(flatten)]
     limit: LimitArgs,
     /// Python that may have Open3D and small_gicp; they then run on the same points.
@@ -59,13 +64,71 @@ pub(super) struct RegistrationArgs {
     no_peers: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum, Serialize)]
-#[serde(rename_all = "lowercase")]
+/// Which contact masks. As text `spoilt`, `clean`, `unet` or `threshold=MM`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(into = "String")]
 enum Masks {
     /// As a learned mask has them.
     Spoilt,
     /// As they are.
     Clean,
+    /// By the mask model.
+    Unet,
+    /// All that is pushed in by so many millimeters.
+    Threshold(f32),
+}
+
+impl std::str::FromStr for Masks {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match (text, text.strip_prefix("threshold=").map(str::parse)) {
+            ("spoilt", _) => Ok(Self::Spoilt),
+            ("clean", _) => Ok(Self::Clean),
+            ("unet", _) => Ok(Self::Unet),
+            (_, Some(Ok(mm))) if (0.0..50.0).contains(&mm) => Ok(Self::Threshold(mm)),
+            _ => Err("masks are spoilt, clean, unet or threshold=MM, with less than 50 mm".to_owned()),
+        }
+    }
+}
+
+impl std::fmt::Display for Masks {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Spoilt => f.write_str("spoilt"),
+            Self::Clean => f.write_str("clean"),
+            Self::Unet => f.write_str("unet"),
+            Self::Threshold(mm) => write!(f, "threshold={mm}"),
+        }
+    }
+}
+
+impl From<Masks> for String {
+    fn from(masks: Masks) -> Self {
+        masks.to_string()
+    }
+}
+
+/// The masks of every case.
+fn masks(set: &CaseSet, args: &RegistrationArgs) -> anyhow::Result<Vec<[Mask; 2]>> {
+    let (rig, models) = (Rig::lab(), args.model.models());
+    let model = match args.masks {
+        Masks::Unet => args.model.mask_model(false, &rig)?,
+        _ => None,
+    };
+    let of = |case: &Case| -> anyhow::Result<[Mask; 2]> {
+        let mut masks = if args.masks == Masks::Spoilt { case.masks.clone() } else { case.masks_clean.clone() };
+        for (mask, imprint) in masks.iter_mut().zip(&case.imprints) {
+            if let Masks::Threshold(mm) = args.masks {
+                *mask = imprint.map(|pushed| pushed.is_finite() && *pushed >= mm / 1e3);
+            }
+            if let Some(model) = &model {
+                *mask = models.mask(model, EngineChoice::default(), imprint, None)?.mask;
+            }
+        }
+        Ok(masks)
+    };
+    set.cases.iter().map(|(name, case)| of(case).with_context(|| name.clone())).collect()
 }
 
 #[derive(Debug, Serialize)]
@@ -159,9 +222,11 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     let machine = Machine::now();
     // One thread, whatever an engine would like to use: the figures are the work, not the machine.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let mut report = pool.install(|| measure(args, &set, &engines, machine, &output))?;
+    let masks = masks(&set, args)?;
+    let (folder, kind) = (&args.cases, args.masks);
+    let mut report = pool.install(|| measure((folder, kind), &set, &masks, &engines, machine, &output))?;
     if !args.no_peers {
-        let prepared = prepare(&set, args.masks)?;
+        let prepared = prepare(&set, &masks)?;
         output.note("asking Python for Open3D and small_gicp ...");
         let asked: Vec<usize> = pairs::spread(prepared.len(), Some(args.peer_limit)).collect();
         match peers::run(&args.python, &prepared, &set.tools, &asked) {
@@ -195,19 +260,21 @@ pub(super) fn is_straight(mesh: &TriMesh) -> bool {
 }
 
 /// The contact points of both fingers, grasp frame, meters.
-fn points(case: &Case, masks: Masks) -> Result<Vec<DVec3>, CloudError> {
-    let masks = match masks {
-        Masks::Spoilt => &case.masks,
-        Masks::Clean => &case.masks_clean,
-    };
+fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, CloudError> {
     contact_points(&case.imprints, &case.cameras, masks)
 }
 
-fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
+/// What the cameras of both fingers saw.
+fn images(case: &Case) -> [PadImage<'_>; 2] {
+    std::array::from_fn(|f| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f] })
+}
+
+fn prepare(set: &CaseSet, masks: &[[Mask; 2]]) -> anyhow::Result<Vec<Prepared>> {
     let straight: BTreeMap<usize, bool> = set.tools.iter().map(|(&n, mesh)| (n, is_straight(mesh))).collect();
     set.cases
         .iter()
-        .map(|(name, case)| {
+        .zip(masks)
+        .map(|((name, case), masks)| {
             let points = points(case, masks).map_err(|err| anyhow::anyhow!("{name}: {err}"))?;
             Ok(Prepared {
                 name: name.clone(),
@@ -222,8 +289,9 @@ fn prepare(set: &CaseSet, masks: Masks) -> anyhow::Result<Vec<Prepared>> {
 }
 
 fn measure(
-    args: &RegistrationArgs,
+    (folder, kind): (&Path, Masks),
     set: &CaseSet,
+    masks: &[[Mask; 2]],
     engines: &[Registration],
     machine: Machine,
     output: &Output,
@@ -249,13 +317,15 @@ fn measure(
         std::hint::black_box((icp::in_space(&model), icp::silhouette(&model)));
         models.insert(number, model);
     }
-    let prepared = prepare(set, args.masks)?;
+    let prepared = prepare(set, masks)?;
     let (mut lift_ms, mut whole_ms) = (Vec::new(), Vec::new());
-    for (_, case) in &set.cases {
+    for ((_, case), masks) in set.cases.iter().zip(masks) {
         let model = &models[&case.tool];
-        lift_ms.push(timed(|| points(case, args.masks)).median);
-        let whole =
-            || Ok::<_, anyhow::Error>(register(&points(case, args.masks)?, model, Registration::default(), false)?);
+        lift_ms.push(timed(|| points(case, masks)).median);
+        let whole = || {
+            let contacts = Contacts { points: &points(case, masks)?, images: &images(case) };
+            Ok::<_, anyhow::Error>(register(contacts, model, Registration::default(), false)?)
+        };
         whole_ms.push(timed(whole).median);
     }
     let quantiles = |ms: &[f64]| Quantiles {
@@ -266,10 +336,14 @@ fn measure(
     for &engine in engines {
         let (mut outcomes, mut offset_mm, mut calls) = (Vec::new(), Vec::new(), 0);
         let cpu_before = thread_cpu_ms();
-        for case in &prepared {
+        for (case, (_, whole)) in prepared.iter().zip(&set.cases) {
             output.step(&engine.to_string());
             let model = &models[&case.tool];
-            let result = timed(|| register(&case.points, model, engine, false));
+            let images = images(whole);
+            let contacts = Contacts { points: &case.points, images: &images };
+            // What is made once for a tool is not charged to its first case.
+            std::hint::black_box(register(contacts, model, engine, false)).ok();
+            let result = timed(|| register(contacts, model, engine, false));
             calls += result.calls;
             offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
             outcomes.push(outcome(case, result));
@@ -289,8 +363,8 @@ fn measure(
     Ok(Report {
         default: Registration::default().to_string(),
         machine,
-        folder: args.cases.clone(),
-        masks: args.masks,
+        folder: folder.to_owned(),
+        masks: kind,
         depth_to_points: quantiles(&lift_ms),
         depth_to_pose: quantiles(&whole_ms),
         engines: rows,
@@ -347,7 +421,7 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
 
 fn text(report: &Report) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
-    let mut text = format!("{}\n{} cases, {:?} masks\n", report.machine.text(), report.cases.len(), report.masks);
+    let mut text = format!("{}\n{} cases, {} masks\n", report.machine.text(), report.cases.len(), report.masks);
     let slowest = |of: &dyn Fn(&ToolRow) -> f64| report.tools.iter().map(of).fold(0.0, f64::max);
     text += &format!(
         "tools: field at most {:.1} ms, everything at most {:.1} ms; depth and mask to points {} ms, to pose {} ms\n\n",

@@ -20,7 +20,9 @@ pub mod correspond;
 mod directions;
 pub mod icp;
 mod influence;
+mod joint;
 pub mod lab_icp;
+mod lanes;
 mod observability;
 mod planar;
 pub mod reason;
@@ -40,12 +42,13 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
+pub use joint::{Basis, JointConfig, JointFit, MaskWeight};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
 pub(crate) use refine::RefineConfig;
-pub use register::{Ask, Register, Scene};
+pub use register::{Ask, Contacts, PadImage, Register, Scene};
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///
@@ -381,6 +384,8 @@ pub struct AlignReport {
     pub within_prior: bool,
     /// Observability: how well the points determine the pose; `None` if the engine had no field to tell from.
     pub observability: Option<Observability>,
+    /// How the membrane was used, from the registration that uses it.
+    pub joint: Option<JointFit>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,
     /// Per-iteration states of all runs; empty unless recorded.

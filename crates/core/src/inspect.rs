@@ -35,7 +35,7 @@ pub fn basin_map(
 
 /// True where the registration compares with the silhouette's field rather than with model points.
 pub(crate) fn uses_field(engine: Registration) -> bool {
-    matches!(engine, Registration::DistanceField | Registration::Certified)
+    matches!(engine, Registration::DistanceField | Registration::Certified | Registration::Joint)
 }
 
 /// Model that contact points are compared with at any step of a run, prepared once per tool.

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{AlignError, AlignReport, Ask, Directions, Register, Scene, icp};
+use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Register, Scene, icp};
 use super::frames::PlanarPose;
 
 mod choice;
@@ -37,6 +37,8 @@ pub enum Registration {
     DistanceField,
     /// Robust registration on the distance field, with a proof by branch and bound.
     Certified,
+    /// The membranes' images against the tent over the tool, and the mask.
+    Joint,
     /// The lab's planar point-to-point loop.
     LabIcp,
     /// Point to point on the silhouette.
@@ -66,6 +68,7 @@ impl Registration {
         match self {
             Self::DistanceField => "ICP (distance field)",
             Self::Certified => "ICP (distance field), certified",
+            Self::Joint => "Joint (membrane and mask)",
             Self::LabIcp => "ICP (paper)",
             Self::PlanarPointToPoint => "ICP point-point, planar",
             Self::PlanarPointToPlane => "ICP point-plane, planar",
@@ -83,6 +86,9 @@ impl Registration {
             Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
             Self::Certified => {
                 "The default's answer with a proof: branch and bound, no pose of the prior is 2 % better"
+            }
+            Self::Joint => {
+                "The whole membrane against the sheet that the tool would lift, with the mask as a weaker term: for bad masks"
             }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
             Self::PlanarPointToPoint => {
@@ -109,18 +115,18 @@ impl Registration {
     }
 }
 
-/// Contact points (grasp frame, meters) to the tool's pose: what every caller ends in. `record` keeps per-iteration
+/// Contact points (grasp frame, meters), with the images of the membranes where they are known, to the tool's pose: what every caller ends in. `record` keeps per-iteration
 /// states, per-point residuals and the distances both ways.
 ///
 /// # Errors
 /// [`AlignError`] for too few points or none near the tool.
-pub fn register(
-    points: &[DVec3],
+pub fn register<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     engine: impl Into<RegistrationChoice>,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), points, tool, Ask { record, ..Ask::default() })
+    register_with(&*engine.into().method(), contacts, tool, Ask { record, ..Ask::default() })
 }
 
 /// Registers from one start, `grasp_from_object`, instead of the engine's own.
@@ -141,13 +147,13 @@ pub(crate) fn register_from(
 ///
 /// # Errors
 /// As [`register`], and for settings that make no sense.
-pub fn register_with(
+pub fn register_with<'a>(
     registration: &dyn Register,
-    points: &[DVec3],
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     ask: Ask<'_>,
 ) -> Result<AlignReport, AlignError> {
-    let scene = Scene::new(points);
+    let scene = Scene::new(contacts);
     let mut report = registration.run(&scene, tool, ask)?;
     if ask.record {
         report.directions = Directions::at(scene.yz(), &icp::silhouette(tool), report.grasp_from_object);

@@ -20,7 +20,6 @@ mod faults;
 mod gelslim;
 mod grasp;
 mod membrane;
-mod relax;
 mod rig;
 mod spoil;
 mod training;

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use super::error::TaskError;
+use touch2touch_core::align::PadImage;
 use touch2touch_core::cloud;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{Sight, VisiblePixels};
@@ -115,6 +116,13 @@ pub fn contact_points(
     }
     let why = "neither finger has an imprint with camera data, so there are no points to align";
     if any { Ok(points) } else { Err(TaskError::new(WHAT, why)) }
+}
+
+/// Views of the pads' depth cameras, for registrations that look at more than contact points. A pad without imprint or
+/// camera is left out.
+pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>) -> Vec<PadImage<'a>> {
+    let image = |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()? });
+    sample.rig.pads().filter_map(image).collect()
 }
 
 /// Pixels of a finger's imprint that are visible in a 3D picture that its mask is drawn on, with their places in it.

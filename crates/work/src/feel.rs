@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::DVec3;
 use strum::IntoEnumIterator as _;
 
+use super::cloud::images;
 use super::error::TaskError;
 use super::imprint::{imprints_of, measured};
 use super::job::JobCx;
@@ -17,7 +18,7 @@ use super::recipe::{Recipe, Stage, no_mask_model};
 use crate::infer::mask::contact_of;
 use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
-use touch2touch_core::align::{Ask, Register};
+use touch2touch_core::align::{Ask, Contacts, Register};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::pose::ToolModel;
@@ -190,7 +191,10 @@ impl Felt {
     ) -> Result<PoseResult, TaskError> {
         let points = self.points().map_err(Clone::clone)?;
         let tool = touch.tool.map_err(Clone::clone)?;
-        pose(points, tool, registration, ask, touch.sample.grasp_from_object)
+        let imprints = &self.contact().imprints;
+        let images = images(touch.sample, &imprints.as_ref());
+        let contacts = Contacts { points, images: &images };
+        pose(contacts, tool, registration, ask, touch.sample.grasp_from_object)
     }
 
     /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on

@@ -7,7 +7,7 @@ use glam::DVec3;
 use super::error::TaskError;
 use super::job::JobCx;
 use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
-use touch2touch_core::align::{AlignReport, Ask, PointFit, Register, TraceStep};
+use touch2touch_core::align::{AlignReport, Ask, Contacts, PointFit, Register, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::basin_map;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel, register_with};
@@ -52,19 +52,20 @@ impl PoseResult {
     }
 }
 
-/// The pose of the tool from contact points (grasp frame, meters). `truth` is `grasp_from_object`, where known.
+/// The pose of the tool from contact points (grasp frame, meters) and the images that they are from. `truth` is `grasp_from_object`, where known.
 ///
 /// # Errors
 /// If there are too few points, or they are nowhere near the tool.
-pub fn pose(
-    points: &[DVec3],
+pub fn pose<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     registration: &dyn Register,
     ask: Ask<'_>,
     truth: Option<PlanarPose>,
 ) -> Result<PoseResult, TaskError> {
+    let contacts = contacts.into();
     let start = Instant::now();
-    let report = register_with(registration, points, tool, ask).map_err(|err| TaskError::from_error("Pose", &err))?;
+    let report = register_with(registration, contacts, tool, ask).map_err(|err| TaskError::from_error("Pose", &err))?;
     let ms = start.elapsed().as_secs_f64() * 1e3;
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
@@ -74,7 +75,7 @@ pub fn pose(
         truth_rad,
         error_rad: truth_rad.map(|t| units::angle_error(angle_rad, t)),
         rms_m: report.inlier_rms_m,
-        num_points: points.len(),
+        num_points: contacts.points.len(),
         stop: report.stop.to_string(),
         converged: report.converged,
         ms,

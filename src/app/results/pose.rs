@@ -10,12 +10,15 @@ use super::super::state::results::Computed;
 use super::super::state::workbench::PoseOf;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
-use touch2touch_core::align::Ask;
+use super::imprint::{Imprint, imprint_input};
+use touch2touch_core::align::{Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
-use touch2touch_work::cloud::Clouds;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::cloud::{Clouds, images};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_work::pose::{self, PoseResult};
 use touch2touch_work::tool::NamedTool;
 
 /// The inputs of every job about a pose: what is registered.
@@ -24,24 +27,46 @@ pub(crate) struct Registered {
     pub(crate) tool: Arc<NamedTool>,
     /// The true pose, `grasp_from_object`, where it is known.
     pub(crate) truth: Option<PlanarPose>,
+    sample: Arc<Sample>,
+    /// Of the fingers that have a mask.
+    imprints: PerPad<Imprint>,
+}
+
+impl Registered {
+    /// Registers it.
+    ///
+    /// # Errors
+    /// As [`pose::pose`].
+    pub(crate) fn pose(&self, registration: RegistrationChoice, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
+        let points = self.clouds.contact_points();
+        let imprints = self.imprints.as_ref().map(|imprint| imprint?.get().ok());
+        let images = images(&self.sample, &imprints);
+        let contacts = Contacts { points: &points, images: &images };
+        pose::pose(contacts, &self.tool.model, &*registration.method(), ask, self.truth)
+    }
 }
 
 /// The job that registers a cloud.
 fn registering(state: &State, key: &PoseKey, ask: Ask<'static>) -> Option<Job<PoseResult>> {
-    let (Registered { clouds, tool, truth }, registration) = (registered(state, key)?, key.registration);
-    Some(Job::new(Lane::Compute, "Pose", move |_| {
-        touch2touch_work::pose::pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
-    }))
+    let (registered, registration) = (registered(state, key)?, key.registration);
+    Some(Job::new(Lane::Compute, "Pose", move |_| registered.pose(registration, ask)))
 }
 
 /// The inputs of a registration; `None` if they are not there.
 pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
     let (pair, _) = key.cloud.place()?;
     let tool = ToolKey { dataset: pair.dataset, name: key.tool.clone() };
+    let mut imprints = PerPad::default();
+    for (finger, (imprint, _)) in key.cloud.parts.entries().filter(|(_, (_, mask))| mask.is_some()) {
+        imprints[finger] = Some(imprint_input(state, imprint)?);
+    }
+    let sample = state.results.samples.get(&pair)?.clone();
     Some(Registered {
         clouds: state.results.clouds.get(&key.cloud)?.clone(),
         tool: state.results.tools.get(&tool)?.clone(),
-        truth: state.results.samples.get(&pair)?.grasp_from_object,
+        truth: sample.grasp_from_object,
+        sample,
+        imprints,
     })
 }
 

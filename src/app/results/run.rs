@@ -3,19 +3,19 @@
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImprintSource, PoseBits, RunKey};
 use super::super::results;
-use super::super::results::{Computes, Registered};
+use super::super::results::Computes;
 use super::super::services::SharedServices;
 use super::super::state::State;
 use touch2touch_core::align::Ask;
-use touch2touch_work::pose::{PoseResult, pose};
+use touch2touch_work::pose::PoseResult;
 
 impl Computes for RunKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        let Registered { clouds, tool, truth } = results::registered(state, &self.pose)?;
+        let registered = results::registered(state, &self.pose)?;
         let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
         Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
             let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
-            pose(&clouds.contact_points(), &tool.model, &*registration.method(), ask, truth)
+            registered.pose(registration, ask)
         }))
     }
 }

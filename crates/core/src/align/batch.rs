@@ -7,14 +7,10 @@
 use glam::DVec2;
 
 use super::ANGLE_SCALE_M;
+use super::lanes::{LANES, Lattice};
 use crate::field::{CELL_M, DistanceField};
 use crate::frames::PlanarPose;
 
-/// Points per step: as many as keep the reads of a step in flight together.
-const LANES: usize = 16;
-/// Adding it to a number below leaves the number's integer part in the low bits.
-const MAGIC: f32 = 8_388_608.0;
-const MAGIC_MASK: u32 = 0x7f_ffff;
 /// Least share of a point's curvature that counts where the kernel bends down.
 const FLAT: f32 = 0.1;
 
@@ -187,16 +183,6 @@ pub(super) struct Slopes {
     cells: Vec<[f32; 4]>,
     /// Reach of the window from anywhere in the cell, meters.
     pub(super) reach: f64,
-}
-
-/// Positions of the lanes on the grid.
-struct Located {
-    /// Cell and position within it, 0 to 1.
-    index: [usize; LANES],
-    fy: [f32; LANES],
-    fz: [f32; LANES],
-    /// True where a lane lies off the grid; it was moved onto it.
-    off: bool,
 }
 
 impl DistanceField {
@@ -466,8 +452,9 @@ impl DistanceField {
             read.ay[l] = motion.cos * y[l] - motion.sin * z[l];
             read.az[l] = motion.sin * y[l] + motion.cos * z[l];
         }
-        let at = self.locate(motion, &read.ay, &read.az);
-        let [a, b, c, d] = self.corners_of(&at);
+        let lattice = Lattice { columns: self.columns, rows: self.rows, values: &self.values };
+        let at = lattice.locate(&read.ay.map(|y| y + motion.y), &read.az.map(|z| z + motion.z));
+        let [a, b, c, d] = lattice.corners_of(&at);
         for l in 0..LANES {
             let (ab, cd) = (b[l] - a[l], d[l] - c[l]);
             let (near, far) = (a[l] + ab * at.fy[l], c[l] + cd * at.fy[l]);
@@ -512,43 +499,6 @@ impl DistanceField {
         })
     }
 
-    #[inline]
-    fn locate(&self, motion: &Motion, ay: &[f32; LANES], az: &[f32; LANES]) -> Located {
-        let (last_y, last_z) = ((self.columns - 1) as f32, (self.rows - 1) as f32);
-        let columns = self.columns as f32;
-        let mut at = Located { index: [0; LANES], fy: [0.0; LANES], fz: [0.0; LANES], off: false };
-        let mut bits = [0u32; LANES];
-        let mut off = 0u32;
-        for l in 0..LANES {
-            let (gy, gz) = (ay[l] + motion.y, az[l] + motion.z);
-            let (cy, cz) = (clamp(gy, last_y), clamp(gz, last_z));
-            off |= u32::from(cy != gy) | u32::from(cz != gz);
-            let (column, row) = (whole(cy, last_y - 1.0), whole(cz, last_z - 1.0));
-            at.fy[l] = cy - column;
-            at.fz[l] = cz - row;
-            // Exact: a field has fewer than 2^23 cells.
-            bits[l] = (row * columns + column + MAGIC).to_bits() & MAGIC_MASK;
-        }
-        at.index = bits.map(|b| b as usize);
-        at.off = off != 0;
-        at
-    }
-
-    /// Values at the four corners around each lane.
-    #[inline]
-    fn corners_of(&self, at: &Located) -> [[f32; LANES]; 4] {
-        let mut corners = [[0f32; LANES]; 4];
-        let reach = self.columns + 2;
-        for (l, index) in at.index.iter().enumerate() {
-            let cell = &self.values[*index..][..reach];
-            corners[0][l] = cell[0];
-            corners[1][l] = cell[1];
-            corners[2][l] = cell[reach - 2];
-            corners[3][l] = cell[reach - 1];
-        }
-        corners
-    }
-
     /// Replaces what was read for lanes off the grid.
     #[cold]
     fn correct_off_grid(&self, motion: &Motion, read: &mut Read) {
@@ -591,19 +541,4 @@ fn widen(values: &[[f32; 4]], columns: usize, reach: usize) -> Vec<[f32; 4]> {
         std::mem::swap(&mut from, &mut to);
     }
     from
-}
-
-/// Between 0 and `high`; not a number becomes 0.
-#[inline]
-fn clamp(x: f32, high: f32) -> f32 {
-    let x = if x > 0.0 { x } else { 0.0 };
-    if x < high { x } else { high }
-}
-
-/// The integer part, at most `high`, of a number from 0 to 2^22.
-#[inline]
-fn whole(x: f32, high: f32) -> f32 {
-    let rounded = (x + MAGIC) - MAGIC;
-    let below = if rounded > x { rounded - 1.0 } else { rounded };
-    if below < high { below } else { high }
 }

@@ -239,6 +239,7 @@ impl Register for IcpConfig {
             inlier_rms_m: (best.sums.inlier_squares / (best.sums.inliers as f64).max(1.0)).sqrt(),
             within_prior: Prior::default().allows(pose),
             observability: Some(observability(&chosen_yz, &tool.field, pose)),
+            joint: None,
             directions: None,
             fits: if ask.record { self.fits(tool, &clean, best.state) } else { Vec::new() },
             trace: trace.steps,

@@ -207,6 +207,7 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
         inlier_rms_m: (matched.inlier_squares / (matched.inliers as f64).max(1.0)).sqrt(),
         within_prior: Prior::default().allows(run.end),
         observability: None,
+        joint: None,
         directions: None,
         trace: paper.trace,
         fits,

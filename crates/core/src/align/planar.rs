@@ -409,6 +409,7 @@ impl<'a> Problem<'a> {
             inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
             within_prior: config.prior.allows(answer.pose),
             observability: Some(answer.seen),
+            joint: None,
             directions: None,
             trace: answer.trace,
             fits: if config.record {
@@ -466,7 +467,7 @@ fn check(config: &AlignConfig) -> Result<(), AlignError> {
 }
 
 /// Every offered point at the final pose.
-fn fits(points: &[DVec2], field: &DistanceField, pose: PlanarPose, kernel: f64) -> Vec<PointFit> {
+pub(super) fn fits(points: &[DVec2], field: &DistanceField, pose: PlanarPose, kernel: f64) -> Vec<PointFit> {
     /// Kernel widths at which the weight has fallen to one hundredth.
     const GATE: f64 = 3.0;
     let object_from_grasp = pose.inverse();

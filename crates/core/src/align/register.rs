@@ -5,6 +5,8 @@ use glam::{DVec2, DVec3};
 use super::{AlignConfig, AlignError, AlignReport, Cleaned, Rung, align, clean};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
+use crate::grid::DepthMap;
+use crate::sample::DepthCamera;
 use crate::tool::ToolModel;
 
 /// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
@@ -12,22 +14,64 @@ const REACH_M: f64 = 0.012;
 /// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
 const MIN_SHARE: f64 = 0.05;
 
-/// Contact points to align, in space and in the plane of the tool.
+/// What the depth camera of one pad saw.
+#[derive(Clone, Copy, Debug)]
+pub struct PadImage<'a> {
+    /// Reference minus depth, meters, raw orientation.
+    pub imprint: &'a DepthMap,
+    /// The camera, with the depth of the free membrane.
+    pub camera: &'a DepthCamera,
+}
+
+/// What was felt: the contact points, and the images of the membranes that they are from.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Contacts<'a> {
+    /// Points of all masks, grasp frame, meters. Those that are not finite are dropped and counted by the registrations.
+    pub points: &'a [DVec3],
+    /// Images of the pads; none where only the points are known.
+    pub images: &'a [PadImage<'a>],
+}
+
+impl<'a> From<&'a [DVec3]> for Contacts<'a> {
+    fn from(points: &'a [DVec3]) -> Self {
+        Self { points, images: &[] }
+    }
+}
+
+impl<'a> From<&'a Vec<DVec3>> for Contacts<'a> {
+    fn from(points: &'a Vec<DVec3>) -> Self {
+        points.as_slice().into()
+    }
+}
+
+impl<'a, const N: usize> From<&'a [DVec3; N]> for Contacts<'a> {
+    fn from(points: &'a [DVec3; N]) -> Self {
+        points.as_slice().into()
+    }
+}
+
+/// What is to be aligned: contact points in space and in the plane of the tool, and the images they are from.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
-    points: &'a [DVec3],
+    contacts: Contacts<'a>,
     yz: Vec<DVec2>,
 }
 
 impl<'a> Scene<'a> {
-    /// Points in the grasp frame, meters. Those that are not finite are dropped and counted by the registrations.
-    pub fn new(points: &'a [DVec3]) -> Self {
-        Self { points, yz: points.iter().map(|p| DVec2::new(p.y, p.z)).collect() }
+    /// Contact points, with the images where they are known.
+    pub fn new(contacts: impl Into<Contacts<'a>>) -> Self {
+        let contacts = contacts.into();
+        Self { contacts, yz: contacts.points.iter().map(|p| DVec2::new(p.y, p.z)).collect() }
     }
 
     /// The points in the grasp frame, meters.
     pub fn points(&self) -> &'a [DVec3] {
-        self.points
+        self.contacts.points
+    }
+
+    /// The images of the pads.
+    pub fn images(&self) -> &'a [PadImage<'a>] {
+        self.contacts.images
     }
 
     /// Points along the closing axis: `(y, z)`, meters.

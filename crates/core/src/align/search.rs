@@ -130,40 +130,9 @@ impl<'a> Search<'a> {
         self.record = record;
     }
 
-    /// Levenberg-Marquardt with one kernel width.
-    ///
-    /// The damping is the same in all directions, so that a direction without slope (a rod along itself) gets no
-    /// step at all instead of an arbitrary one.
     fn descend(&mut self, run: usize, at: &mut Progress, points: &Cloud, kernel: f64, small: f64) {
-        let mut here = self.sums(points, at.state, kernel);
-        self.note(run, at, &here, kernel, points.len());
-        let mut damping = DAMPING_START;
-        at.stop = Stop::IterationLimit;
-        for _ in 0..self.max {
-            let Some(step) = solve(&here, damping * here.weight.max(1e-12)) else {
-                damping *= 10.0;
-                continue;
-            };
-            if step[0].abs().max(step[1].hypot(step[2])) < small {
-                at.stop = Stop::SmallStep;
-                break;
-            }
-            let state = at.state.moved(step);
-            let there = self.sums(points, state, kernel);
-            if there.cost < here.cost {
-                at.state = state;
-                at.iterations += 1;
-                here = there;
-                damping = (damping * 0.1).max(1e-6);
-                self.note(run, at, &here, kernel, points.len());
-            } else {
-                damping *= 10.0;
-                if damping > DAMPING_MAX {
-                    at.stop = Stop::NoDescent;
-                    break;
-                }
-            }
-        }
+        let max = self.max;
+        let here = minimize(&mut OnField { search: self, run, points, kernel }, at, max, small);
         at.cost = here.cost / points.len() as f64;
         at.inliers = here.inliers;
         at.inlier_squares = here.inlier_squares;
@@ -183,6 +152,70 @@ impl<'a> Search<'a> {
             });
         }
     }
+}
+
+/// One kernel width on one cloud.
+struct OnField<'s, 'a> {
+    search: &'s mut Search<'a>,
+    run: usize,
+    points: &'s Cloud,
+    kernel: f64,
+}
+
+impl Cost for OnField<'_, '_> {
+    fn sums(&mut self, state: State) -> Sums {
+        self.search.sums(self.points, state, self.kernel)
+    }
+
+    fn note(&mut self, at: &Progress, sums: &Sums) {
+        self.search.note(self.run, at, sums, self.kernel, self.points.len());
+    }
+}
+
+/// What a descent goes down on.
+pub(super) trait Cost {
+    /// Cost, slope and curvature at a state.
+    fn sums(&mut self, state: State) -> Sums;
+
+    /// Told of the start and of every step.
+    fn note(&mut self, _at: &Progress, _sums: &Sums) {}
+}
+
+/// Levenberg-Marquardt; the sums at the end.
+///
+/// The damping is the same in all directions, so that a direction without slope (a rod along itself) gets no
+/// step at all instead of an arbitrary one.
+pub(super) fn minimize(cost: &mut impl Cost, at: &mut Progress, max: usize, small: f64) -> Sums {
+    let mut here = cost.sums(at.state);
+    cost.note(at, &here);
+    let mut damping = DAMPING_START;
+    at.stop = Stop::IterationLimit;
+    for _ in 0..max {
+        let Some(step) = solve(&here, damping * here.weight.max(1e-12)) else {
+            damping *= 10.0;
+            continue;
+        };
+        if step[0].abs().max(step[1].hypot(step[2])) < small {
+            at.stop = Stop::SmallStep;
+            break;
+        }
+        let state = at.state.moved(step);
+        let there = cost.sums(state);
+        if there.cost < here.cost {
+            at.state = state;
+            at.iterations += 1;
+            here = there;
+            damping = (damping * 0.1).max(1e-6);
+            cost.note(at, &here);
+        } else {
+            damping *= 10.0;
+            if damping > DAMPING_MAX {
+                at.stop = Stop::NoDescent;
+                break;
+            }
+        }
+    }
+    here
 }
 
 /// Solves `(H + damping) step = -g` by Cholesky; `None` if that is not positive definite.

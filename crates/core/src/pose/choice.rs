@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use super::Registration;
 use crate::align::icp::Rejector;
-use crate::align::{AlignConfig, IcpConfig, LabIcpConfig, RefineConfig, Register};
+use crate::align::{AlignConfig, IcpConfig, JointConfig, LabIcpConfig, RefineConfig, Register};
 
 /// Gates that can be chosen, meters.
 const GATE_M: std::ops::RangeInclusive<f64> = 1e-5..=0.05;
@@ -141,7 +141,7 @@ impl RegistrationChoice {
                     Registration::DistanceField | Registration::Certified => {
                         AlignConfig::default().kernels_m.last().copied()
                     }
-                    Registration::LabIcp => None,
+                    Registration::LabIcp | Registration::Joint => None,
                     Registration::Refined => of_pairs(RefineConfig::default().space),
                     by => by.icp().and_then(of_pairs),
                 }
@@ -160,6 +160,7 @@ impl RegistrationChoice {
         match self.by {
             Registration::DistanceField => Box::new(rejection.on_field(AlignConfig::default())),
             Registration::Certified => Box::new(rejection.on_field(AlignConfig::certified())),
+            Registration::Joint => Box::new(JointConfig::default()),
             Registration::LabIcp => Box::new(LabIcpConfig::default()),
             Registration::Refined => {
                 let RefineConfig { planar, space } = RefineConfig::default();
@@ -174,7 +175,7 @@ impl Registration {
     /// Settings of a registration that is put together as an ICP; `None` for the others.
     fn icp(self) -> Option<IcpConfig> {
         match self {
-            Self::DistanceField | Self::Certified | Self::LabIcp | Self::Refined => None,
+            Self::DistanceField | Self::Certified | Self::Joint | Self::LabIcp | Self::Refined => None,
             Self::PlanarPointToPoint => Some(IcpConfig::planar_point_to_point()),
             Self::PlanarPointToPlane => Some(IcpConfig::planar_point_to_plane()),
             Self::PlanarGicp => Some(IcpConfig::planar_gicp()),
@@ -186,7 +187,7 @@ impl Registration {
 
     /// True where it can be given a gate.
     pub(crate) fn has_gate(self) -> bool {
-        self != Self::LabIcp
+        !matches!(self, Self::LabIcp | Self::Joint)
     }
 
     /// True where it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.

@@ -7,12 +7,12 @@
 
 use glam::DVec2;
 
-use super::relax::{Field, Problem};
 use super::{GelSlimConfig, rig};
 use crate::catalog::ToolSpec;
 use crate::frames::PlanarPose;
 use crate::grid::RgbGrid;
 use crate::noise::{Noise, Stream};
+use crate::relax::{Field, Problem};
 use crate::rig::{PadId, lab};
 use crate::sample::{ColorImages, ColorTouch};
 

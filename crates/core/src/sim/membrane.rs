@@ -10,10 +10,10 @@
 
 use glam::DVec2;
 
-use super::relax::{Field, Problem};
 use super::{BubbleConfig, MEMBRANE_STEP_M};
 use crate::catalog::ToolSpec;
 use crate::frames::PlanarPose;
+use crate::relax::{Field, Problem};
 
 /// A pressed membrane.
 pub struct Membrane<'a> {

@@ -6,19 +6,19 @@
 
 /// A field on a square grid, row by row.
 #[derive(Clone, Debug)]
-pub(super) struct Field {
-    pub(super) columns: usize,
-    pub(super) rows: usize,
-    pub(super) values: Vec<f32>,
+pub(crate) struct Field {
+    pub(crate) columns: usize,
+    pub(crate) rows: usize,
+    pub(crate) values: Vec<f32>,
 }
 
 impl Field {
-    pub(super) fn filled(columns: usize, rows: usize, value: f32) -> Self {
+    pub(crate) fn filled(columns: usize, rows: usize, value: f32) -> Self {
         Self { columns, rows, values: vec![value; columns * rows] }
     }
 
     /// Bilinear value at node coordinates; beyond the border the border's value.
-    pub(super) fn at(&self, x: f64, y: f64) -> f64 {
+    pub(crate) fn at(&self, x: f64, y: f64) -> f64 {
         let x = x.clamp(0.0, (self.columns - 1) as f64 - 1e-6);
         let y = y.clamp(0.0, (self.rows - 1) as f64 - 1e-6);
         let (ix, iy) = (x as usize, y as usize);
@@ -31,7 +31,7 @@ impl Field {
     }
 
     /// Every second node.
-    fn thinned(&self) -> Field {
+    pub(crate) fn thinned(&self) -> Field {
         let (columns, rows) = (self.columns.div_ceil(2), self.rows.div_ceil(2));
         let mut out = Field::filled(columns, rows, 0.0);
         for y in 0..rows {
@@ -62,25 +62,25 @@ impl Field {
 }
 
 /// The sheet, see the module.
-pub(super) struct Problem<'a> {
+pub(crate) struct Problem<'a> {
     /// Lowest allowed value; `NEG_INFINITY` where nothing is in the way.
-    pub(super) obstacle: &'a Field,
+    pub(crate) obstacle: &'a Field,
     /// Nodes that can move; the others stay at 0. The border never moves.
-    pub(super) free: &'a [bool],
+    pub(crate) free: &'a [bool],
     /// Load divided by tension, 1/m (per square meter of the grid: the right hand side).
-    pub(super) load: f32,
+    pub(crate) load: f32,
     /// More of it, node by node.
-    pub(super) more: Option<&'a Field>,
+    pub(crate) more: Option<&'a Field>,
     /// Foundation stiffness divided by tension, 1/m².
-    pub(super) stiffness: f32,
+    pub(crate) stiffness: f32,
     /// Grid spacing, meters.
-    pub(super) step: f32,
+    pub(crate) step: f32,
 }
 
 impl Problem<'_> {
     /// Solves on `levels` grids, each twice as fine as the one before, with `sweeps` sweeps on the finest and twice
     /// as many on each coarser one.
-    pub(super) fn solve(&self, levels: usize, sweeps: usize) -> Field {
+    pub(crate) fn solve(&self, levels: usize, sweeps: usize) -> Field {
         self.solve_from(levels, sweeps, 0)
     }
 
@@ -110,7 +110,7 @@ impl Problem<'_> {
     }
 
     /// Obstacle and free nodes on a grid of twice the spacing.
-    pub(super) fn coarser(&self, reach: usize) -> (Field, Vec<bool>) {
+    pub(crate) fn coarser(&self, reach: usize) -> (Field, Vec<bool>) {
         let obstacle = self.obstacle.coarser(reach);
         let mut free = Vec::with_capacity(obstacle.values.len());
         for y in 0..obstacle.rows {
@@ -121,7 +121,7 @@ impl Problem<'_> {
     }
 
     /// `sweeps` red-black sweeps in place.
-    pub(super) fn relax(&self, w: &mut Field, sweeps: usize) {
+    pub(crate) fn relax(&self, w: &mut Field, sweeps: usize) {
         let columns = w.columns;
         let h2 = self.step * self.step;
         let inverse = 1.0 / (4.0 + self.stiffness * h2);

@@ -1,0 +1,166 @@
+//! The membrane's image and the mask together: what the whole membrane says of the pose, and the mask where that is little.
+//!
+//! A mask is made by a threshold or a model and can be wrong where the tool is plain to see. The membrane's height needs
+//! no mask: over a tool it is a tent (the solution of an obstacle problem, see `tent`), which a pose only moves. Its image
+//! and the tent are compared in bands of lengths, because offsets and slow slopes (a camera that is off, the pressure) are
+//! not the tool, and pixel noise is not either. The mask stays as a second, weaker term: the weaker, the less noise the
+//! membrane has and the less the mask agrees with it.
+//!
+//! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
+
+mod cost;
+mod image;
+mod problem;
+mod smooth;
+mod template;
+#[cfg(test)]
+mod tests;
+
+use serde::{Deserialize, Serialize};
+
+use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
+use crate::frames::PlanarPose;
+use crate::tool::ToolModel;
+use problem::{Problem, check};
+
+/// What the registration by membrane and mask may vary. The default is what the product uses.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointConfig {
+    /// Poses to start from, `grasp_from_object`: exactly these. Empty: its own.
+    pub starts: Vec<PlanarPose>,
+    /// The registration by the mask alone, which answers where the membrane says little; its prior is this one's.
+    pub mask: AlignConfig,
+    /// Places of the membranes that are compared in each band, coarse to fine, and for the answer (in the finest).
+    pub points: [usize; 4],
+    /// Widths of the Geman-McClure kernel likewise, meters.
+    pub kernels_m: [f64; 4],
+    /// Points of the mask while starts are told apart, and for the answer.
+    pub mask_points: [usize; 2],
+    /// Widths of the mask's kernel, meters, likewise.
+    pub mask_kernels_m: [f64; 2],
+    /// Weight of the mask beside the membrane.
+    pub weight: MaskWeight,
+    /// Most steps in each band.
+    pub max_iterations: usize,
+    /// Costs this close, as a share, do not tell two ends apart.
+    pub close: f64,
+    /// Share of the membrane's relief below which the membrane alone is asked as well, and answers if it explains more.
+    pub doubtful: f64,
+    /// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
+    pub explained: f64,
+    /// Keep per-iteration states and per-point residuals.
+    pub record: bool,
+}
+
+/// How much the mask counts beside the membrane, as a factor of its mean cost.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MaskWeight {
+    /// While starts are told apart.
+    pub scouts: f64,
+    /// For the answer, where the membrane has the noise of `noise_m`. It grows with the fourth power of the noise: what the
+    /// membrane tells falls with the square of the noise, and model errors make its residuals alike.
+    pub answer: f64,
+    /// Noise, meters.
+    pub noise_m: f64,
+    /// Least and greatest weight for the answer.
+    pub range: [f64; 2],
+    /// Mean cost of the mask at the membrane's pose from which on it counts less, by its inverse.
+    pub agrees: f64,
+}
+
+impl Default for JointConfig {
+    fn default() -> Self {
+        Self {
+            starts: Vec::new(),
+            mask: AlignConfig::default(),
+            points: [100, 150, 400, 1200],
+            kernels_m: [4e-3, 1e-3, 0.5e-3, 0.5e-3],
+            mask_points: [64, 400],
+            mask_kernels_m: [2e-3, 1e-3],
+            weight: MaskWeight { scouts: 0.1, answer: 0.02, noise_m: 0.075e-3, range: [0.02, 0.3], agrees: 0.1 },
+            max_iterations: 20,
+            close: 0.15,
+            doubtful: 0.3,
+            explained: 0.05,
+            record: false,
+        }
+    }
+}
+
+/// Who answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "snake_case")]
+pub enum Basis {
+    /// Membrane and mask together.
+    #[strum(to_string = "membrane and mask")]
+    Both,
+    /// The membrane alone: the mask is next to empty, or contradicts it.
+    #[strum(to_string = "membrane alone: the mask is next to empty or contradicts it")]
+    Membrane,
+    /// The mask alone, because there is no image of a membrane with its camera.
+    #[strum(to_string = "mask alone: no depth image with a camera")]
+    NoImage,
+    /// The mask alone, because the membranes come nowhere near each other, or hardly a pixel has a depth.
+    #[strum(to_string = "mask alone: the membranes do not show where they would meet")]
+    NoZone,
+    /// The mask alone, because the tool hardly shows in the membrane.
+    #[strum(to_string = "mask alone: too little of the membrane lies on the tool")]
+    LittleContact,
+}
+
+/// How the membrane was used.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct JointFit {
+    /// Who answered.
+    pub basis: Basis,
+    /// Noise of the membrane against its template: 1.48 times the median residual, meters. 0 where it was not used.
+    pub noise_m: f64,
+    /// Weight of the mask's mean cost beside the membrane's.
+    pub mask_weight: f64,
+    /// Area of the membranes that was compared, square meters.
+    pub area_m2: f64,
+    /// Share of the membrane's relief that the tool explains, at most 1.
+    pub explained: f64,
+}
+
+impl JointFit {
+    fn by_mask(basis: Basis) -> Self {
+        Self { basis, noise_m: 0.0, mask_weight: 1.0, area_m2: 0.0, explained: 0.0 }
+    }
+}
+
+impl Register for JointConfig {
+    fn run(&self, scene: &Scene<'_>, tool: &ToolModel, ask: Ask<'_>) -> Result<AlignReport, AlignError> {
+        let mut config = self.clone();
+        config.record = ask.record;
+        if let Some(starts) = ask.starts {
+            if starts.is_empty() {
+                return Err(AlignError::Config { what: "starts" });
+            }
+            config.starts = starts.to_vec();
+        }
+        check(&config)?;
+        let by_mask = |fit: JointFit| -> Result<AlignReport, AlignError> {
+            let report = AlignConfig { starts: config.starts.clone(), ..self.mask.clone() }.run(scene, tool, ask)?;
+            Ok(AlignReport { joint: Some(fit), ..report })
+        };
+        if scene.images().is_empty() {
+            return by_mask(JointFit::by_mask(Basis::NoImage));
+        }
+        let Some(mut problem) = Problem::new(scene, tool, &config)? else {
+            return by_mask(JointFit::by_mask(Basis::NoZone));
+        };
+        let mut answer = problem.solve();
+        if answer.fit.explained < config.doubtful && problem.forget_mask() {
+            // A bad mask can lead all scouts away from what the membrane shows plainly.
+            let alone = problem.solve();
+            if alone.fit.explained > answer.fit.explained + config.explained {
+                answer = alone;
+            }
+        }
+        if answer.fit.explained < config.explained {
+            return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
+        }
+        Ok(problem.report(scene.yz(), answer))
+    }
+}

@@ -1,0 +1,237 @@
+//! What a pose costs: how far the membrane is from the template, and how far the mask from the silhouette.
+
+use glam::DVec2;
+
+use super::template::BandField;
+use crate::align::ANGLE_SCALE_M;
+use crate::align::TraceStep;
+use crate::align::batch::{Cloud, State, Sums};
+use crate::align::lanes::{LANES, Lattice};
+use crate::align::search::{Cost, Progress};
+use crate::field::DistanceField;
+use crate::tent::STEP_M;
+
+/// Least share of a point's curvature that counts where the kernel bends down.
+const FLAT: f32 = 0.1;
+
+/// Places of a membrane image with its band there; padded to whole steps.
+pub(super) struct Patch {
+    /// Places about a common center, in nodes.
+    y: Vec<f32>,
+    z: Vec<f32>,
+    /// Meters.
+    band: Vec<f32>,
+    len: usize,
+}
+
+impl Patch {
+    /// From places about a common center and the band there, both in meters.
+    pub(super) fn new(places: impl ExactSizeIterator<Item = (DVec2, f32)>) -> Self {
+        let len = places.len();
+        let padded = len.next_multiple_of(LANES);
+        let [mut y, mut z, mut band] = [(); 3].map(|()| Vec::with_capacity(padded));
+        for (place, value) in places {
+            y.push((place.x / STEP_M) as f32);
+            z.push((place.y / STEP_M) as f32);
+            band.push(value);
+        }
+        for list in [&mut y, &mut z, &mut band] {
+            list.resize(padded, 0.0);
+        }
+        Self { y, z, band, len }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+}
+
+/// Residuals of a step of lanes and how they change with the place: meters, and meters per node.
+struct Read {
+    ay: [f32; LANES],
+    az: [f32; LANES],
+    r: [f32; LANES],
+    gy: [f32; LANES],
+    gz: [f32; LANES],
+    template: [f32; LANES],
+}
+
+impl BandField {
+    fn read(&self, patch: &Patch, at: usize, state: State) -> Read {
+        let turn = DVec2::from_angle(state.phi);
+        let place = (state.place - self.origin) / STEP_M;
+        let (cos, sin) = (turn.x as f32, turn.y as f32);
+        let (place_y, place_z) = (place.x as f32, place.y as f32);
+        let span = at..at + LANES;
+        let (y, z, band) = (&patch.y[span.clone()], &patch.z[span.clone()], &patch.band[span]);
+        let zero = [0f32; LANES];
+        let mut read = Read { ay: zero, az: zero, r: zero, gy: zero, gz: zero, template: zero };
+        let (mut ty, mut tz) = (zero, zero);
+        for l in 0..LANES {
+            read.ay[l] = cos * y[l] - sin * z[l];
+            read.az[l] = sin * y[l] + cos * z[l];
+            ty[l] = read.ay[l] + place_y;
+            tz[l] = read.az[l] + place_z;
+        }
+        let lattice = Lattice { columns: self.field.columns, rows: self.field.rows, values: &self.field.values };
+        // Off the grid the border's value counts, which is next to nothing.
+        let at = lattice.locate(&ty, &tz);
+        let [a, b, c, d] = lattice.corners_of(&at);
+        for l in 0..LANES {
+            let (ab, cd) = (b[l] - a[l], d[l] - c[l]);
+            let (near, far) = (a[l] + ab * at.fy[l], c[l] + cd * at.fy[l]);
+            read.template[l] = near + (far - near) * at.fz[l];
+            read.r[l] = read.template[l] - band[l];
+            read.gy[l] = ab + (cd - ab) * at.fz[l];
+            read.gz[l] = far - near;
+        }
+        read
+    }
+
+    /// Cost, slope and curvature in one pass.
+    fn sums(&self, patch: &Patch, state: State, kernel_m: f64) -> Sums {
+        let kernel = kernel_m as f32;
+        let square = kernel * kernel;
+        let bend_scale = 4.0 / square;
+        let mut h = [[0f32; LANES]; 6];
+        let mut g = [[0f32; LANES]; 3];
+        let [mut cost, mut weight, mut inliers, mut squares] = [[0f32; LANES]; 4];
+        for at in (0..patch.y.len()).step_by(LANES) {
+            let Read { ay, az, r, gy, gz, .. } = self.read(patch, at, state);
+            let mut counts = [1f32; LANES];
+            if patch.len < at + LANES {
+                counts[patch.len - at..].fill(0.0);
+            }
+            for l in 0..LANES {
+                let r2 = r[l] * r[l];
+                let ratio = square / (square + r2);
+                let w = counts[l] * ratio * ratio;
+                cost[l] += counts[l] * r2 * ratio;
+                weight[l] += w;
+                let near = if r2 <= square { counts[l] } else { 0.0 };
+                inliers[l] += near;
+                squares[l] += near * r2;
+                let (j0, j1, j2) = (gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]);
+                let bend = 1.0 - bend_scale * r2 * ratio;
+                let bent = if bend > FLAT { bend } else { FLAT };
+                let (g0, g1, g2) = (w * j0, w * j1, w * j2);
+                let (w0, w1, w2) = (bent * g0, bent * g1, bent * g2);
+                h[0][l] += w0 * j0;
+                h[1][l] += w0 * j1;
+                h[2][l] += w0 * j2;
+                h[3][l] += w1 * j1;
+                h[4][l] += w1 * j2;
+                h[5][l] += w2 * j2;
+                g[0][l] += g0 * r[l];
+                g[1][l] += g1 * r[l];
+                g[2][l] += g2 * r[l];
+            }
+        }
+        let total = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
+        let slope = [1.0 / ANGLE_SCALE_M, 1.0 / STEP_M, 1.0 / STEP_M];
+        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        Sums {
+            h: std::array::from_fn(|i| total(h[i]) * slope[pairs[i].0] * slope[pairs[i].1]),
+            g: std::array::from_fn(|i| total(g[i]) * slope[i]),
+            cost: total(cost),
+            weight: total(weight),
+            inliers: total(inliers) as usize,
+            inlier_squares: total(squares),
+        }
+    }
+
+    /// Residuals at a state and the template there, meters.
+    pub(super) fn residuals(&self, patch: &Patch, state: State, mut each: impl FnMut(f32, f32)) {
+        for at in (0..patch.y.len()).step_by(LANES) {
+            let read = self.read(patch, at, state);
+            for l in 0..LANES.min(patch.len - at) {
+                each(read.r[l], read.template[l]);
+            }
+        }
+    }
+}
+
+/// The mask's part of the cost.
+#[derive(Clone, Copy)]
+pub(super) struct MaskPart<'a> {
+    pub(super) field: &'a DistanceField,
+    pub(super) cloud: &'a Cloud,
+    pub(super) kernel_m: f64,
+    /// How much it counts beside the membrane.
+    pub(super) weight: f64,
+}
+
+/// The joint cost of one band: the mean of the membrane's Geman-McClure costs plus `weight` times the mask's, both as
+/// shares of their squared kernel widths, so 0 to 1.
+pub(super) struct Joint<'a> {
+    /// The patch of each finger with its template.
+    pub(super) fingers: &'a [(&'a BandField, Patch)],
+    pub(super) kernel_m: f64,
+    pub(super) mask: Option<MaskPart<'a>>,
+    /// Look-ups so far.
+    pub(super) lookups: usize,
+}
+
+impl Joint<'_> {
+    pub(super) fn points(&self) -> usize {
+        self.fingers.iter().map(|(_, patch)| patch.len()).sum()
+    }
+}
+
+/// Adds `scale` times some sums to others.
+fn add(to: &mut Sums, sums: &Sums, scale: f64) {
+    to.h.iter_mut().zip(sums.h).for_each(|(to, h)| *to += scale * h);
+    to.g.iter_mut().zip(sums.g).for_each(|(to, g)| *to += scale * g);
+    to.cost += scale * sums.cost;
+    to.weight += scale * sums.weight;
+}
+
+impl Cost for Joint<'_> {
+    fn sums(&mut self, state: State) -> Sums {
+        let points = self.points();
+        self.lookups += points;
+        let mut all = Sums::default();
+        let scale = 1.0 / (self.kernel_m.powi(2) * points.max(1) as f64);
+        for (template, patch) in self.fingers {
+            let sums = template.sums(patch, state, self.kernel_m);
+            add(&mut all, &sums, scale);
+            all.inliers += sums.inliers;
+            all.inlier_squares += sums.inlier_squares;
+        }
+        if let Some(mask) = &self.mask {
+            self.lookups += mask.cloud.asked();
+            let sums = mask.field.sums(mask.cloud, state, mask.kernel_m);
+            add(&mut all, &sums, mask.weight / (mask.kernel_m.powi(2) * mask.cloud.len().max(1) as f64));
+        }
+        all
+    }
+}
+
+/// A joint cost whose steps are written down.
+pub(super) struct Noted<'j, 'a> {
+    pub(super) cost: &'j mut Joint<'a>,
+    pub(super) run: usize,
+    pub(super) centroid: DVec2,
+    pub(super) trace: Option<&'j mut Vec<TraceStep>>,
+}
+
+impl Cost for Noted<'_, '_> {
+    fn sums(&mut self, state: State) -> Sums {
+        self.cost.sums(state)
+    }
+
+    fn note(&mut self, at: &Progress, sums: &Sums) {
+        let (points, kernel_m) = (self.cost.points(), self.cost.kernel_m);
+        let Some(trace) = &mut self.trace else { return };
+        trace.push(TraceStep {
+            run: self.run,
+            iteration: at.iterations,
+            grasp_from_object: at.state.to_pose(self.centroid),
+            grasp_from_object_6dof: None,
+            cost_m2: sums.cost * kernel_m * kernel_m,
+            inlier_share: sums.inliers as f64 / points.max(1) as f64,
+            kernel_m,
+            points,
+        });
+    }
+}

@@ -1,0 +1,356 @@
+//! The search for the pose under which templates and silhouette fit the membranes and the mask.
+
+use std::sync::Arc;
+
+use glam::DVec2;
+
+use super::cost::{Joint, MaskPart, Noted, Patch};
+use super::image::Image;
+use super::smooth::BANDS;
+use super::template::{BandField, Template, template};
+use super::{Basis, JointConfig, JointFit};
+use crate::align::batch::{Cloud, State};
+use crate::align::observability::of_cloud;
+use crate::align::planar::fits;
+use crate::align::search::{Progress, Search, minimize};
+use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
+use crate::frames::PlanarPose;
+use crate::mesh::sampling::spread;
+use crate::tool::ToolModel;
+
+/// Smallest area of the membranes that is compared, square meters.
+const MIN_AREA_M2: f64 = 1e-4;
+/// Position in [`JointConfig::points`] of what decides the answer. It is in the finest band.
+const LAST: usize = 3;
+/// Kernels of the mask's own scouts, meters, wide to narrow.
+const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
+/// Angles of further starts as shares of the prior's, by rung.
+const MORE: [[f64; 2]; 2] = [[0.45, -0.45], [0.9, -0.9]];
+/// Steps that move no point by more than about this, meters, end the descents.
+const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
+
+/// Refuses settings that make no sense.
+pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
+    let bad = |what| Err(AlignError::Config { what });
+    let positive = |x: &f64| x.is_finite() && *x > 1e-6;
+    if config.starts.iter().any(|s| !s.is_finite()) {
+        return bad("starts");
+    }
+    if config.points.iter().chain(&config.mask_points).any(|n| *n < MIN_POINTS) {
+        return bad("points");
+    }
+    if !config.kernels_m.iter().chain(&config.mask_kernels_m).all(positive) {
+        return bad("kernels_m");
+    }
+    let weight = &config.weight;
+    if ![weight.scouts, weight.answer, weight.noise_m, weight.range[0], weight.agrees].iter().all(positive)
+        || weight.range[1] < weight.range[0]
+        || !weight.range[1].is_finite()
+    {
+        return bad("weight");
+    }
+    if config.max_iterations == 0 {
+        return bad("max_iterations");
+    }
+    Ok(())
+}
+
+/// A finger's image and its template.
+struct Finger {
+    image: Image,
+    template: Arc<Template>,
+}
+
+/// The patches of the fingers in one band.
+type Patches<'p> = Vec<(&'p BandField, Patch)>;
+
+/// A question prepared for every band.
+pub(super) struct Problem<'a> {
+    tool: &'a ToolModel,
+    config: &'a JointConfig,
+    fingers: Vec<Finger>,
+    /// Mean of the places of the membranes, about which everything turns, `(y, z)`, meters.
+    centroid: DVec2,
+    /// The mask's points for scouts and for the answer; `None` where they are too few.
+    mask: Option<[Cloud; 2]>,
+    not_finite: usize,
+}
+
+/// What was found.
+pub(super) struct Answer {
+    starts: Vec<PlanarPose>,
+    runs: Vec<Progress>,
+    winner: usize,
+    rung: Rung,
+    pub(super) fit: JointFit,
+    lookups: usize,
+    trace: Vec<TraceStep>,
+    points: usize,
+}
+
+/// Descents with what they cost and left behind.
+struct Descents<'p, 'a> {
+    problem: &'p Problem<'a>,
+    patches: [Patches<'p>; LAST + 1],
+    lookups: usize,
+    trace: Vec<TraceStep>,
+}
+
+impl Descents<'_, '_> {
+    /// Goes down on one band.
+    fn descend(&mut self, run: usize, at: &mut Progress, stage: usize, weight: f64) {
+        let config = self.problem.config;
+        let last = usize::from(stage == LAST);
+        let mask = self.problem.mask.as_ref().map(|clouds| MaskPart {
+            field: &self.problem.tool.field,
+            cloud: &clouds[last],
+            kernel_m: config.mask_kernels_m[last],
+            weight,
+        });
+        let mut joint = Joint { fingers: &self.patches[stage], kernel_m: config.kernels_m[stage], mask, lookups: 0 };
+        let trace = config.record.then_some(&mut self.trace);
+        let mut noted = Noted { cost: &mut joint, run, centroid: self.problem.centroid, trace };
+        let sums = minimize(&mut noted, at, config.max_iterations, STEPS_M[stage]);
+        (at.cost, at.inliers, at.inlier_squares) = (sums.cost, sums.inliers, sums.inlier_squares);
+        self.lookups += joint.lookups;
+    }
+
+    /// Through the bands from one start.
+    fn scout(&mut self, run: usize, at: &mut Progress, from: usize) {
+        for stage in from..LAST {
+            self.descend(run, at, stage, self.problem.config.weight.scouts);
+        }
+    }
+}
+
+/// Whether two ends are the same place, as far as scouts can tell.
+fn alike(a: &State, b: &State) -> bool {
+    const SAME_M: f64 = 6e-4;
+    (a.phi - b.phi).abs() * ANGLE_SCALE_M < SAME_M && a.place.distance(b.place) < SAME_M
+}
+
+impl<'a> Problem<'a> {
+    /// `None` if the membranes show too little of where they would meet, or the tool has nothing there.
+    pub(super) fn new(
+        scene: &Scene<'_>,
+        tool: &'a ToolModel,
+        config: &'a JointConfig,
+    ) -> Result<Option<Self>, AlignError> {
+        let finite = tool.mesh.vertices.iter().filter(|v| v.is_finite());
+        let tops = finite.fold([0f64; 2], |[low, high], v| [low.max(-v.x), high.max(v.x)]);
+        let images: Vec<Image> = scene.images().iter().filter_map(|image| Image::new(image, tops)).collect();
+        let area: f64 = images.iter().map(Image::area_m2).sum();
+        if area < MIN_AREA_M2 {
+            return Ok(None);
+        }
+        // The membranes of a gripper are alike: one free shape, the mean of all images.
+        let mean = |of: fn(&Image) -> f64| images.iter().map(|image| of(image) * image.area_m2()).sum::<f64>() / area;
+        let (curvature, floor_m) = (mean(|image| image.curvature), mean(|image| image.floor_m));
+        let fingers: Vec<Finger> = images
+            .into_iter()
+            .filter_map(|image| Some(Finger { template: template(tool, image.side, curvature, floor_m)?, image }))
+            .collect();
+        let places: Vec<DVec2> =
+            fingers.iter().flat_map(|finger| finger.image.sample(BANDS[0], 64).map(|(place, _)| place)).collect();
+        if places.is_empty() {
+            return Ok(None);
+        }
+        let centroid = places.iter().sum::<DVec2>() / places.len() as f64;
+        let cleaned = match clean(scene.yz(), MIN_POINTS) {
+            Ok(cleaned) => Some(cleaned),
+            Err(AlignError::TooFewPoints { .. } | AlignError::Coincident { .. }) => None,
+            Err(error) => return Err(error),
+        };
+        let not_finite = scene.yz().iter().filter(|p| !p.is_finite()).count();
+        let mask = cleaned.map(|cleaned| {
+            config.mask_points.map(|count| {
+                let points = &cleaned.points;
+                Cloud::new(spread(points.len(), count).into_iter().map(|i| points[i] - centroid))
+            })
+        });
+        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite }))
+    }
+
+    /// Leaves the mask out from now on; whether there was one.
+    pub(super) fn forget_mask(&mut self) -> bool {
+        self.mask.take().is_some()
+    }
+
+    /// The images as a stage compares them.
+    fn patches(&self, stage: usize) -> Patches<'_> {
+        let band = stage.min(BANDS.len() - 1);
+        let nodes: usize = self.fingers.iter().map(|finger| finger.image.len()).sum();
+        let patch = |finger: &Finger| {
+            let count = (self.config.points[stage] * finger.image.len()).div_ceil(nodes.max(1));
+            let places = finger.image.sample(BANDS[band], count);
+            Patch::new(places.map(|(place, value)| (place - self.centroid, value)))
+        };
+        self.fingers.iter().map(|finger| (&finger.template[band], patch(finger))).collect()
+    }
+
+    fn allowed(&self, at: &Progress) -> bool {
+        self.config.mask.prior.allows(at.state.to_pose(self.centroid))
+    }
+
+    /// Two scouts from the middle of the prior, one by the bands and one by the mask; two more, and two more, while the best
+    /// is alone, has a rival of nearly its cost elsewhere, or lies where no gripper holds a tool. Then the best two are
+    /// refined.
+    pub(super) fn solve(&self) -> Answer {
+        let config = self.config;
+        let own = config.starts.is_empty();
+        let mut starts = if own { vec![PlanarPose::default()] } else { config.starts.clone() };
+        let patches = std::array::from_fn(|stage| self.patches(stage));
+        let mut descents = Descents { problem: self, patches, lookups: 0, trace: Vec::new() };
+        let mut runs: Vec<Progress> = Vec::new();
+        let mut rung = if own { Rung::Single } else { Rung::Fixed };
+        let mut more = MORE.iter().filter(|_| own);
+        let order = loop {
+            for start in &starts[runs.len()..] {
+                let mut at = Progress::new(State::from_pose(*start, self.centroid));
+                descents.scout(runs.len(), &mut at, 0);
+                runs.push(at);
+            }
+            if rung == Rung::Single
+                && let Some(mut at) = self.mask_scout(&mut descents.lookups)
+            {
+                descents.scout(runs.len(), &mut at, 1);
+                runs.push(at);
+                starts.push(PlanarPose::default());
+            }
+            let order = self.order(&runs);
+            let best = &runs[order[0]];
+            let (met, apart): (Vec<&Progress>, Vec<&Progress>) =
+                runs.iter().partition(|at| alike(&at.state, &best.state));
+            let rival = apart.iter().any(|at| at.cost < best.cost * (1.0 + config.close));
+            if self.allowed(best) && met.len() > 1 && !rival {
+                break order;
+            }
+            let Some(shares) = more.next() else { break order };
+            rung = Rung::Several;
+            let theta_rad = config.mask.prior.theta_rad;
+            starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
+        };
+        let best = runs[order[0]];
+        let (noise_m, explained) = self.told(&descents.patches[LAST], best.state);
+        let mask_weight = self.mask_weight(noise_m, best.state);
+        let winner = self.refine(&mut runs, &order, &mut descents, mask_weight);
+        let fit = JointFit {
+            basis: if self.mask.is_some() { Basis::Both } else { Basis::Membrane },
+            noise_m,
+            mask_weight,
+            area_m2: self.fingers.iter().map(|finger| finger.image.area_m2()).sum(),
+            explained,
+        };
+        let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
+        let Descents { lookups, trace, .. } = descents;
+        Answer { starts, runs, winner, rung, fit, lookups, trace, points }
+    }
+
+    /// Runs by preference: within the prior before outside, then the cheaper one.
+    fn order(&self, runs: &[Progress]) -> Vec<usize> {
+        let mut order: Vec<usize> = (0..runs.len()).collect();
+        order.sort_by(|&a, &b| {
+            let (a, b) = (&runs[a], &runs[b]);
+            self.allowed(b).cmp(&self.allowed(a)).then_with(|| a.cost.total_cmp(&b.cost))
+        });
+        order
+    }
+
+    /// Where the mask alone leads from the middle of the prior.
+    fn mask_scout(&self, lookups: &mut usize) -> Option<Progress> {
+        let [scouts, _] = self.mask.as_ref()?;
+        let mut search = Search::new(&self.tool.field, self.centroid, self.config.max_iterations, false);
+        let from = [State::from_pose(PlanarPose::default(), self.centroid)];
+        let found = search.scout(&from, scouts, &MASK_SCOUTS_M).pop();
+        *lookups += search.lookups;
+        found
+    }
+
+    /// Refines the best two scouts that are apart and cost about the same; which is the best.
+    fn refine(&self, runs: &mut [Progress], order: &[usize], descents: &mut Descents<'_, '_>, weight: f64) -> usize {
+        let limit = runs[order[0]].cost * (1.0 + self.config.close);
+        let mut refined: Vec<usize> = Vec::with_capacity(2);
+        for &run in order {
+            let at = runs[run];
+            let worth = at.cost <= limit && self.allowed(&at) == self.allowed(&runs[order[0]]);
+            if refined.is_empty() || worth && refined.len() < 2 && !alike(&runs[refined[0]].state, &at.state) {
+                descents.descend(run, &mut runs[run], LAST, weight);
+                refined.push(run);
+            }
+        }
+        refined.into_iter().min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost)).unwrap_or(0)
+    }
+
+    /// 1.48 times the median residual at a state (meters), and which share of the relief the template explains there.
+    fn told(&self, patches: &Patches<'_>, state: State) -> (f64, f64) {
+        let square = self.config.kernels_m[LAST].powi(2) as f32;
+        let capped = |r: f32| f64::from(r * r / (square + r * r));
+        let (mut residuals, mut left, mut relief) = (Vec::new(), 0.0, 0.0);
+        for (template, patch) in patches {
+            template.residuals(patch, state, |r, template| {
+                residuals.push(r.abs());
+                left += capped(r);
+                relief += capped(template - r);
+            });
+        }
+        if residuals.is_empty() {
+            return (0.0, 0.0);
+        }
+        let middle = residuals.len() / 2;
+        let (_, median, _) = residuals.select_nth_unstable_by(middle, f32::total_cmp);
+        (1.48 * f64::from(*median), if relief > 0.0 { 1.0 - left / relief } else { 0.0 })
+    }
+
+    /// How much the mask counts for the answer.
+    fn mask_weight(&self, noise_m: f64, state: State) -> f64 {
+        let Some([_, cloud]) = &self.mask else { return 0.0 };
+        let (weight, kernel) = (&self.config.weight, self.config.mask_kernels_m[1]);
+        let cost = self.tool.field.sums(cloud, state, kernel).cost / (kernel * kernel * cloud.len().max(1) as f64);
+        let by_noise = weight.answer * (noise_m / weight.noise_m).powi(4);
+        by_noise.clamp(weight.range[0], weight.range[1]) * (weight.agrees / cost.max(1e-9)).min(1.0)
+    }
+
+    pub(super) fn report(&self, points_yz: &[DVec2], answer: Answer) -> AlignReport {
+        let config = self.config;
+        let best = answer.runs[answer.winner];
+        let pose = best.state.to_pose(self.centroid);
+        let seen = self.mask.as_ref().map(|[_, cloud]| of_cloud(cloud, self.centroid, &self.tool.field, best.state));
+        let square = config.kernels_m[LAST].powi(2);
+        let run = |(run, start): (&Progress, &PlanarPose)| Run {
+            requested: *start,
+            start: *start,
+            end: run.state.to_pose(self.centroid),
+            cost_m2: run.cost * square,
+            iterations: run.iterations,
+            stop: run.stop,
+        };
+        let runs: Vec<Run> = answer.runs.iter().zip(&answer.starts).map(run).collect();
+        let fits =
+            if config.record { fits(points_yz, &self.tool.field, pose, config.mask_kernels_m[1]) } else { Vec::new() };
+        AlignReport {
+            grasp_from_object: pose,
+            grasp_from_object_6dof: None,
+            converged: best.stop.converged(),
+            stop: best.stop,
+            start: answer.starts[answer.winner],
+            winner: answer.winner,
+            rung: answer.rung,
+            ladder: Vec::new(),
+            certificate: None,
+            iterations: runs.iter().map(|run| run.iterations).sum(),
+            lookups: answer.lookups,
+            offered: points_yz.len(),
+            not_finite: self.not_finite,
+            used: answer.points,
+            inlier_share: best.inliers as f64 / answer.points.max(1) as f64,
+            inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
+            within_prior: config.mask.prior.allows(pose),
+            observability: seen,
+            joint: Some(answer.fit),
+            directions: None,
+            trace: answer.trace,
+            fits,
+            runs,
+        }
+    }
+}

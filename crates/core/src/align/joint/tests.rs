@@ -1,0 +1,170 @@
+use glam::{DVec2, DVec3};
+
+use super::cost::{Joint, MaskPart, Patch};
+use super::smooth::BANDS;
+use super::template::template;
+use super::*;
+use crate::align::batch::{Cloud, State};
+use crate::align::search::Cost;
+use crate::align::{Contacts, PadImage};
+use crate::catalog::tools;
+use crate::cloud::lift;
+use crate::grid::{DepthMap, Mask};
+use crate::rig::lab;
+use crate::sample::DepthCamera;
+use crate::sim::{SimConfig, random_grasp, simulate};
+use crate::units::angle_error;
+
+/// A touch of the simulator: imprints, cameras and true contact of both fingers, the tool and the pose.
+struct Touch {
+    imprints: [DepthMap; 2],
+    cameras: [DepthCamera; 2],
+    masks: [Mask; 2],
+    tool: ToolModel,
+    truth: PlanarPose,
+}
+
+impl Touch {
+    fn new(tool: usize, seed: u64) -> Self {
+        let sample = simulate(&tools()[tool], random_grasp(seed), seed, &SimConfig::default());
+        let touch = |f: usize| sample.pad(lab::PADS[f]).unwrap().depth().unwrap();
+        Self {
+            imprints: [0, 1].map(|f| touch(f).imprint.clone()),
+            cameras: [0, 1].map(|f| touch(f).camera.clone().unwrap()),
+            masks: [0, 1].map(|f| touch(f).truth.as_ref().unwrap().contact.clone()),
+            tool: ToolModel::new(tools()[tool].mesh()).unwrap(),
+            truth: sample.grasp_from_object.unwrap(),
+        }
+    }
+
+    fn points(&self) -> Vec<DVec3> {
+        (0..2).flat_map(|f| lift(&self.imprints[f], &self.cameras[f], Some(&self.masks[f])).unwrap().points).collect()
+    }
+
+    fn images(&self) -> Vec<PadImage<'_>> {
+        (0..2).map(|f| PadImage { imprint: &self.imprints[f], camera: &self.cameras[f] }).collect()
+    }
+
+    fn by(&self, method: &dyn Register) -> Result<AlignReport, AlignError> {
+        let contacts = Contacts { points: &self.points(), images: &self.images() };
+        method.run(&Scene::new(contacts), &self.tool, Ask::default())
+    }
+
+    fn error_deg(&self, report: &AlignReport) -> f64 {
+        angle_error(report.grasp_from_object.theta_rad, self.truth.theta_rad).abs().to_degrees()
+    }
+}
+
+#[test]
+fn a_foreign_body_in_the_mask_turns_the_masks_pose_and_hardly_this_one() {
+    let (mut mask_worst, mut joint_worst) = (0f64, 0f64);
+    for (tool, seed) in [(0, 3), (3, 4), (7, 5)] {
+        let mut touch = Touch::new(tool, seed);
+        for mask in &mut touch.masks {
+            for y in 0..60 {
+                for x in 0..90 {
+                    mask[(x, y)] = true;
+                }
+            }
+        }
+        let joint = touch.by(&JointConfig::default()).unwrap();
+        assert_eq!(joint.joint.unwrap().basis, Basis::Both);
+        joint_worst = joint_worst.max(touch.error_deg(&joint));
+        mask_worst = mask_worst.max(touch.error_deg(&touch.by(&AlignConfig::default()).unwrap()));
+    }
+    assert!(joint_worst < 2.5 && mask_worst > 2.0 * joint_worst, "{joint_worst} {mask_worst}");
+}
+
+#[test]
+fn without_a_mask_the_membrane_answers_and_the_order_of_the_fingers_is_nothing() {
+    let mut touch = Touch::new(3, 8);
+    touch.masks.iter_mut().for_each(|mask| mask.as_mut_slice().fill(false));
+    let found = touch.by(&JointConfig::default()).unwrap();
+    assert_eq!(found.joint.unwrap().basis, Basis::Membrane);
+    assert!(touch.error_deg(&found) < 2.0, "{}", touch.error_deg(&found));
+    assert_eq!(found, touch.by(&JointConfig::default()).unwrap(), "the same bits");
+    touch.imprints.reverse();
+    touch.cameras.reverse();
+    let swapped = touch.by(&JointConfig::default()).unwrap();
+    assert!(touch.error_deg(&swapped) < 2.0);
+    assert!(angle_error(swapped.grasp_from_object.theta_rad, found.grasp_from_object.theta_rad).abs() < 5e-3);
+}
+
+#[test]
+fn where_the_membrane_says_nothing_the_mask_answers_bit_for_bit_and_it_is_said() {
+    let touch = Touch::new(0, 3);
+    let by_mask = touch.by(&AlignConfig::default()).unwrap();
+    let same = |touch: &Touch, images: &[PadImage<'_>], basis: Basis| {
+        let contacts = Contacts { points: &touch.points(), images };
+        let found = JointConfig::default().run(&Scene::new(contacts), &touch.tool, Ask::default()).unwrap();
+        assert_eq!(found.joint.unwrap().basis, basis);
+        assert_eq!(AlignReport { joint: None, ..found }, by_mask);
+    };
+    same(&touch, &[], Basis::NoImage);
+    let nothing = DepthMap::filled(175, 140, f32::NAN);
+    let image = |imprint, f: usize| PadImage { imprint, camera: &touch.cameras[f] };
+    same(&touch, &[image(&nothing, 0), image(&nothing, 1)], Basis::NoZone);
+    let small = DepthMap::filled(5, 4, 0.0);
+    same(&touch, &[image(&small, 0)], Basis::NoZone);
+    let mut lost = touch.cameras[0].clone();
+    lost.grasp_from_camera.translation.x = f64::NAN;
+    same(&touch, &[PadImage { imprint: &touch.imprints[0], camera: &lost }], Basis::NoZone);
+    let mut empty = touch.cameras[0].clone();
+    empty.depth_reference.as_mut_slice().fill(f32::INFINITY);
+    same(&touch, &[PadImage { imprint: &touch.imprints[0], camera: &empty }], Basis::NoZone);
+    // Membranes that nothing pushed in: where they would pass the middle plane they stop there.
+    let free = [0, 1].map(|f: usize| {
+        let camera = &touch.cameras[f];
+        DepthMap::from_fn(175, 140, |x, y| {
+            let reference = camera.depth_reference[(x, y)];
+            let direction = camera.grasp_from_camera.matrix3 * camera.lift(x as f64, y as f64, 1.0);
+            let plane = (-camera.grasp_from_camera.translation.x / direction.x) as f32;
+            (reference - plane).max(0.0)
+        })
+    });
+    same(&touch, &[image(&free[0], 0), image(&free[1], 1)], Basis::LittleContact);
+}
+
+#[test]
+fn most_pixels_can_be_missing_or_absurd() {
+    let mut touch = Touch::new(3, 4);
+    for (f, imprint) in touch.imprints.iter_mut().enumerate() {
+        for (i, value) in imprint.as_mut_slice().iter_mut().enumerate() {
+            match (i * 7919 + f) % 11 {
+                0..4 => *value = f32::NAN,
+                4 => *value = f32::INFINITY,
+                5 => *value = -1e30,
+                6 => *value = touch.cameras[f].depth_reference.as_slice()[i],
+                _ => {}
+            }
+        }
+    }
+    let found = touch.by(&JointConfig::default()).unwrap();
+    assert!(touch.error_deg(&found) < 2.5, "{}", touch.error_deg(&found));
+    let no_sense = JointConfig { points: [0; 4], ..JointConfig::default() };
+    assert_eq!(touch.by(&no_sense), Err(AlignError::Config { what: "points" }));
+}
+
+#[test]
+fn the_slope_of_the_joint_cost_is_its_derivative() {
+    let touch = Touch::new(0, 3);
+    let template = template(&touch.tool, 1.0, 20.0, 0.0).unwrap();
+    let places = (0..200).map(|i| {
+        let place = DVec2::new(f64::from(i % 20) - 10.0, f64::from(i / 20) - 5.0) * 1.3e-3;
+        (place, 2e-4 * (i % 7) as f32 - 4e-4)
+    });
+    let fingers = [(&template[BANDS.len() - 1], Patch::new(places.collect::<Vec<_>>().into_iter()))];
+    let cloud = Cloud::new((0..96).map(|i| DVec2::new(f64::from(i % 12) - 4.0, f64::from(i / 12)) * 1.7e-3));
+    let mask = MaskPart { field: &touch.tool.field, cloud: &cloud, kernel_m: 1e-3, weight: 0.1 };
+    let mut joint = Joint { fingers: &fingers, kernel_m: 5e-4, mask: Some(mask), lookups: 0 };
+    // Bilinear look-ups have kinks: the mean slope over a step within which few points pass one.
+    let state = State { phi: 0.1, place: DVec2::new(1.1e-3, -7e-4) };
+    let step = 4e-6;
+    for axis in 0..3 {
+        let moved = |by: f64| state.moved(std::array::from_fn(|i| if i == axis { by } else { 0.0 }));
+        let numeric = (joint.sums(moved(step)).cost - joint.sums(moved(-step)).cost) / (2.0 * step);
+        let analytic = 2.0 * joint.sums(state).g[axis];
+        assert!((numeric - analytic).abs() < 0.03 * analytic.abs() + 0.3, "{axis}: {numeric} {analytic}");
+    }
+    assert_eq!(joint.lookups, 9 * 296);
+}
