@@ -115,7 +115,8 @@ impl<'a> Worker<'a> {
         latency.mask = ms(step);
         let step = Instant::now();
         let felt = felt.reach(touch, Stage::Pose, &self.models, &cx)?;
-        let (pose, no_pose) = match (tool, felt.pose()) {
+        // Without a tool, that is the reason, whatever else is missing.
+        let (pose, no_pose) = match (tool, touch.tool.and(felt.pose())) {
             (Some(name), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
             (_, Err(err)) => (None, Some(err.why.clone())),
             (None, Ok(_)) => (None, None),

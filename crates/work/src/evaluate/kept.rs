@@ -207,7 +207,8 @@ fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &Method) -> 
         version: VERSION,
         program: program(),
         stored: matches!(method, Method::Stored),
-        recipe: Recipe { engine, ..recipe }.id(Stage::Pose),
+        // Drawn masks are in the key of the grasp.
+        recipe: Recipe { engine, hand: true, ..recipe }.id(Stage::Pose),
         classifier: models.classifier_hash(),
         engine: models.engine(),
         finger: setup.finger,
