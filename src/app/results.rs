@@ -95,7 +95,7 @@ pub(crate) use pose::{Registered, registered, want_pose, want_pose_table};
 pub use pose::{pose, pose_key, pose_of, provisional_pose};
 pub(crate) use prediction::{hold, keep_prediction, want_other_finger, want_stored};
 pub(crate) use prefetch::{prefetch, want_predictions_ahead};
-pub use preview::{Onlooker, PreviewRequest, preview, preview_wish};
+pub use preview::{Onlooker, PreviewRequest, preview, preview_request};
 pub(crate) use proposal::want_proposal;
 pub use proposal::{proposal, proposal_key, shown_proposal};
 pub(crate) use run::run_key;

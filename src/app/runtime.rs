@@ -1,4 +1,4 @@
-//! [`Runtime`]: turns effects and wishes into jobs on lanes, and their answers into commands.
+//! [`Runtime`]: turns effects and requests into jobs on lanes, and their answers into commands.
 
 mod follow;
 mod lanes;
@@ -67,7 +67,7 @@ pub struct Runtime {
     /// Pictures on the way, only the latest of each touch.
     previews: Arc<std::sync::Mutex<LatestPreviews>>,
     /// The part of them that would be looked at.
-    preview_wish: Arc<std::sync::Mutex<PreviewRequest>>,
+    preview_request: Arc<std::sync::Mutex<PreviewRequest>>,
     wake: Wake,
     cancels: BTreeMap<Ticket, Cancel>,
     follower: Option<follow::FollowTask>,
@@ -99,7 +99,7 @@ impl Runtime {
             sender,
             progress: Arc::default(),
             previews: Arc::default(),
-            preview_wish: Arc::default(),
+            preview_request: Arc::default(),
             wake,
             cancels: BTreeMap::new(),
             follower: None,
@@ -146,9 +146,9 @@ impl Runtime {
             self.run(state, command, &mut ui);
         }
         self.retry(state, &mut ui);
-        let wish = results::preview_wish(state);
-        if wish != *lock(&self.preview_wish) {
-            *lock(&self.preview_wish) = wish;
+        let request = results::preview_request(state);
+        if request != *lock(&self.preview_request) {
+            *lock(&self.preview_request) = request;
         }
         let wanted = demand::demands(state);
         if wanted != state.tasks.demanded {

@@ -102,7 +102,7 @@ pub trait DataSource: Send + Sync {
     fn save_labels(&self, name: &str, labels: &PairLabels, deed: &Operation) -> Result<Option<PairLabels>, TaskError>;
 
     /// Writes labels that could not be written where they belong into a folder; `None` = where they wait for the next opening.
-    /// Where they are then.
+    /// Returns the place where they are then.
     ///
     /// # Errors
     /// If they cannot be written there either.

@@ -157,7 +157,7 @@ fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models
     let cx = JobCx::unwatched();
     let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
     let made_from = subject.made_from(|generator| {
-        let own_mapping = subject.wish().is_some_and(|wish| wish.shift.is_some());
+        let own_mapping = subject.change().is_some_and(|change| change.shift.is_some());
         let model = if own_mapping { args.model.without_mapping() } else { args.model.clone() };
         let model = generator.map_or_else(|| model.clone(), |name| model.with_generator(name));
         recipe(&model, ImprintSource::Predicted)

@@ -80,7 +80,7 @@ struct Both {
     studio: Studio,
     /// The place as a verb takes it.
     path: String,
-    /// Where the verbs keep and write.
+    /// Folder in which the verbs keep and write.
     home: PathBuf,
 }
 
@@ -137,7 +137,7 @@ impl Both {
         self.home.join(name).to_str().unwrap().to_owned()
     }
 
-    /// What a verb answers; `Err` is what it says instead.
+    /// Answer of a verb; `Err` is what it says instead.
     fn run(&self, words: &[String]) -> Result<Value, String> {
         let mut words: Vec<&str> = words.iter().map(String::as_str).collect();
         // Some commands say it themselves.
@@ -151,7 +151,7 @@ impl Both {
         answer.ok_or_else(|| String::from_utf8_lossy(&output.stderr).into_owned())
     }
 
-    /// What the command of a pane answers.
+    /// Answer of the command of a pane.
     fn said(&self, pane: Pane) -> Result<Value, String> {
         self.run(&self.words(pane))
     }
@@ -169,7 +169,7 @@ fn written(value: &(impl Serialize + ?Sized)) -> Value {
     serde_json::from_str(&serde_json::to_string(value).unwrap()).unwrap()
 }
 
-/// How many numbers there are in a value.
+/// Count of the numbers in a value.
 fn numbers(value: &Value) -> usize {
     match value {
         Value::Number(_) => 1,
@@ -179,7 +179,7 @@ fn numbers(value: &Value) -> usize {
     }
 }
 
-/// Where two values differ first.
+/// First place at which two values differ.
 fn difference(shown: &Value, said: &Value, at: &str) -> Option<String> {
     match (shown, said) {
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {

@@ -6,7 +6,7 @@ use super::random::{chain, compared, files, labels, posed, tables, watched};
 use super::{exchange, influence, proposals, recipes};
 use crate::support::run;
 
-/// How a verb is held against the studio.
+/// Comparison of a verb with the studio.
 enum Held {
     /// By these tests.
     By(&'static [fn()]),
@@ -14,7 +14,7 @@ enum Held {
     Not(&'static str),
 }
 
-/// What learns is built with the feature `tune`.
+/// Learning is built with the feature `tune`.
 mod learned {
     #[cfg(feature = "tune")]
     pub(super) const TESTS: [fn(); 2] = [

@@ -64,7 +64,7 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     person.click(&other);
     let versus = person.state().settings.compared();
     assert_eq!(versus.a, Subject::shown());
-    assert_eq!(versus.b.wish().and_then(|wish| wish.bundle.clone()), Some(other));
+    assert_eq!(versus.b.change().and_then(|change| change.bundle.clone()), Some(other));
     let found =
         results::subjects_compared(person.state(), &versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
     assert!(found.mae_m > 0.0);

@@ -264,7 +264,7 @@ fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, CloudError> {
     contact_points(&case.imprints, &case.cameras, masks)
 }
 
-/// What the cameras of both fingers saw.
+/// Views of the cameras of both fingers.
 fn images(case: &Case) -> [PadImage<'_>; 2] {
     std::array::from_fn(|f| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f] })
 }

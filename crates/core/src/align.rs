@@ -384,7 +384,7 @@ pub struct AlignReport {
     pub within_prior: bool,
     /// Observability: how well the points determine the pose; `None` if the engine had no field to tell from.
     pub observability: Option<Observability>,
-    /// How the membrane was used, from the registration that uses it.
+    /// Use of the membrane, from the registration that uses it.
     pub joint: Option<JointFit>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,

@@ -115,7 +115,7 @@ pub(crate) fn tent(heights: &Sheet, curvature: f64) -> Sheet {
     Sheet { field, origin: heights.origin }
 }
 
-/// What the slopes of a sheet add to its load.
+/// Addition of a sheet's slopes to its load.
 fn bending(sheet: &Field, load: f32) -> Field {
     let (columns, rows) = (sheet.columns, sheet.rows);
     let mut more = Field::filled(columns, rows, 0.0);

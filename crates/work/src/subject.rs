@@ -113,9 +113,9 @@ impl Subject {
     }
 
     /// Changes to the recipe, where something is predicted for it.
-    pub fn wish(&self) -> Option<&RecipeChange> {
+    pub fn change(&self) -> Option<&RecipeChange> {
         match self {
-            Self::Predicted(wish) | Self::Mean(wish, _) => Some(wish),
+            Self::Predicted(change) | Self::Mean(change, _) => Some(change),
             Self::Measured | Self::Stored => None,
         }
     }
@@ -142,13 +142,13 @@ impl Subject {
             Self::Predicted(_) => "Prediction".to_owned(),
             Self::Mean(_, seeds) => format!("Mean of {seeds} seeds"),
         };
-        let wish = self.wish().cloned().unwrap_or_default();
+        let change = self.change().cloned().unwrap_or_default();
         let parts = [
             Some(base),
-            wish.bundle,
-            wish.seed.map(|seed| format!("seed {seed}")),
-            wish.steps.map(|steps| format!("{steps} steps")),
-            wish.shift.map(|shift| shift.mode().label().to_lowercase()),
+            change.bundle,
+            change.seed.map(|seed| format!("seed {seed}")),
+            change.steps.map(|steps| format!("{steps} steps")),
+            change.shift.map(|shift| shift.mode().label().to_lowercase()),
         ];
         parts.into_iter().flatten().collect::<Vec<_>>().join(" · ")
     }
@@ -162,13 +162,13 @@ impl std::fmt::Display for Subject {
             Self::Predicted(_) => ("prediction", None),
             Self::Mean(_, seeds) => ("mean", Some(format!("seeds={seeds}"))),
         };
-        let wish = self.wish().cloned().unwrap_or_default();
+        let change = self.change().cloned().unwrap_or_default();
         let parts = [
             seeds,
-            wish.bundle.map(|bundle| format!("bundle={bundle}")),
-            wish.seed.map(|seed| format!("seed={seed}")),
-            wish.steps.map(|steps| format!("steps={steps}")),
-            wish.shift.map(|shift| format!("shift={}", shift.key())),
+            change.bundle.map(|bundle| format!("bundle={bundle}")),
+            change.seed.map(|seed| format!("seed={seed}")),
+            change.steps.map(|steps| format!("steps={steps}")),
+            change.shift.map(|shift| format!("shift={}", shift.key())),
         ];
         let parts: Vec<String> = parts.into_iter().flatten().collect();
         let colon = if parts.is_empty() { "" } else { ":" };
@@ -182,25 +182,27 @@ impl FromStr for Subject {
     fn from_str(text: &str) -> Result<Self, String> {
         use strum::IntoEnumIterator as _;
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
-        let (mut wish, mut seeds) = (RecipeChange::default(), None);
+        let (mut change, mut seeds) = (RecipeChange::default(), None);
         for part in rest.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let (key, value) = part.split_once('=').ok_or_else(|| format!("\"{part}\" is not KEY=VALUE"))?;
             let wrong = || format!("{key} cannot be \"{value}\"");
             match key.trim() {
-                "bundle" => wish.bundle = Some(value.to_owned()),
-                "seed" => wish.seed = Some(value.parse().map_err(|_| wrong())?),
-                "steps" => wish.steps = Some(value.parse().ok().filter(|n| (1..=1000).contains(n)).ok_or_else(wrong)?),
-                "shift" => wish.shift = Some(Mapping::iter().find(|m| m.key() == value).ok_or_else(wrong)?),
+                "bundle" => change.bundle = Some(value.to_owned()),
+                "seed" => change.seed = Some(value.parse().map_err(|_| wrong())?),
+                "steps" => {
+                    change.steps = Some(value.parse().ok().filter(|n| (1..=1000).contains(n)).ok_or_else(wrong)?)
+                }
+                "shift" => change.shift = Some(Mapping::iter().find(|m| m.key() == value).ok_or_else(wrong)?),
                 "seeds" => seeds = Some(value.parse().ok().filter(|n| SEEDS.contains(n)).ok_or_else(wrong)?),
                 _ => return Err(format!("{key} is none of bundle, seed, steps, shift, seeds")),
             }
         }
-        let nothing_else = wish == RecipeChange::default() && seeds.is_none();
+        let nothing_else = change == RecipeChange::default() && seeds.is_none();
         match name.trim() {
             "measured" if nothing_else => Ok(Self::Measured),
             "stored" if nothing_else => Ok(Self::Stored),
-            "prediction" if seeds.is_none() => Ok(Self::Predicted(wish)),
-            "mean" => Ok(Self::Mean(wish, seeds.unwrap_or(8))),
+            "prediction" if seeds.is_none() => Ok(Self::Predicted(change)),
+            "mean" => Ok(Self::Mean(change, seeds.unwrap_or(8))),
             "measured" | "stored" | "prediction" => Err(format!("{name} has no such choice: {rest}")),
             _ => Err(format!("\"{name}\" is none of measured, prediction, mean, stored")),
         }
@@ -227,7 +229,7 @@ mod tests {
 
     #[test]
     fn what_is_written_is_read() {
-        let wish = RecipeChange {
+        let change = RecipeChange {
             bundle: Some("fitted".into()),
             steps: Some(50),
             seed: Some(u64::MAX),
@@ -237,8 +239,8 @@ mod tests {
             Subject::Measured,
             Subject::Stored,
             Subject::shown(),
-            Subject::Predicted(wish.clone()),
-            Subject::Mean(wish, 4),
+            Subject::Predicted(change.clone()),
+            Subject::Mean(change, 4),
         ];
         for subject in subjects {
             assert_eq!(subject.to_string().parse::<Subject>().unwrap(), subject);

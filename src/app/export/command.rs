@@ -162,16 +162,16 @@ pub fn equivalent(state: &State, pane: Pane, error_m: f32) -> Option<String> {
 
 /// A subject with the folder of its bundle in place of the bundle's name.
 fn placed(state: &State, subject: &Subject) -> Subject {
-    let placed = |wish: &RecipeChange| {
-        let bundle = wish.bundle.as_ref().map(|name| {
+    let placed = |change: &RecipeChange| {
+        let bundle = change.bundle.as_ref().map(|name| {
             let found = state.library.bundles.iter().find(|bundle| bundle.name == *name);
             found.map_or_else(|| name.clone(), |bundle| bundle.origin.path().display().to_string())
         });
-        RecipeChange { bundle, ..wish.clone() }
+        RecipeChange { bundle, ..change.clone() }
     };
     match subject {
-        Subject::Predicted(wish) => Subject::Predicted(placed(wish)),
-        Subject::Mean(wish, seeds) => Subject::Mean(placed(wish), *seeds),
+        Subject::Predicted(change) => Subject::Predicted(placed(change)),
+        Subject::Mean(change, seeds) => Subject::Mean(placed(change), *seeds),
         other => other.clone(),
     }
 }

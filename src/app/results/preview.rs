@@ -34,7 +34,7 @@ impl PreviewRequest {
 #[derive(Clone)]
 pub struct Onlooker {
     /// The pictures that would be looked at now.
-    pub wish: Arc<Mutex<PreviewRequest>>,
+    pub request: Arc<Mutex<PreviewRequest>>,
     /// Receives it.
     pub sink: PreviewSink,
 }
@@ -53,8 +53,8 @@ struct Watched {
 
 impl Previews for Watched {
     fn wants(&self, item: usize, step: u32) -> Option<ShiftMode> {
-        let wish = self.by.wish.lock().unwrap_or_else(PoisonError::into_inner);
-        wish.wants(self.items.get(item)?.touch, step).then_some(wish.shift)
+        let request = self.by.request.lock().unwrap_or_else(PoisonError::into_inner);
+        request.wants(self.items.get(item)?.touch, step).then_some(request.shift)
     }
 
     fn show(&self, item: usize, picture: PreviewPicture) {
@@ -70,7 +70,7 @@ pub fn preview(state: &State, finger: PadId) -> Option<&Arc<Preview>> {
 }
 
 /// The pictures of predictions under way that would be looked at: the predicted imprints on screen, unless a pen is on them.
-pub fn preview_wish(state: &State) -> PreviewRequest {
+pub fn preview_request(state: &State) -> PreviewRequest {
     let shown = state.needs(Demand::Imprint(ImprintSource::Predicted)) && state.document.stroke.is_none();
     let touches = match state.pair_key().filter(|_| shown) {
         Some(pair) => state.fingers().into_iter().map(|finger| pair.finger(finger)).collect(),

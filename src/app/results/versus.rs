@@ -115,7 +115,7 @@ impl Computes for CloudDifferenceKey {
 fn side_of(subject: &Subject) -> Option<ImprintSource> {
     match subject {
         Subject::Measured => Some(ImprintSource::Measured),
-        Subject::Predicted(wish) if *wish == RecipeChange::default() => Some(ImprintSource::Predicted),
+        Subject::Predicted(change) if *change == RecipeChange::default() => Some(ImprintSource::Predicted),
         _ => None,
     }
 }
@@ -152,7 +152,7 @@ pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<Im
     match subject {
         Subject::Measured => results::imprint_key(state, ImprintSource::Measured, finger),
         // The one that the other panes show, made by whatever settings.
-        Subject::Predicted(wish) if *wish == RecipeChange::default() => {
+        Subject::Predicted(change) if *change == RecipeChange::default() => {
             results::imprint_key(state, ImprintSource::Predicted, finger)
         }
         Subject::Predicted(_) => {

@@ -64,7 +64,7 @@ impl Runtime {
             lock(&latest).insert(preview.recipe.touch, (ticket, Arc::new(preview)));
             wake();
         });
-        let onlooker = Onlooker { wish: self.preview_wish.clone(), sink };
+        let onlooker = Onlooker { request: self.preview_request.clone(), sink };
         let access = Access { services: self.services.clone(), onlooker };
         let body: Body<Answer> = Box::new(move |cx| Ok(Answer::Ended(ticket, body(&access, cx)?)));
         let failed = Box::new(move |err| Answer::TaskFailed(ticket, err));

@@ -54,42 +54,42 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
     };
     row(ui, mean, "Mean of seeds", "The mean of predictions that differ in their seeds");
     row(ui, Subject::Stored, "Stored picture", "What another program predicted: NAME_vqvae.png beside the pair");
-    let wishes = made(cx);
-    if !wishes.is_empty() {
+    let variants = variants(cx);
+    if !variants.is_empty() {
         ui.separator();
         ui.label(caption("Made of this touch", cx.p));
-        for wish in wishes {
-            let value = Subject::Predicted(wish);
+        for variant in variants {
+            let value = Subject::Predicted(variant);
             let text = value.label();
             row(ui, value, text.trim_start_matches("Prediction · "), "This very recipe, of every pair");
         }
     }
     ui.separator();
     ui.label(caption("Another prediction", cx.p));
-    let wish = subject.wish().cloned().unwrap_or_default();
-    if let Some(wish) = change(cx, ui, &wish) {
+    let variant = subject.change().cloned().unwrap_or_default();
+    if let Some(variant) = change(cx, ui, &variant) {
         chosen = Some(match subject {
-            Subject::Mean(_, count) => Subject::Mean(wish, *count),
-            _ => Subject::Predicted(wish),
+            Subject::Mean(_, count) => Subject::Mean(variant, *count),
+            _ => Subject::Predicted(variant),
         });
     }
-    if let Subject::Mean(wish, count) = subject {
+    if let Subject::Mean(variant, count) = subject {
         let mut count = *count;
         ui.horizontal(|ui| {
             ui.label("Seeds");
             if ui.add(DragValue::new(&mut count).range(SEEDS)).changed() {
-                chosen = Some(Subject::Mean(wish.clone(), count));
+                chosen = Some(Subject::Mean(variant.clone(), count));
             }
         });
     }
     chosen
 }
 
-/// The predictions that were made of the active finger, each as the wish that names it.
-fn made(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
+/// The predictions that were made of the active finger, each as the change to a recipe that names it.
+fn variants(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
     let state = cx.state;
     let keys = state.touch_key(state.selection.finger).and_then(|touch| state.results.made.get(&touch));
-    let wish = |key: &crate::app::keys::PredictionKey| {
+    let variant = |key: &crate::app::keys::PredictionKey| {
         let bundle = state.library.bundle(&key.bundle)?;
         Some(RecipeChange {
             bundle: Some(bundle.name.clone()),
@@ -98,12 +98,12 @@ fn made(cx: &Cx<'_>) -> BTreeSet<RecipeChange> {
             shift: None,
         })
     };
-    keys.into_iter().flatten().rev().take(6).filter_map(wish).collect()
+    keys.into_iter().flatten().rev().take(6).filter_map(variant).collect()
 }
 
 /// Model, seed, steps and way to meters; what was changed.
-fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &RecipeChange) -> Option<RecipeChange> {
-    let mut new = wish.clone();
+fn change(cx: &Cx<'_>, ui: &mut Ui, variant: &RecipeChange) -> Option<RecipeChange> {
+    let mut new = variant.clone();
     ui.spacing_mut().item_spacing.y = 2.0;
     let rig = cx.state.rig();
     let depth = |b: &&BundleInfo| b.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Depth);
@@ -127,7 +127,7 @@ fn change(cx: &Cx<'_>, ui: &mut Ui, wish: &RecipeChange) -> Option<RecipeChange>
         }
     }
     ui.label(RichText::new("What is not chosen here is as in the Generate pane.").size(SMALL).color(cx.p.weak));
-    (new != *wish).then_some(new)
+    (new != *variant).then_some(new)
 }
 
 /// A number that is either left to the settings or chosen.

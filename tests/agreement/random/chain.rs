@@ -75,7 +75,7 @@ pub(in crate::agreement) fn a_random_recipe_has_the_same_depth_chain_in_the_pane
     compared(&counts, 200);
 }
 
-/// What the fan of seeds says, in the words of the verb.
+/// Figures of the fan of seeds, in the words of the verb.
 fn fan(angles_rad: &[Option<f64>], truth_rad: Option<f64>) -> Value {
     let found = AngleFan::of(&angles_rad.iter().flatten().copied().collect::<Vec<_>>());
     let mean = found.as_ref().and_then(|fan| fan.mean_rad);

@@ -1,4 +1,4 @@
-//! What people say of pairs: drawn, cleaned up, taken over, accepted, reviewed; and masks that are proposed.
+//! Labels of pairs: drawn, cleaned up, taken over, accepted, reviewed; and masks that are proposed.
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::LabelsCommand;

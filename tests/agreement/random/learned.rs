@@ -1,4 +1,4 @@
-//! What is learned: a fit of the generator, and a mask model. Of fixed choices: either takes half a minute.
+//! Learning: a fit of the generator, and a mask model. Of fixed choices: either takes half a minute.
 
 use touch2touch::app::command::{AdaptCommand, TrainCommand};
 use touch2touch::app::settings::prefer;

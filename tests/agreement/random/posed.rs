@@ -17,7 +17,7 @@ fn with_poses(home: &Path) -> impl Iterator<Item = Both> {
     Both::places(home).take(2)
 }
 
-/// What keeps a registration from an answer is the same in both.
+/// The reason that keeps a registration from an answer is the same in both.
 fn same_reason<T>(shown: Lookup<'_, T>, said: Result<Value, String>, what: &str) {
     let said = match said {
         Err(said) => said,

@@ -1,4 +1,4 @@
-//! What is said of a whole data set: statistics of its predictions, dials, and the order of its masks.
+//! Figures of a whole data set: statistics of its predictions, dials, and the order of its masks.
 
 use std::collections::BTreeSet;
 

@@ -7,7 +7,7 @@
 use glam::DVec2;
 
 use super::ANGLE_SCALE_M;
-use super::lanes::{LANES, Lattice};
+use super::lanes::{LANES, LaneSums, Lattice, Sums};
 use crate::field::{CELL_M, DistanceField};
 use crate::frames::PlanarPose;
 
@@ -100,24 +100,6 @@ impl State {
     }
 }
 
-/// Sums over the points at one state.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sums {
-    /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`ANGLE_SCALE_M`], y, z):
-    /// 00 01 02 11 12 22.
-    pub(super) h: [f64; 6],
-    /// Weighted slope of half the squared residuals, meters.
-    pub(super) g: [f64; 3],
-    /// Geman-McClure cost, square meters.
-    pub(super) cost: f64,
-    /// Sum of the weights.
-    pub(super) weight: f64,
-    /// Points within the kernel's width of the silhouette, or on it.
-    pub(super) inliers: usize,
-    /// Squared residuals of those, square meters.
-    pub(super) inlier_squares: f64,
-}
-
 /// A state in the field's cell units.
 struct Motion {
     cos: f32,
@@ -192,9 +174,7 @@ impl DistanceField {
         let kernel_m = kernel as f32;
         let square = kernel_m * kernel_m;
         let bend_scale = 4.0 / square;
-        let mut h = [[0f32; LANES]; 6];
-        let mut g = [[0f32; LANES]; 3];
-        let [mut cost, mut weight, mut inliers, mut squares] = [[0f32; LANES]; 4];
+        let mut sums = LaneSums::default();
         let mut left = cloud.len;
         // Neighbors in an image are neighbors here: often all of a step are on the silhouette.
         let mut whole_steps = 0;
@@ -215,41 +195,22 @@ impl DistanceField {
                 let r2 = r * r;
                 let ratio = square / (square + r2);
                 let w = ratio * ratio;
-                cost[l] += r2 * ratio;
-                weight[l] += w;
                 let near = if r <= kernel_m { 1.0 } else { 0.0 };
-                inliers[l] += near;
-                squares[l] += near * r2;
-                let (j0, j1, j2) = (gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]);
+                sums.count(l, r2 * ratio, w, near, r2);
                 let w = w * pulls;
                 let bend = 1.0 - bend_scale * r2 * ratio;
                 let bent = if bend > FLAT { bend } else { FLAT };
-                let (g0, g1, g2) = (w * j0, w * j1, w * j2);
-                let (w0, w1, w2) = (bent * g0, bent * g1, bent * g2);
-                h[0][l] += w0 * j0;
-                h[1][l] += w0 * j1;
-                h[2][l] += w0 * j2;
-                h[3][l] += w1 * j1;
-                h[4][l] += w1 * j2;
-                h[5][l] += w2 * j2;
-                g[0][l] += g0 * r;
-                g[1][l] += g1 * r;
-                g[2][l] += g2 * r;
+                sums.pull(l, r, [gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]], w, bent);
             }
         }
-        let total = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
         // Slopes were taken per cell: meters per cell to meters per meter, arms in cells to meters.
-        let slope = [1.0 / ANGLE_SCALE_M, 1.0 / CELL_M, 1.0 / CELL_M];
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
+        let found = sums.total([1.0 / ANGLE_SCALE_M, 1.0 / CELL_M, 1.0 / CELL_M]);
         let fitting = cloud.resting + whole_steps * LANES;
         let padding = cloud.y.len() - cloud.len;
         Sums {
-            h: std::array::from_fn(|i| total(h[i]) * slope[pairs[i].0] * slope[pairs[i].1]),
-            g: std::array::from_fn(|i| total(g[i]) * slope[i]),
-            cost: total(cost),
-            weight: total(weight) + fitting as f64 - padding as f64,
-            inliers: total(inliers) as usize + fitting - padding,
-            inlier_squares: total(squares),
+            weight: found.weight + fitting as f64 - padding as f64,
+            inliers: found.inliers + fitting - padding,
+            ..found
         }
     }
 

@@ -23,7 +23,7 @@ use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 use problem::{Problem, check};
 
-/// What the registration by membrane and mask may vary. The default is what the product uses.
+/// Choices of the registration by membrane and mask. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointConfig {
     /// Poses to start from, `grasp_from_object`: exactly these. Empty: its own.
@@ -52,7 +52,7 @@ pub struct JointConfig {
     pub record: bool,
 }
 
-/// How much the mask counts beside the membrane, as a factor of its mean cost.
+/// Weight of the mask beside the membrane, as a factor of its mean cost.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MaskWeight {
     /// While starts are told apart.
@@ -108,7 +108,7 @@ pub enum Basis {
     LittleContact,
 }
 
-/// How the membrane was used.
+/// Use of the membrane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFit {
     /// Who answered.

@@ -14,7 +14,7 @@ const REACH_M: f64 = 0.012;
 /// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
 const MIN_SHARE: f64 = 0.05;
 
-/// What the depth camera of one pad saw.
+/// View of the depth camera of one pad.
 #[derive(Clone, Copy, Debug)]
 pub struct PadImage<'a> {
     /// Reference minus depth, meters, raw orientation.
@@ -23,7 +23,7 @@ pub struct PadImage<'a> {
     pub camera: &'a DepthCamera,
 }
 
-/// What was felt: the contact points, and the images of the membranes that they are from.
+/// Contact points of a grasp, and the images of the membranes that they are from.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Contacts<'a> {
     /// Points of all masks, grasp frame, meters. Those that are not finite are dropped and counted by the registrations.
@@ -50,7 +50,7 @@ impl<'a, const N: usize> From<&'a [DVec3; N]> for Contacts<'a> {
     }
 }
 
-/// What is to be aligned: contact points in space and in the plane of the tool, and the images they are from.
+/// Input of a registration: contact points in space and in the plane of the tool, and the images they are from.
 #[derive(Clone, Debug)]
 pub struct Scene<'a> {
     contacts: Contacts<'a>,

@@ -2,7 +2,8 @@
 
 use glam::DVec2;
 
-use super::batch::{Cloud, State, Sums};
+use super::batch::{Cloud, State};
+use super::lanes::Sums;
 use super::{Stop, TraceStep};
 use crate::field::DistanceField;
 
@@ -172,7 +173,7 @@ impl Cost for OnField<'_, '_> {
     }
 }
 
-/// What a descent goes down on.
+/// Function that a descent minimizes.
 pub(super) trait Cost {
     /// Cost, slope and curvature at a state.
     fn sums(&mut self, state: State) -> Sums;

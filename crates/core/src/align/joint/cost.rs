@@ -1,12 +1,12 @@
-//! What a pose costs: how far the membrane is from the template, and how far the mask from the silhouette.
+//! The cost of a pose: distance of the membrane from the template, and of the mask from the silhouette.
 
 use glam::DVec2;
 
 use super::template::BandField;
 use crate::align::ANGLE_SCALE_M;
 use crate::align::TraceStep;
-use crate::align::batch::{Cloud, State, Sums};
-use crate::align::lanes::{LANES, Lattice};
+use crate::align::batch::{Cloud, State};
+use crate::align::lanes::{LANES, LaneSums, Lattice, Sums};
 use crate::align::search::{Cost, Progress};
 use crate::field::DistanceField;
 use crate::tent::STEP_M;
@@ -93,9 +93,7 @@ impl BandField {
         let kernel = kernel_m as f32;
         let square = kernel * kernel;
         let bend_scale = 4.0 / square;
-        let mut h = [[0f32; LANES]; 6];
-        let mut g = [[0f32; LANES]; 3];
-        let [mut cost, mut weight, mut inliers, mut squares] = [[0f32; LANES]; 4];
+        let mut sums = LaneSums::default();
         for at in (0..patch.y.len()).step_by(LANES) {
             let Read { ay, az, r, gy, gz, .. } = self.read(patch, at, state);
             let mut counts = [1f32; LANES];
@@ -106,38 +104,14 @@ impl BandField {
                 let r2 = r[l] * r[l];
                 let ratio = square / (square + r2);
                 let w = counts[l] * ratio * ratio;
-                cost[l] += counts[l] * r2 * ratio;
-                weight[l] += w;
                 let near = if r2 <= square { counts[l] } else { 0.0 };
-                inliers[l] += near;
-                squares[l] += near * r2;
-                let (j0, j1, j2) = (gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]);
+                sums.count(l, counts[l] * r2 * ratio, w, near, r2);
                 let bend = 1.0 - bend_scale * r2 * ratio;
                 let bent = if bend > FLAT { bend } else { FLAT };
-                let (g0, g1, g2) = (w * j0, w * j1, w * j2);
-                let (w0, w1, w2) = (bent * g0, bent * g1, bent * g2);
-                h[0][l] += w0 * j0;
-                h[1][l] += w0 * j1;
-                h[2][l] += w0 * j2;
-                h[3][l] += w1 * j1;
-                h[4][l] += w1 * j2;
-                h[5][l] += w2 * j2;
-                g[0][l] += g0 * r[l];
-                g[1][l] += g1 * r[l];
-                g[2][l] += g2 * r[l];
+                sums.pull(l, r[l], [gz[l] * ay[l] - gy[l] * az[l], gy[l], gz[l]], w, bent);
             }
         }
-        let total = |lanes: [f32; LANES]| lanes.iter().map(|v| f64::from(*v)).sum::<f64>();
-        let slope = [1.0 / ANGLE_SCALE_M, 1.0 / STEP_M, 1.0 / STEP_M];
-        let pairs = [(0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)];
-        Sums {
-            h: std::array::from_fn(|i| total(h[i]) * slope[pairs[i].0] * slope[pairs[i].1]),
-            g: std::array::from_fn(|i| total(g[i]) * slope[i]),
-            cost: total(cost),
-            weight: total(weight),
-            inliers: total(inliers) as usize,
-            inlier_squares: total(squares),
-        }
+        sums.total([1.0 / ANGLE_SCALE_M, 1.0 / STEP_M, 1.0 / STEP_M])
     }
 
     /// Residuals at a state and the template there, meters.
@@ -157,7 +131,7 @@ pub(super) struct MaskPart<'a> {
     pub(super) field: &'a DistanceField,
     pub(super) cloud: &'a Cloud,
     pub(super) kernel_m: f64,
-    /// How much it counts beside the membrane.
+    /// Weight beside the membrane.
     pub(super) weight: f64,
 }
 

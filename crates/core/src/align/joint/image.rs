@@ -1,4 +1,4 @@
-//! What the membrane of one finger looks like: its height over the middle plane, by bands of lengths.
+//! The image of one finger's membrane: its height over the middle plane, by bands of lengths.
 
 use glam::{DVec2, Vec3};
 use nalgebra::{SMatrix, SVector};
@@ -20,7 +20,7 @@ const STEP_M: f64 = 0.75e-3;
 const HIGHEST_M: f32 = 0.05;
 /// Greatest height that counts, meters.
 const CLIP_M: f32 = 0.012;
-/// How far around the zone the image goes, meters.
+/// Margin of the image around the zone, meters.
 const MARGIN_M: f64 = 0.003;
 /// Pixels nearer to the zone's border are not compared, meters: beyond it the membrane is not the template's.
 const BORDER_M: f64 = 3e-3;
@@ -78,7 +78,7 @@ impl Rays {
     }
 }
 
-/// Where the free membranes would meet.
+/// Zone in which the free membranes would meet.
 struct Zone {
     /// For each row the first and one past the last column.
     spans: Vec<[usize; 2]>,

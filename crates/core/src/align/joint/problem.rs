@@ -76,7 +76,7 @@ pub(super) struct Problem<'a> {
     not_finite: usize,
 }
 
-/// What was found.
+/// Outcome of a search: its starts and their runs.
 pub(super) struct Answer {
     starts: Vec<PlanarPose>,
     runs: Vec<Progress>,
@@ -123,7 +123,7 @@ impl Descents<'_, '_> {
     }
 }
 
-/// Whether two ends are the same place, as far as scouts can tell.
+/// True where two ends are the same place, as far as scouts can tell.
 fn alike(a: &State, b: &State) -> bool {
     const SAME_M: f64 = 6e-4;
     (a.phi - b.phi).abs() * ANGLE_SCALE_M < SAME_M && a.place.distance(b.place) < SAME_M
@@ -256,7 +256,7 @@ impl<'a> Problem<'a> {
         order
     }
 
-    /// Where the mask alone leads from the middle of the prior.
+    /// Pose to which the mask alone leads from the middle of the prior.
     fn mask_scout(&self, lookups: &mut usize) -> Option<Progress> {
         let [scouts, _] = self.mask.as_ref()?;
         let mut search = Search::new(&self.tool.field, self.centroid, self.config.max_iterations, false);
@@ -301,7 +301,7 @@ impl<'a> Problem<'a> {
         (1.48 * f64::from(*median), if relief > 0.0 { 1.0 - left / relief } else { 0.0 })
     }
 
-    /// How much the mask counts for the answer.
+    /// Weight of the mask in the answer.
     fn mask_weight(&self, noise_m: f64, state: State) -> f64 {
         let Some([_, cloud]) = &self.mask else { return 0.0 };
         let (weight, kernel) = (&self.config.weight, self.config.mask_kernels_m[1]);

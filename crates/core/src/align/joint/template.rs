@@ -1,4 +1,4 @@
-//! What the membrane of each finger looks like over a tool, by bands of lengths.
+//! The shape of each finger's membrane over a tool, by bands of lengths.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, PoisonError};
