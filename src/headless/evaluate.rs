@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
-use super::recipe::{MappingArgs, RuntimeArg, common};
+use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
@@ -172,11 +172,11 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let finger = fingers.first().copied().filter(|_| fingers.len() < dataset.rig.pads().len());
     let only = if let [one] = generators.as_slice() { Some(Bundle::open(one.clone())?) } else { None };
     let shift = args.mapping.mode(only.as_ref().map(|bundle| (bundle.name(), bundle.hash())))?;
-    let mask_model = first(&args.mask_bundle, |b| b.mask_unet().is_some());
+    let mask_model = first_mask_model(args.mask_bundle.as_deref(), &bundles)?;
     Ok(Setup {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime)?,
+        recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime),
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,

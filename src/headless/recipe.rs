@@ -14,7 +14,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint;
-use touch2touch_work::infer::bundle::Origin;
+use touch2touch_work::infer::bundle::Bundle;
 use touch2touch_work::infer::engine::{EngineChoice, resolve};
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::MaskSource;
@@ -114,19 +114,19 @@ impl ModelArgs {
 pub(super) fn common(
     shift: ShiftMode,
     mask: &MaskArgs,
-    mask_model: Option<Origin>,
+    mask_model: Option<Model>,
     registration: RegistrationChoice,
     engine: RuntimeArg,
-) -> Result<Recipe, TaskError> {
-    let open = |origin| bundles::open("Open the mask model", origin).map(Model::from);
-    Ok(Recipe {
-        shift,
-        mask: mask.choice(),
-        mask_model: mask_model.map(open).transpose()?,
-        hand: !mask.no_hand,
-        registration,
-        engine: engine.choice(),
-        ..Recipe::default()
+) -> Recipe {
+    let (mask, hand) = (mask.choice(), !mask.no_hand);
+    Recipe { shift, mask, mask_model, hand, registration, engine: engine.choice(), ..Recipe::default() }
+}
+
+/// The mask model that is named, else the first that was found.
+pub(super) fn first_mask_model(named: Option<&Path>, found: &[Bundle]) -> Result<Option<Model>, TaskError> {
+    Ok(match named {
+        Some(folder) => Some(bundles::open("Open the mask model", folder)?.into()),
+        None => found.iter().find(|bundle| bundle.mask_unet().is_some()).map(|bundle| BundleInfo::of(bundle).into()),
     })
 }
 

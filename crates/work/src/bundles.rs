@@ -178,8 +178,8 @@ pub struct FoundBundles {
 
 /// The bundle that a stored identity names, also as builds before this one wrote it.
 pub fn by_id<'a>(bundles: &'a [BundleInfo], id: &str) -> Option<&'a BundleInfo> {
-    let id = current(id);
-    bundles.iter().find(|bundle| *bundle.id == *id)
+    let of = |id: &str| bundles.iter().find(|bundle| *bundle.id == *id);
+    of(id).or_else(|| of(&current(id)))
 }
 
 /// All bundles there are: those of the user, those in the program, and those in `folders`.

@@ -7,12 +7,12 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::recipe::{MappingArgs, RuntimeArg, common};
+use super::super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::evaluate::Setup;
-use touch2touch_work::infer::bundle::{Bundle, Origin, find_all};
+use touch2touch_work::infer::bundle::{Bundle, find_all};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::labels::{Labels, Review};
 use touch2touch_work::models::Models;
@@ -70,11 +70,11 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     let bundles = find_all(&[]).bundles;
     let first = |fits: fn(&Bundle) -> bool| bundles.iter().find(|b| fits(b)).map(|b| b.origin().clone());
     let generator = |b: &&Bundle| b.ends(&dataset.rig).is_some_and(|ends| ends.is_ok());
-    let mask_model = args.mask_bundle.as_ref().map(Origin::from).or_else(|| first(|b| b.mask_unet().is_some()));
+    let mask_model = first_mask_model(args.mask_bundle.as_deref(), &bundles)?;
     Ok(Setup {
         bundles: bundles.iter().filter(generator).map(|b| b.origin().clone()).collect(),
         classifier: first(|b| b.tool_classifier().is_some()),
-        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.registration, args.runtime)?,
+        recipe: common(args.mapping.mode(None)?, &args.mask, mask_model, args.registration, args.runtime),
         ..Setup::default()
     })
 }

@@ -65,7 +65,7 @@ impl Lattice<'_> {
 /// Sums over the points at one state.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sums {
-    /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`ANGLE_SCALE_M`], y, z):
+    /// Upper triangle of the weighted Gauss-Newton matrix for (angle times [`super::ANGLE_SCALE_M`], y, z):
     /// 00 01 02 11 12 22.
     pub(super) h: [f64; 6],
     /// Weighted slope of half the squared residuals, meters.

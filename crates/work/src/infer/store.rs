@@ -8,7 +8,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
@@ -44,6 +44,8 @@ pub struct Store {
     budget: u64,
     /// Bytes in the folder, as far as known: counted at the first write.
     bytes: Mutex<Option<u64>>,
+    /// The predictions that there were when one was first missed.
+    at_first: OnceLock<Inputs>,
 }
 
 /// Prediction as it was stored.
@@ -102,7 +104,7 @@ impl Inputs {
 impl Store {
     /// A store in `folder` (made when something is first written) of at most `budget` bytes; 0 keeps nothing.
     pub fn new(folder: PathBuf, budget: u64) -> Self {
-        Self { folder, budget, bytes: Mutex::new(None) }
+        Self { folder, budget, bytes: Mutex::new(None), at_first: OnceLock::new() }
     }
 
     /// Folder of the store.
@@ -128,10 +130,14 @@ impl Store {
     }
 
     /// The files of an input whose names hold the hex digits of an earlier build's key in place of a recipe's id.
+    /// Nobody writes such files any more: one look at the folder is enough.
     fn named_by_v1(&self, input: &str) -> Vec<PathBuf> {
-        let all = self.inputs();
         let prefix = short(input).len() + 1;
-        let v1 = all.of(input).filter(|name| name[prefix..].starts_with(|c: char| c.is_ascii_hexdigit()));
+        let v1 = self
+            .at_first
+            .get_or_init(|| self.inputs())
+            .of(input)
+            .filter(|name| name[prefix..].starts_with(|c: char| c.is_ascii_hexdigit()));
         v1.map(|name| self.folder.join(name)).collect()
     }
 
