@@ -3,50 +3,13 @@
 //! Panes read the state and put commands on a list; they compute nothing and change nothing. What is derived for the
 //! screen (textures, outlines) is made again only when the recipe of what is shown changes.
 
-pub mod app;
-pub mod theme;
-mod thumbnail;
-mod timemachine;
-mod train;
-mod unsaved;
-mod versus;
-pub mod widget;
+mod panes;
+mod parts;
+mod window;
 
-mod adapt;
-mod bars;
-mod basin;
-mod browser;
-mod cx;
-mod dial;
-mod dialogs;
-mod export;
-mod fuzzy;
-mod generate;
-mod images;
-mod kept;
-mod layers;
-mod layout;
-mod ledger;
-mod log;
-mod made_with;
-mod masks;
-mod metrics;
-mod palette;
-mod pane;
-mod pen;
-mod poses;
-mod results;
-mod saved;
-mod scatter;
-mod scene;
-mod scene_view;
-mod screenshot;
-mod seeds;
-mod settings_pane;
-mod shortcuts;
-mod table;
-
-pub use app::{Options, StudioApp};
+pub use parts::{theme, widget};
+pub use window::app;
+pub use window::app::{Options, StudioApp};
 
 use std::path::PathBuf;
 use std::sync::Arc;

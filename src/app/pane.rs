@@ -110,7 +110,7 @@ pub enum Demand {
     Training,
 }
 
-/// The table, given to the macro `$with`: for each file of `ui` the panes that it draws.
+/// The table, given to the macro `$with`: for each file of `ui/panes` the panes that it draws.
 macro_rules! panes {
     ($with:ident) => {
         $with! {

@@ -17,7 +17,6 @@ use touch2touch_core::rig::{Rig, SensorKind};
 use touch2touch_work::bundles::{BundleInfo, BundleKind, by_id};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::filter::Filter;
-use touch2touch_work::prediction::made_with;
 
 /// A place that can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -244,7 +243,7 @@ impl Library {
 
     /// The making of a prediction, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.
     pub fn made_with(&self, recipe: &PredictionKey) -> String {
-        made_with(self.model_name(&recipe.bundle), &recipe.config)
+        format!("{} · {}", self.model_name(&recipe.bundle), recipe.config.text())
     }
 
     /// The name of the mask model that a recipe takes; empty where it takes none.

@@ -72,6 +72,24 @@ pub struct GenerateConfig {
 }
 
 impl GenerateConfig {
+    /// The settings as they stand beside each picture, 3D view and file of a prediction: `2 steps · seed 42`, with the
+    /// sampler, its noise and the guidance where they are not the usual ones.
+    pub fn text(&self) -> String {
+        let Self { steps, eta, seed, sampler, guidance, .. } = *self;
+        let plural = if steps == 1 { "" } else { "s" };
+        let mut text = format!("{steps} step{plural} · seed {seed}");
+        if sampler != Sampler::default() {
+            text += &format!(" · {}", <&str>::from(sampler));
+        }
+        if eta != 0.0 {
+            text += &format!(" · eta {eta}");
+        }
+        if guidance != 1.0 {
+            text += &format!(" · guidance {guidance}");
+        }
+        text
+    }
+
     /// All of it as whole numbers, which have an order.
     fn bits(&self) -> (u32, u64, Sampler, u64, Spacing, u64) {
         let Self { steps, eta, seed, sampler, spacing, guidance } = *self;

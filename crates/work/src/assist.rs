@@ -1,0 +1,5 @@
+//! Help for those who draw masks: proposals, edits as values, and the order that is worth their time.
+
+pub mod label_edit;
+pub mod propose;
+pub mod queue;

@@ -1,0 +1,18 @@
+//! Results looked into: one touch in detail, two against each other, whole data sets as tables, and figures of them.
+
+pub mod canvas;
+pub mod compare;
+pub mod deviation;
+pub mod doubts;
+pub mod ensemble;
+pub mod evaluate;
+pub mod fan;
+pub mod figure;
+pub mod fonts;
+pub mod influence;
+pub mod layers;
+pub mod ledger;
+pub mod statistics;
+pub mod subject;
+pub mod sweep;
+pub mod verdict;

@@ -1,0 +1,105 @@
+//! Contact points to the tool's pose in the hand, with its error where the truth is known: [`pose`].
+
+use std::time::Instant;
+
+use glam::DVec3;
+
+use crate::error::TaskError;
+use crate::job::JobCx;
+use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
+use touch2touch_core::align::{AlignReport, Ask, Contacts, PointFit, Register, TraceStep};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::inspect::basin_map;
+use touch2touch_core::pose::{RegistrationChoice, ToolModel, register_with};
+use touch2touch_core::units;
+
+/// A registered pose.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PoseResult {
+    /// The tool in the hand.
+    pub grasp_from_object: PlanarPose,
+    /// The angle that the lab reports: of `object_from_grasp`, radians.
+    pub angle_rad: f64,
+    /// The true angle in the same sense, where known.
+    pub truth_rad: Option<f64>,
+    /// Size of the angle's error, where the truth is known.
+    pub error_rad: Option<f64>,
+    /// Root mean square of the residuals, meters.
+    pub rms_m: f64,
+    /// Contact points registered.
+    pub num_points: usize,
+    /// Why it stopped, in words.
+    pub stop: String,
+    /// True where it stopped because nothing moved any more.
+    pub converged: bool,
+    /// Time it took, milliseconds.
+    pub ms: f64,
+    /// Everything the registration says about itself; with trace and fits only of a recorded run.
+    pub report: AlignReport,
+}
+
+impl PoseResult {
+    /// Pose the other way round; its angle is the number that the lab reports.
+    pub fn object_from_grasp(&self) -> PlanarPose {
+        self.grasp_from_object.inverse()
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        size_of::<Self>()
+            + self.report.trace.len() * size_of::<TraceStep>()
+            + self.report.fits.len() * size_of::<PointFit>()
+    }
+}
+
+/// The pose of the tool from contact points (grasp frame, meters) and the images that they are from. `truth` is `grasp_from_object`, where known.
+///
+/// # Errors
+/// If there are too few points, or they are nowhere near the tool.
+pub fn pose<'a>(
+    contacts: impl Into<Contacts<'a>>,
+    tool: &ToolModel,
+    registration: &dyn Register,
+    ask: Ask<'_>,
+    truth: Option<PlanarPose>,
+) -> Result<PoseResult, TaskError> {
+    let contacts = contacts.into();
+    let start = Instant::now();
+    let report = register_with(registration, contacts, tool, ask).map_err(|err| TaskError::from_error("Pose", &err))?;
+    let ms = start.elapsed().as_secs_f64() * 1e3;
+    let angle_rad = report.lab_angle_rad();
+    let truth_rad = truth.map(|t| t.inverse().theta_rad);
+    Ok(PoseResult {
+        grasp_from_object: report.grasp_from_object,
+        angle_rad,
+        truth_rad,
+        error_rad: truth_rad.map(|t| units::angle_error(angle_rad, t)),
+        rms_m: report.inlier_rms_m,
+        num_points: contacts.points.len(),
+        stop: report.stop.to_string(),
+        converged: report.converged,
+        ms,
+        report,
+    })
+}
+
+/// Basin map: the poses that many starts lead to.
+///
+/// # Errors
+/// If the job was told to stop, or no start led anywhere.
+pub fn basin(
+    points: &[DVec3],
+    tool: &ToolModel,
+    registration: RegistrationChoice,
+    plane: Plane,
+    cx: &JobCx,
+) -> Result<Basin, TaskError> {
+    const WHAT: &str = "Basin map";
+    let config = BasinConfig::new(plane);
+    let map = basin_map(points, tool, registration, &config, || cx.cancel.is_cancelled())
+        .ok_or_else(|| TaskError::cancelled(WHAT))?;
+    match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
+        Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),
+        _ => Ok(map),
+    }
+}

@@ -1,0 +1,23 @@
+//! The panes, a file for each kind of them, as the table in `app/pane.rs` lists them.
+
+pub(crate) mod adapt;
+pub(crate) mod basin;
+pub(crate) mod browser;
+pub(crate) mod dial;
+pub(crate) mod generate;
+pub(crate) mod images;
+pub(crate) mod layers;
+pub(crate) mod ledger;
+pub(crate) mod log;
+pub(crate) mod masks;
+pub(crate) mod metrics;
+pub(crate) mod poses;
+pub(crate) mod results;
+pub(crate) mod scatter;
+pub(crate) mod scene;
+pub(crate) mod seeds;
+pub(crate) mod settings_pane;
+pub(crate) mod table;
+pub(crate) mod timemachine;
+pub(crate) mod train;
+pub(crate) mod versus;

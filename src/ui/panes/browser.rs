@@ -1,0 +1,489 @@
+//! The list of pairs: source, filter, sort, thumbnails, review states.
+
+use eframe::egui::{
+    self, Align2, Color32, CornerRadius, FontId, Rect, RichText, Role, ScrollArea, Sense, Stroke, TextureId, Ui,
+    WidgetInfo, pos2, vec2,
+};
+use strum::IntoEnumIterator as _;
+
+use super::scene::error_color;
+use crate::app::action::Action;
+use crate::app::command::{Command, LibraryCommand, Pane};
+use crate::app::evaluate::ScoreChoice;
+use crate::app::labels::Review;
+use crate::app::library::{Place, Sort, short_name};
+use crate::app::results;
+use crate::app::scores::{Grade, SourceScores};
+use crate::app::tasks::TaskKind;
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::dialogs::Purpose;
+use crate::ui::parts::theme::{Palette, SMALL, caption};
+use crate::ui::parts::widget::cut::cut_in_the_middle;
+use crate::ui::parts::widget::empty;
+use crate::ui::parts::widget::texture::depth_image;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::evaluation::Metric;
+use touch2touch_core::units::counted;
+use touch2touch_work::queue::QueueBy;
+
+/// Height of a row, points.
+const ROW: f32 = 40.0;
+/// Width of a thumbnail, points.
+const THUMB: f32 = 44.0;
+
+/// The color of a review state.
+pub(crate) fn review_color(p: &Palette, review: Review) -> Color32 {
+    match review {
+        Review::Todo => p.weak,
+        Review::InProgress => p.caution,
+        Review::Flagged => p.wrong,
+        Review::Done => p.good,
+        Review::Skip => p.line,
+    }
+}
+
+/// The filter being typed, and where the list was scrolled to.
+#[derive(Default)]
+pub(crate) struct Memory {
+    /// The filter being typed.
+    filter: String,
+    /// True where the filter wants the keyboard.
+    pub focus_filter: bool,
+    /// The row that the list was last scrolled to; `None` where the list is a new one.
+    pub scrolled_to: Option<Option<usize>>,
+}
+
+/// The pane.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        source_menu(cx, ui);
+        filter_row(cx, ui, memory);
+        ui.add_space(2.0);
+        list(cx, ui, memory);
+    });
+}
+
+/// Title of what is open, with the menu of sources.
+fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let library = &cx.state.library;
+    let title = match (&library.opening, &library.open) {
+        (Some(place), _) => format!("Opening {place}…"),
+        (None, Some(open)) => open.source.title().to_owned(),
+        (None, None) => "Open…".to_owned(),
+    };
+    let width = ui.available_width();
+    let button = egui::Button::new(RichText::new(title).color(cx.p.strong)).truncate().min_size(vec2(width, 24.0));
+    let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
+        ui.set_min_width(220.0);
+        if ui.button("Demo").on_hover_text("Simulated touches of 12 tools, made when they are looked at").clicked() {
+            cx.push(LibraryCommand::Open(Place::Demo));
+        }
+        let folder = ui.add(egui::Button::new("Open folder…").shortcut_text(cx.keys().text(Action::OpenFolder)));
+        if folder.on_hover_text("A folder in the lab's layout, or a folder of image pairs").clicked() {
+            cx.act(Action::OpenFolder);
+        }
+        if ui.button("Open path…").on_hover_text("Type or paste a path").clicked() {
+            cx.shared.dialogs.type_path(Purpose::Folder, "");
+        }
+        let reload = ui.add_enabled(
+            cx.state.library.open.is_some(),
+            egui::Button::new("Reload").shortcut_text(cx.keys().text(Action::Reload)),
+        );
+        if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
+            cx.act(Action::Reload);
+        }
+        let following = cx.state.library.follow.is_some();
+        let button =
+            egui::Button::new(Action::Follow.name()).shortcut_text(cx.keys().text(Action::Follow)).selected(following);
+        let follow = ui.add_enabled(Action::Follow.command(cx.state).is_some(), button);
+        if follow.on_hover_text(Action::Follow.tooltip()).clicked() {
+            cx.act(Action::Follow);
+        }
+        let recent: Vec<_> = cx.state.settings.recent.iter().filter(|r| **r != Place::Demo).cloned().collect();
+        if !recent.is_empty() {
+            ui.separator();
+            ui.label(caption("Recent", cx.p));
+            for place in recent {
+                let text = place.to_string();
+                let short = text.rsplit('/').next().unwrap_or(&text).to_owned();
+                if ui.button(short).on_hover_text(text).clicked() {
+                    cx.push(LibraryCommand::Open(place));
+                }
+            }
+        }
+    });
+    response.on_hover_text("What is open. Click to open something else, or drop a folder on the window");
+}
+
+fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
+    /// Narrower than this the order stands below the filter.
+    const BESIDE: f32 = 60.0;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let (sort_width, full) = (74.0, ui.available_width());
+        let beside = full - sort_width - 12.0;
+        let width = if beside < BESIDE { full - 8.0 } else { beside };
+        let edit = egui::TextEdit::singleline(&mut memory.filter).hint_text("Filter").desired_width(width);
+        let response = ui.add(edit).accessible_name("Filter pairs");
+        if std::mem::take(&mut memory.focus_filter) {
+            response.request_focus();
+        }
+        if response.changed() {
+            cx.out.push(Command::Library(LibraryCommand::SetFilter(memory.filter.clone())));
+        } else if !response.has_focus() && memory.filter != cx.state.library.filter {
+            memory.filter.clone_from(&cx.state.library.filter);
+        }
+        let tip = "Words of the name, the tool or the note. tool:rod narrows to tools, note:edge to notes, has:note to pairs \
+             with one; is:todo, is:in-progress, is:flagged, is:done and \
+             is:skip to review states; angle>5, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
+             or measured:angle>2) in °, dB, mm and %";
+        response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
+        let sort = cx.state.library.sort;
+        let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
+        let response = combo.show_ui(ui, |ui| {
+            for s in Sort::iter() {
+                if ui.selectable_label(s == sort, s.name()).clicked() {
+                    cx.out.push(Command::Library(LibraryCommand::SetSort(s)));
+                }
+            }
+        });
+        response.response.accessible_name("Sort").on_hover_text("Order of the list");
+    });
+    score_row(cx, ui);
+    uncertain_row(cx, ui);
+    if let Some(open) = &cx.state.library.open
+        && open.tools.len() > 1
+    {
+        let chosen = cx.state.library.tool.clone();
+        let text = chosen.clone().unwrap_or_else(|| format!("All {} tools", open.tools.len()));
+        let combo = egui::ComboBox::from_id_salt("tool").width(ui.available_width()).selected_text(text).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            if ui.selectable_label(chosen.is_none(), "All tools").clicked() {
+                cx.out.push(Command::Library(LibraryCommand::SetToolFilter(None)));
+            }
+            for tool in &open.tools {
+                if ui.selectable_label(chosen.as_ref() == Some(tool), tool).clicked() {
+                    cx.out.push(Command::Library(LibraryCommand::SetToolFilter(Some(tool.clone()))));
+                }
+            }
+        });
+        response.response.accessible_name("Tool").on_hover_text("Only pairs of one tool");
+    }
+}
+
+/// By which score the list is ordered, colored and filtered; nothing while there are no scores, or where the list is
+/// ordered by what is uncertain.
+fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let table = &cx.state.table;
+    let Some((by, metric)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
+    let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
+    let mut next = None;
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let direction = 52.0;
+        let width = ui.available_width() - direction - 8.0;
+        let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(metric.name());
+        let response = combo.show_ui(ui, |ui| {
+            for f in by.metrics() {
+                if ui.selectable_label(f == metric, f.name()).on_hover_text(f.tip()).clicked() {
+                    next = Some(ScoreChoice { metric: Some(f), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "The score that the list shows, and is sorted and filtered by";
+        response.response.accessible_name("Score").on_hover_text(tip);
+        let text = if chosen.best_first { "best" } else { "worst" };
+        let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
+        let tip = "Which come first; N shows the next worst. A click turns the order round";
+        if ui.add_sized([direction, 18.0], button).accessible_name("Order of the scores").on_hover_text(tip).clicked() {
+            // The first click sorts, the next ones turn round.
+            next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
+        }
+    });
+    if table.scores.sources.len() > 1 {
+        let combo = egui::ComboBox::from_id_salt("source").width(ui.available_width());
+        let response = combo.selected_text(by.short()).truncate().show_ui(ui, |ui| {
+            for source in &table.scores.sources {
+                if ui.selectable_label(source.name == by.name, &*source.name).clicked() {
+                    next = Some(ScoreChoice { source: Some(source.name.clone()), ..chosen.clone() });
+                }
+            }
+        });
+        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
+        response.response.accessible_name("Source of the score").on_hover_text(tip);
+    }
+    if let Some(next) = next {
+        cx.push(LibraryCommand::SetScore(next));
+    }
+}
+
+/// Row with the metric that orders the list where the most uncertain come first, and the number of ranked pairs.
+fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if cx.state.library.sort != Sort::Uncertain {
+        return;
+    }
+    let by = cx.state.table.uncertain_by;
+    let combo = egui::ComboBox::from_id_salt("uncertain").width(ui.available_width()).selected_text(by.name());
+    let response = combo.truncate().show_ui(ui, |ui| {
+        for other in QueueBy::iter() {
+            if ui.selectable_label(other == by, other.name()).on_hover_text(other.tip()).clicked() {
+                cx.out.push(Command::Library(LibraryCommand::SetUncertainBy(other)));
+            }
+        }
+    });
+    response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
+    let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
+    if cx.state.tasks.of_kind(TaskKind::Evaluate).is_none() {
+        ui.horizontal_wrapped(|ui| {
+            cx.action_button(ui, Action::RankMasks, "Rank");
+            ui.label(caption(format!("{known} of {total} ranked"), cx.p));
+        });
+    }
+}
+
+fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
+    let library = &cx.state.library;
+    let total = library.pairs().len();
+    let shown = library.order.len();
+    let done =
+        library.open.as_ref().map_or(0, |_| cx.state.document.reviews.values().filter(|r| r.is_finished()).count());
+    ui.horizontal(|ui| {
+        let count = if shown == total { counted(total, "pair") } else { format!("{shown} of {total} pairs") };
+        ui.label(caption(count, cx.p));
+        if done > 0 {
+            ui.label(RichText::new(format!("{done} done")).size(SMALL).color(cx.p.good));
+        }
+        let problems = library.open.as_ref().map_or(0, |o| o.source.problems().len());
+        if problems > 0 {
+            let text = RichText::new(format!("{problems} problems")).size(SMALL).color(cx.p.caution);
+            ui.label(text).on_hover_ui(|ui| {
+                if let Some(open) = &cx.state.library.open {
+                    for problem in open.source.problems().iter().take(12) {
+                        ui.label(format!("{}: {}", problem.file.display(), problem.what));
+                        ui.label(caption(problem.hint.as_str(), cx.p));
+                    }
+                }
+            });
+        }
+    });
+    scoring(cx, ui);
+    if let Some(failure) = &library.failure {
+        ui.label(RichText::new(failure.to_string()).color(cx.p.wrong).size(SMALL));
+    }
+    if shown == 0 {
+        if library.opening.is_some() {
+            ui.label(caption("Reading the index…", cx.p));
+        } else if library.open.is_none() {
+            if empty::show(
+                ui,
+                "Nothing is open",
+                "Drop a folder here",
+                Some(("Open the demo", Action::OpenDemo.tooltip())),
+            ) {
+                cx.act(Action::OpenDemo);
+            }
+        } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
+            cx.push(LibraryCommand::SetFilter(String::new()));
+            cx.push(LibraryCommand::SetToolFilter(None));
+            cx.push(LibraryCommand::Brush(None));
+        }
+        return;
+    }
+    let selected_row = cx.state.selection.pair.and_then(|p| library.row_of(p));
+    let spacing = 2.0;
+    ui.spacing_mut().item_spacing.y = spacing;
+    let mut area = ScrollArea::vertical().auto_shrink(false).id_salt("pairs");
+    // A step by key may leave the visible rows: follow it, once.
+    if Some(selected_row) != memory.scrolled_to {
+        let fresh = memory.scrolled_to.is_none();
+        memory.scrolled_to = Some(selected_row);
+        if let Some(row) = selected_row {
+            let rows = &library.rows;
+            let height = ui.available_height();
+            if fresh || !(rows.start < row && row + 2 < rows.end) {
+                let offset = row as f32 * (ROW + spacing) - height * 0.5 + ROW * 0.5;
+                area = area.vertical_scroll_offset(offset.max(0.0));
+            }
+        }
+    }
+    let output = area.show_rows(ui, ROW, shown, |ui, range| {
+        for row in range.clone() {
+            if let Some(id) = cx.state.library.order.get(row).copied() {
+                row_ui(cx, ui, id, Some(row) == selected_row);
+            }
+        }
+        range
+    });
+    if output.inner != cx.state.library.rows {
+        cx.push(LibraryCommand::ShowRows(output.inner));
+    }
+}
+
+/// Brushed pairs, and the progress of the scoring.
+fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
+    if let Some(brush) = &cx.state.library.brush {
+        let button = egui::Button::new(format!("{} brushed ×", brush.len())).selected(true);
+        let response = ui.add(button).accessible_name("Show all pairs again");
+        let tip = "Only the pairs brushed in the scatter are listed. Shows all again";
+        if response.on_hover_text(cx.keys().behind(tip, Action::CancelJobs)).clicked() {
+            cx.push(LibraryCommand::Brush(None));
+        }
+    }
+    let total = cx.state.library.pairs().len();
+    let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
+    let possible = Action::PredictAll.command(cx.state).is_some();
+    if (possible && scored < total) || cx.state.tasks.of_kind(TaskKind::Evaluate).is_some() {
+        predict_all(cx, ui, scored);
+    }
+}
+
+/// The button that scores all pairs, or how far that is.
+pub(crate) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
+    let total = cx.state.library.pairs().len();
+    ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
+        Some((ticket, task)) => {
+            let text = format!("{} of {}", task.progress.done, task.progress.total);
+            let what = (text.as_str(), "Stop; what was scored until then is kept");
+            cx.stoppable(ui, (ticket, task), 260.0, what);
+        }
+        None => {
+            cx.action_button(ui, Action::PredictAll, "Predict all");
+            ui.label(caption(format!("{scored} of {total} scored"), cx.p));
+        }
+    });
+}
+
+/// The color of a score: by size where that means something on its own, else by how it stands among the others.
+pub(crate) fn score_color(p: &Palette, source: &SourceScores, metric: Metric, value: f64) -> Color32 {
+    match (metric, source.standing(metric, value)) {
+        (Metric::Angle, _) if value.is_nan() => p.wrong,
+        (Metric::Angle, _) => error_color(p, value),
+        (_, Grade::Worst) => p.wrong,
+        (_, Grade::Poor) => p.caution,
+        (_, Grade::Fine) => p.text,
+    }
+}
+
+fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
+    let Some(entry) = cx.state.library.entry(id) else { return };
+    let p = cx.p;
+    let review = cx.state.document.review(&entry.name);
+    let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
+    response.widget_info(|| {
+        WidgetInfo::selected(Role::Button, true, selected, format!("{}, {}", entry.name, review.name()))
+    });
+    if ui.is_rect_visible(rect) {
+        let painter = ui.painter_at(rect);
+        let fill = if selected {
+            p.selected
+        } else if response.hovered() {
+            p.control[0]
+        } else {
+            Color32::TRANSPARENT
+        };
+        painter.rect_filled(rect, 4.0, fill);
+        if selected {
+            let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
+            painter.rect_filled(mark, CornerRadius { nw: 4, sw: 4, ne: 0, se: 0 }, p.accent);
+        }
+        let thumb = Rect::from_min_size(rect.min + vec2(6.0, 2.5), vec2(THUMB, ROW - 5.0));
+        match thumbnail(cx, ui, id) {
+            Some(texture) => {
+                let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
+                painter.image(texture, thumb, uv, Color32::WHITE);
+            }
+            None => {
+                painter.rect_filled(thumb, 2.0, p.canvas);
+            }
+        }
+        let left = thumb.right() + 8.0;
+        let dot = pos2(rect.right() - 10.0, rect.center().y);
+        let color = review_color(p, review);
+        if review == Review::Todo {
+            painter.circle_stroke(dot, 3.5, Stroke::new(1.25, color));
+        } else {
+            painter.circle_filled(dot, 4.0, color);
+        }
+        let noted = !cx.state.document.note(&entry.name).is_empty();
+        if noted {
+            note_mark(&painter, pos2(rect.right() - 10.0, rect.top() + 9.0), p.caution);
+        }
+        let mut right = rect.right() - 18.0;
+        if let Some((text, color)) = figure_text(cx, id) {
+            let end = pos2(right, rect.bottom() - 5.0);
+            right = painter.text(end, Align2::RIGHT_BOTTOM, text, FontId::proportional(SMALL), color).left() - 4.0;
+        }
+        let clip = Rect::from_min_max(pos2(left, rect.top()), pos2(right, rect.bottom()));
+        let text = ui.painter_at(clip);
+        let name = short_name(entry);
+        let (font, color) = (FontId::proportional(13.0), if selected { p.strong } else { p.text });
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), color).size().x;
+        let name = cut_in_the_middle(name, rect.right() - 18.0 - left, width);
+        text.text(pos2(left, rect.top() + 5.0), Align2::LEFT_TOP, name, font.clone(), color);
+        let tool = entry.tool.as_deref().unwrap_or("no tool");
+        let tool = tool.strip_prefix("pattern_").unwrap_or(tool).replace('_', " ");
+        let font = FontId::proportional(SMALL);
+        let width = |text: &str| ui.painter().layout_no_wrap(text.to_owned(), font.clone(), p.weak).size().x;
+        let tool = cut_in_the_middle(&tool, right - left, width);
+        text.text(pos2(left, rect.bottom() - 5.0), Align2::LEFT_BOTTOM, tool, font.clone(), p.weak);
+    }
+    let mut tip = format!("{}\n{}", entry.name, review.name());
+    let note = cx.state.document.note(&entry.name);
+    if !note.is_empty() {
+        tip += &format!("\nNote: {note}");
+    }
+    for part in cx.state.table.scores.queue.get(id).into_iter().flat_map(|queued| &queued.parts) {
+        let worse = (100.0 * part.rank).round();
+        tip += &format!("\n{}: more than {worse:.0} % of the others", part.text());
+    }
+    if response.on_hover_text(tip).clicked() {
+        cx.push(LibraryCommand::Select(id));
+    }
+}
+
+/// A sheet with lines: the pair has a note.
+fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
+    painter.rect_stroke(
+        Rect::from_center_size(center, vec2(7.0, 8.0)),
+        1.0,
+        Stroke::new(1.0, color),
+        egui::StrokeKind::Inside,
+    );
+    for y in [-1.0, 1.0] {
+        painter.hline(center.x - 2.0..=center.x + 2.0, center.y + y, Stroke::new(1.0, color));
+    }
+}
+
+/// The score of a pair that the list is about; where the most uncertain come first, why it stands where it does.
+fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
+    let table = &cx.state.table;
+    if cx.state.library.sort == Sort::Uncertain {
+        let part = table.scores.queue.get(pair)?.reason(table.uncertain_by)?;
+        let color = match part.rank {
+            rank if rank > 0.9 => cx.p.wrong,
+            rank if rank > 0.7 => cx.p.caution,
+            _ => cx.p.text,
+        };
+        return Some((format!("{} {}", part.metric.short(), part.metric.text(part.value)), color));
+    }
+    let (source, metric) = table.by()?;
+    let value = source.value(pair, metric)?;
+    Some((metric.text(value), score_color(cx.p, source, metric, value)))
+}
+
+/// The picture of a pair's measured imprint, if it is there.
+fn thumbnail(cx: &mut Cx<'_>, ui: &Ui, id: PairId) -> Option<TextureId> {
+    let open = cx.state.library.open.as_ref()?;
+    let key = open.key(id);
+    // Without a measured imprint it is empty, and the device takes no empty picture: the whole window would stay black.
+    let depth = results::thumbnail(cx.state, id).filter(|depth| !depth.is_empty())?;
+    let range = super::images::range_of(cx.state);
+    let bits = (range.lo.to_bits(), range.hi.to_bits());
+    let map = super::images::map_of(cx.state);
+    let picture = cx
+        .shared
+        .textures
+        .get(ui.ctx(), ("thumbnail", key), (bits, map), false, || (depth_image(depth, map, range), None));
+    Some(picture.texture.id())
+}

@@ -1,0 +1,330 @@
+//! The generator: bundle, steps, seed, range mapping, run, and the results so far.
+
+use crate::app::settings::prefer;
+use crate::app::{recipe, results};
+use eframe::egui::{self, RichText, ScrollArea, Ui, vec2};
+use strum::IntoEnumIterator as _;
+
+use crate::app::action::Action;
+use crate::app::command::{Pane, PredictCommand};
+use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
+use crate::app::settings::{GenerateSettings, STEPS};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{SMALL, caption, section, value};
+use touch2touch_core::diffusion::GUIDANCE;
+use touch2touch_work::bundles::{BundleInfo, BundleKind};
+
+/// Width of the captions at the left.
+const LABEL: f32 = 60.0;
+
+/// A caption at the left of its control.
+fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
+    // In a narrow pane what does not fit beside the name stands below it.
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let layout = egui::Layout::left_to_right(egui::Align::Center);
+        ui.allocate_ui_with_layout(vec2(LABEL, 24.0), layout, |ui| {
+            ui.set_min_width(LABEL);
+            ui.label(RichText::new(name).color(weak));
+        });
+        add(ui);
+    });
+}
+
+/// Nothing is kept between frames.
+pub(crate) type Memory = ();
+
+/// The pane.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
+            settings(cx, ui);
+            run(cx, ui);
+            ui.add_space(4.0);
+            mapping(cx, ui);
+            ui.add_space(4.0);
+            results(cx, ui);
+        });
+    });
+}
+
+/// The model bundle, and the folders that are none.
+fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
+    row(ui, cx.p.weak, "Model", |ui| {
+        let bundles: Vec<_> = cx.state.library.bundles.iter().filter(|b| b.kind == BundleKind::Generator).collect();
+        let current = recipe::bundle(cx.state, BundleKind::Generator).map_or("none found", |b| b.name.as_str());
+        let combo =
+            egui::ComboBox::from_id_salt("bundle").width(ui.available_width() - 8.0).selected_text(current).truncate();
+        let response = combo.show_ui(ui, |ui| {
+            for bundle in bundles {
+                let chosen = bundle.name == current;
+                // One for other sensors stays in the list, and says why it cannot be used.
+                let misfit = bundle.ends(&cx.state.rig()).and_then(Result::err);
+                let label = egui::Button::selectable(chosen, egui::RichText::new(&bundle.name));
+                let option = ui.add_enabled(misfit.is_none(), label);
+                let option = match misfit {
+                    Some(misfit) => option.on_disabled_hover_text(misfit.to_string()),
+                    None => option.on_hover_text(bundle.origin.to_string()),
+                };
+                if option.clicked() {
+                    new.bundle = Some(bundle.name.clone());
+                }
+            }
+        });
+        response.response.accessible_name("Model").on_hover_text("The model bundle that generates");
+    });
+    for problem in &cx.state.library.bundle_problems {
+        ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
+    }
+}
+
+fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
+    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
+    let spelt_out = cx.state.settings.generate.spelt_out(bundle);
+    let mut new = spelt_out.clone();
+    model(cx, ui, &mut new);
+    row(ui, cx.p.weak, "Preset", |ui| {
+        for preset in Preset::iter() {
+            let chosen = spelt_out.preset == Some(preset);
+            let button = ui.add(egui::Button::selectable(chosen, preset_name(preset)));
+            if button.on_hover_text(preset_help(preset, bundle)).clicked() {
+                new = GenerateSettings { preset: Some(preset), ..spelt_out.clone() };
+            }
+        }
+        if spelt_out.preset.is_none() {
+            ui.label(caption("own numbers", cx.p));
+        }
+    });
+    row(ui, cx.p.weak, "Sampler", |ui| {
+        let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
+        let response = combo.show_ui(ui, |ui| {
+            for sampler in Sampler::iter() {
+                ui.selectable_value(&mut new.sampler, sampler, sampler_name(sampler));
+            }
+        });
+        response.response.accessible_name("Sampler").on_hover_text("The way from noise to an image");
+        ui.label(RichText::new("eta").color(cx.p.weak));
+        let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
+        reset(
+            ui.add(drag).accessible_name("Eta"),
+            "DDIM's share of fresh noise, 0 to 1; 0 is deterministic",
+            "0.00",
+            || {
+                new.eta = GenerateSettings::default().eta;
+            },
+        );
+    });
+    row(ui, cx.p.weak, "Steps", |ui| {
+        let drag = egui::DragValue::new(&mut new.steps).speed(0.2).range(STEPS);
+        let tip = "Denoising steps: more take longer and add detail";
+        let recommended = bundle.and_then(|bundle| bundle.generator.as_ref()).map_or(10, |g| g.defaults.steps);
+        reset(ui.add(drag).accessible_name("Steps"), tip, &recommended.to_string(), || new.steps = recommended);
+        let both = ui.checkbox(&mut new.both_fingers, "both fingers");
+        both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
+    });
+    row(ui, cx.p.weak, "Seed", |ui| {
+        let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
+        reset(
+            ui.add(drag).accessible_name("Seed"),
+            "Seed of the noise: the same seed gives the same prediction",
+            "42",
+            || {
+                new.seed = GenerateSettings::default().seed;
+            },
+        );
+        let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
+        if lock.on_hover_text(cx.keys().help(Action::LockSeed)).clicked() {
+            new.seed_locked = !new.seed_locked;
+        }
+        cx.action_button(ui, Action::GenerateNewSeed, "New");
+    });
+    if guided {
+        row(ui, cx.p.weak, "Guidance", |ui| {
+            let range = *GUIDANCE.start()..=*GUIDANCE.end();
+            let drag = egui::DragValue::new(&mut new.guidance).speed(0.05).range(range).fixed_decimals(1);
+            let tip = "How strongly the touch decides: above 1 more than the model alone would let it";
+            reset(ui.add(drag).accessible_name("Guidance"), tip, "1.0", || new.guidance = 1.0);
+        });
+    }
+    row(ui, cx.p.weak, "Preview", |ui| {
+        let drag = egui::DragValue::new(&mut new.preview_every).speed(0.1).range(0..=100);
+        let tip = "A picture on the way after so many steps, and after the first; 0 shows only the result";
+        reset(ui.add(drag.prefix("every ").suffix(" steps")).accessible_name("Preview"), tip, "4", || {
+            new.preview_every = GenerateSettings::default().preview_every;
+        });
+        let by_itself = ui.checkbox(&mut new.by_itself, "by itself");
+        by_itself.on_hover_text(
+            "The pair on screen is predicted without a click where that takes less than a second on this machine, by \
+             what earlier predictions took. Default on",
+        );
+    });
+    if new != spelt_out {
+        // Whoever changes a number has left the preset.
+        if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
+            new.preset = None;
+        }
+        cx.push(prefer(move |s| s.generate = new.clone()));
+    }
+}
+
+/// Tooltip with the default; a double-click resets.
+fn reset(response: egui::Response, tip: &str, default: &str, mut set: impl FnMut()) {
+    if response.double_clicked() {
+        set();
+    }
+    response.on_hover_text(format!("{tip}. Default {default}; double-click resets"));
+}
+
+fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    let running = cx.state.tasks.any_generating();
+    let width = ui.available_width();
+    match running {
+        Some((ticket, task)) => {
+            let text = if task.progress.text.is_empty() { "starting" } else { &task.progress.text };
+            let tip = cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs);
+            ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, (text, &tip)));
+        }
+        None => {
+            let can = results::can_generate(cx.state);
+            let text = RichText::new("Generate").family(crate::ui::parts::theme::medium()).color(cx.p.on_accent);
+            let button = egui::Button::new(text).fill(cx.p.accent).min_size(vec2(width, 28.0));
+            let response = ui.add_enabled(can.is_ok(), button).accessible_name("Generate");
+            let response = response.on_hover_text(cx.keys().help(Action::Generate));
+            let why = can.err().map_or("", |absent| absent.text());
+            if response.on_disabled_hover_text(why).clicked() {
+                cx.act(Action::Generate);
+            }
+            if !why.is_empty() {
+                ui.label(RichText::new(why).size(SMALL).color(cx.p.caution));
+            }
+        }
+    }
+}
+
+/// The name on screen.
+fn preset_name(preset: Preset) -> &'static str {
+    match preset {
+        Preset::Fast => "Fast",
+        Preset::Default => "Default",
+        Preset::Sharp => "Sharp",
+    }
+}
+
+/// Tooltip of a preset: what it does with this bundle.
+fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
+    let what = match preset {
+        Preset::Fast => "For looking through a data set: about the mean of all plausible imprints",
+        Preset::Default => "What the model's bundle recommends",
+        Preset::Sharp => "The sharpest picture: as many steps as still change anything",
+    };
+    match bundle.and_then(|bundle| bundle.generator.as_ref()) {
+        Some(g) => {
+            let config = preset.config(g.defaults, g.training_steps);
+            format!("{what}: {} with {} steps", sampler_name(config.sampler), config.steps)
+        }
+        None => what.to_owned(),
+    }
+}
+
+/// The name on screen.
+fn sampler_name(sampler: Sampler) -> &'static str {
+    match sampler {
+        Sampler::Ddim => "DDIM",
+        Sampler::Ddpm => "DDPM",
+        Sampler::DpmSolver2m => "DPM++ 2M",
+    }
+}
+
+fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.label(section("Range mapping", cx.p));
+    let current = cx.state.settings.shift;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        // The refit is there once its statistics are; until then the button brings them.
+        for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
+            let radio = ui.radio(mode == current, mode.label());
+            if radio.on_hover_text(shift_tooltip(mode)).clicked() {
+                cx.push(prefer(move |s| s.shift = mode));
+            }
+        }
+        if cx.state.settings.refit.is_none() {
+            cx.action_button(ui, Action::Refit, "Refit…");
+        }
+    });
+}
+
+fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let finger = cx.state.selection.finger;
+    let Some(touch) = cx.state.touch_key(finger) else { return };
+    let keys: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
+    ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
+    if keys.is_empty() {
+        ui.label(caption("None yet for this touch.", cx.p));
+        return;
+    }
+    let chosen = results::chosen(cx.state, finger).cloned();
+    let shift = cx.state.settings.shift;
+    for recipe in keys.iter().rev() {
+        let selected = chosen.as_ref() == Some(recipe);
+        let psnr = cx
+            .state
+            .results
+            .versus
+            .get(&VersusKey::measured(recipe.clone(), shift))
+            .and_then(|c| c.psnr_db)
+            .map_or(String::new(), |v| format!("{v:.1} dB"));
+        let prediction = cx.state.results.predictions.get(recipe);
+        let seconds = prediction.map_or(String::new(), |p| match p.kept {
+            true => "kept".to_owned(),
+            false => format!("{:.1} s", p.seconds),
+        });
+        let took = prediction.map_or(String::new(), |p| match p.kept {
+            true => format!("Made earlier in {:.1} s and kept on the disk", p.seconds),
+            false => format!("Made in {:.2} s", p.seconds),
+        });
+        ui.horizontal_wrapped(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let text = format!("seed {}", recipe.config.seed);
+            let label = ui.add(egui::Button::selectable(selected, text).min_size(vec2(84.0, 20.0)));
+            if label.on_hover_text("Show this prediction").clicked() {
+                choose(cx, recipe);
+            }
+            ui.label(caption(format!("{} steps", recipe.config.steps), cx.p));
+            ui.label(value(psnr, cx.p).size(SMALL));
+            ui.label(caption(seconds, cx.p)).on_hover_text(took);
+            let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
+            let reuse = reuse.accessible_name(format!("Use seed {}", recipe.config.seed));
+            if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
+                let config = recipe.config;
+                cx.push(prefer(move |s| {
+                    s.generate = GenerateSettings {
+                        preset: None,
+                        steps: config.steps,
+                        seed: config.seed,
+                        seed_locked: true,
+                        sampler: config.sampler,
+                        eta: config.eta,
+                        spacing: config.spacing,
+                        guidance: config.guidance,
+                        ..s.generate.clone()
+                    }
+                }));
+            }
+        });
+    }
+}
+
+/// Shows a prediction, and that of the other finger made with the same settings, if there is one.
+fn choose(cx: &mut Cx<'_>, recipe: &PredictionKey) {
+    cx.push(PredictCommand::Choose(recipe.clone()));
+    for finger in cx.state.rig().pads() {
+        let Some(touch) = cx.state.touch_key(finger) else { continue };
+        let other = PredictionKey { touch, ..recipe.clone() };
+        if other != *recipe && cx.state.results.predictions.contains(&other) {
+            cx.push(PredictCommand::Choose(other));
+        }
+    }
+}

@@ -1,0 +1,79 @@
+//! The mask on an image.
+
+use eframe::egui::{Color32, Key, Ui};
+
+use super::Memory;
+use crate::app::keys::{ImprintSource, MaskVersion};
+use crate::app::pane::Pane;
+use crate::app::{labels, results};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{CONTACT, GHOST, IGNORED, PROPOSED};
+use crate::ui::parts::widget::image_canvas::CanvasOutput;
+use crate::ui::parts::widget::texture::{dashes, mask_image, outline};
+use touch2touch_core::rig::PadId;
+
+/// True while a key is held that takes everything off the imprint, so that the data itself is seen.
+pub(super) fn is_bared(ui: &Ui) -> bool {
+    ui.input(|i| i.key_down(Key::X)) && !ui.ctx().egui_wants_keyboard_input()
+}
+
+/// The mask in force as a veil with an outline, or the outline alone.
+pub(super) fn mask(
+    cx: &mut Cx<'_>,
+    ui: &Ui,
+    memory: &mut Memory,
+    output: &CanvasOutput,
+    source: ImprintSource,
+    finger: PadId,
+) {
+    let settings = &cx.state.settings;
+    if !settings.mask_visible {
+        return;
+    }
+    let Ok(in_force) = results::mask_in_force(cx.state, source, finger) else { return };
+    let key: (&MaskVersion, _) = (&in_force.version, results::imprint_key(cx.state, source, finger).ok());
+    // Where nobody paints the data itself is what counts: the outline says enough.
+    let veiled = !settings.mask_outline && !results::shows_influence(cx.state, source);
+    if veiled && cx.state.selection.panes.contains(&Pane::Masks) {
+        let mask = in_force.mask;
+        let slot = ("mask", source, finger);
+        let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);
+        output.paint(texture, CONTACT.gamma_multiply(settings.mask_opacity));
+    }
+    if let Some(ignored) = results::drawn_mask(cx.state, source, finger).and_then(|hand| hand.marks.ignored()) {
+        let slot = ("ignored", source, finger);
+        let veil = || (mask_image(ignored, Color32::WHITE), None);
+        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
+        output.paint(picture.texture.id(), IGNORED.gamma_multiply(settings.mask_opacity));
+        let segments = memory.outlines.get(&("ignored", source, finger), &key, || outline(ignored));
+        output.segments(segments, IGNORED, 1.25);
+    }
+    if !settings.mask.gate.is_open() && cx.state.selection.panes.contains(&Pane::Masks) {
+        let gate = serde_json::to_string(&settings.mask.gate).unwrap_or_default();
+        let key = (gate, key.1.clone(), results::gate_is_known(cx.state, source, finger));
+        let allowed = || results::allowed(cx.state, source, finger).ok().flatten();
+        let segments = memory
+            .outlines
+            .get(&("gate", source, finger), &key, || allowed().map(|allowed| outline(&allowed)).unwrap_or_default());
+        output.segments(segments, Color32::from_gray(190), 1.0);
+    }
+    if let Some(proposal) = results::shown_proposal(cx.state, source, finger) {
+        let key = results::proposal_key(cx.state, source, finger).ok();
+        let slot = ("proposal", source, finger);
+        let veil = || (mask_image(&proposal.mask, Color32::WHITE), None);
+        let picture = cx.shared.textures.get(ui.ctx(), slot, &key, true, veil);
+        output.paint(picture.texture.id(), PROPOSED.gamma_multiply(0.6 * settings.mask_opacity));
+        let segments = memory.outlines.get(&slot, &key, || outline(&proposal.mask));
+        output.segments(segments, Color32::from_black_alpha(110), 2.5);
+        output.segments(segments, PROPOSED, 1.25);
+    }
+    if let Some(ghost) = labels::ghost(cx.state, source).filter(|ghost| ghost.finger == finger) {
+        let dashes = memory.outlines.get(&("ghost", source, finger), ghost.revision, || dashes(&outline(ghost.mask)));
+        output.segments(dashes, Color32::from_black_alpha(140), 2.5);
+        output.segments(dashes, GHOST, 1.5);
+    }
+    let mask = in_force.mask;
+    let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask));
+    output.segments(segments, Color32::from_black_alpha(110), 2.5);
+    output.segments(segments, CONTACT, 1.25);
+}

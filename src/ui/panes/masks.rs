@@ -1,0 +1,508 @@
+//! The mask tools: brush, eraser, automatic sources with live preview, clean-ups, undo, review state.
+
+mod proposal;
+mod stats;
+
+use crate::app::results;
+use crate::app::settings::prefer;
+use eframe::egui::{self, Align, Layout, RichText, ScrollArea, Ui, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::browser::review_color;
+use crate::app::action::Action;
+use crate::app::command::{LabelsCommand, Pane, ViewCommand};
+use crate::app::keys::ImprintSource;
+use crate::app::labels::Review;
+use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool, ToolRow};
+use crate::app::state::Lookup;
+use crate::app::workbench::SceneTool;
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
+use touch2touch_core::label::{DrawTool, Layers, Paint};
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::labels::{MAX_NOTE, system_person};
+
+/// The note being typed.
+#[derive(Default)]
+pub(crate) struct Memory {
+    /// The pair that it is of.
+    pair: String,
+    /// The text.
+    note: String,
+    /// True while it is being typed.
+    typing: bool,
+}
+
+/// The pane.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        if let Some(err) = cx.state.document.blocked(cx.state.pair_name()) {
+            ui.label(RichText::new("The stored labels of this pair cannot be read.").color(cx.p.wrong));
+            ui.label(caption(format!("{err} They are left untouched, and this pair cannot be edited."), cx.p));
+            return;
+        }
+        ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
+            // What every mask takes comes first, so that it is on screen without scrolling.
+            tools(cx, ui);
+            correct(cx, ui);
+            review(cx, ui);
+            proposal::show(cx, ui);
+            source(cx, ui);
+            if system_person().is_none() {
+                super::settings_pane::person(cx, ui);
+            }
+            note(cx, ui, memory);
+            clean_ups(cx, ui);
+            opacity(cx, ui);
+            stats::show(cx, ui);
+        });
+    });
+}
+
+fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for tool in MaskTool::iter() {
+            let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
+            let button = egui::Button::selectable(mask.tool == tool, row.name).min_size(vec2(56.0, 24.0));
+            if ui.add(button).on_hover_text(cx.keys().help(row.action)).clicked() {
+                cx.act(row.action);
+            }
+        }
+    });
+    let mask = &cx.state.settings.mask;
+    match mask.tool.row(mask) {
+        ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
+        ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
+        // As high as a number: what lies below stays where it is from tool to tool.
+        row => _ = ui.horizontal(|ui| ui.label(caption(row.hint, cx.p))),
+    }
+    paints(cx, ui);
+    in_3d(cx, ui);
+    gate(cx, ui);
+    overlay(cx, ui);
+}
+
+/// Drawing on the points of the 3D views, and what that reaches.
+fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(caption("In 3D", cx.p));
+        let on = cx.state.workbench.tool == SceneTool::Paint;
+        cx.action_switch(ui, Action::PaintIn3d, "draw", on);
+        let now = cx.state.settings.mask.layers;
+        for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
+            let button = ui.add(egui::Button::selectable(now == layers, text));
+            let tip = format!("Drawings in 3D reach {}", layers.name());
+            if button.on_hover_text(cx.keys().behind(&tip, Action::PaintLayers)).clicked() && now != layers {
+                cx.act(Action::PaintLayers);
+            }
+        }
+    });
+}
+
+/// Choice of what the tools make of the pixels.
+fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(caption("Paint", cx.p));
+        let now = cx.state.settings.mask.paint;
+        for (paint, text, tip, color) in [
+            (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
+            (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore), IGNORED),
+            (Paint::LetThrough, "proposal", cx.keys().help(Action::LetThrough), PROPOSED),
+        ] {
+            if paint == Paint::LetThrough && now != paint && !results::proposes(cx.state) {
+                continue;
+            }
+            let text = RichText::new(text).color(if now == paint { color } else { cx.p.text });
+            if ui.add(egui::Button::selectable(now == paint, text)).on_hover_text(tip).clicked() {
+                cx.push(prefer(move |s| s.mask.paint = paint));
+            }
+        }
+    });
+}
+
+fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        let mut radius = cx.state.settings.mask.radius_px;
+        ui.spacing_mut().slider_width = (ui.available_width() - 148.0).max(40.0);
+        let slider = egui::Slider::new(&mut radius, BRUSH_RADIUS_PX).logarithmic(true).fixed_decimals(1).suffix(" px");
+        let response = ui.add(slider).accessible_name("Brush radius");
+        if response.double_clicked() {
+            radius = MaskSettings::default().radius_px;
+        }
+        if response.changed() || response.double_clicked() {
+            cx.push(prefer(move |s| s.mask.radius_px = radius));
+        }
+        let mm = f64::from(radius) / cx.state.rig().depth_px_per_mm();
+        ui.label(caption(format!("{mm:.2} mm"), cx.p));
+        let tip = "Radius of brush and eraser, image pixels ([[brush_smaller]] and [[brush_larger]], Shift + wheel, \
+                   Alt + move). Double-click resets";
+        response.on_hover_text(cx.keys().fill(tip));
+    });
+}
+
+/// A slider over millimeters of a length in meters; whether it changed.
+fn slider_mm(ui: &mut Ui, name: &str, meters: &mut f32, range: std::ops::RangeInclusive<f32>, tip: &str) -> bool {
+    let mut mm = *meters * 1e3;
+    let slider = egui::Slider::new(&mut mm, range).fixed_decimals(2).suffix(" mm");
+    let changed = ui.add(slider).accessible_name(name).on_hover_text(tip).changed();
+    if changed {
+        *meters = mm * 1e-3;
+    }
+    changed
+}
+
+fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let mut new = cx.state.settings.mask.clone();
+    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
+    let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
+               halves it";
+    if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {
+        cx.push(prefer(move |s| s.mask = new.clone()));
+    }
+}
+
+/// Limits on the pixels that a hand may change.
+fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let mut new = cx.state.settings.mask.clone();
+    let gate = &mut new.gate;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 6.0;
+        ui.label(caption("Only", cx.p));
+        let mut by_depth = gate.depth_m.is_some();
+        let tip = "Tools change only pixels whose imprint lies between two depths";
+        if ui.checkbox(&mut by_depth, "in depth").on_hover_text(tip).changed() {
+            gate.depth_m = by_depth.then_some([cx.state.settings.mask.choice.threshold_m, 0.02]);
+        }
+        let mut by_cad = gate.cad_m.is_some();
+        let tip = "Tools change only pixels whose membrane point lies near the CAD model at the true pose";
+        if ui.checkbox(&mut by_cad, "near CAD").on_hover_text(tip).changed() {
+            gate.cad_m = by_cad.then_some(cx.state.settings.mask.choice.cad_distance_m);
+        }
+        let invert = egui::Checkbox::new(&mut gate.inverted, "invert");
+        let open = gate.depth_m.is_none() && gate.cad_m.is_none();
+        ui.add_enabled(!open, invert).on_hover_text("Tools change everything but that");
+    });
+    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
+    if let Some([lo, hi]) = &mut gate.depth_m {
+        slider_mm(ui, "Gate from depth", lo, -5.0..=20.0, "The least depth that may change");
+        slider_mm(ui, "Gate to depth", hi, -5.0..=20.0, "The greatest depth that may change");
+    }
+    if let Some(cad_m) = &mut gate.cad_m {
+        slider_mm(ui, "Gate around CAD", cad_m, 0.0..=5.0, "The greatest distance to the CAD model");
+    }
+    if new.gate != cx.state.settings.mask.gate {
+        cx.push(prefer(move |s| s.mask = new.clone()));
+    }
+}
+
+/// The automatic source, with its number.
+fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    ui.label(section("Automatic source", cx.p));
+    let settings = &cx.state.settings.mask;
+    let finger = cx.state.selection.finger;
+    let combo = egui::ComboBox::from_id_salt("mask source").width(ui.available_width() - 8.0);
+    let response = combo.selected_text(settings.choice.source.name()).show_ui(ui, |ui| {
+        for source in MaskSource::iter() {
+            let option = ui.selectable_label(source == settings.choice.source, source.name());
+            if option.on_hover_text(source.tooltip()).clicked() {
+                cx.out.push(prefer(move |s| s.mask.choice.source = source).into());
+            }
+        }
+    });
+    response.response.accessible_name("Mask source").on_hover_text(settings.choice.source.tooltip());
+    let mut new = settings.clone();
+    ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
+    match settings.choice.source {
+        MaskSource::Threshold => {
+            let mut mm = new.choice.threshold_m * 1e3;
+            let slider = egui::Slider::new(&mut mm, 0.0..=15.0).fixed_decimals(2).suffix(" mm");
+            let response = ui.add(slider).accessible_name("Threshold");
+            if response.double_clicked() {
+                mm = MaskChoice::default().threshold_m * 1e3;
+            }
+            new.choice.threshold_m = mm * 1e-3;
+            response
+                .on_hover_text("Pixels pushed in further than this, millimeters. Default 5.00; double-click resets");
+        }
+        MaskSource::TopPercent => {
+            let slider = egui::Slider::new(&mut new.choice.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");
+            let response = ui.add(slider).accessible_name("Top percent");
+            if response.double_clicked() {
+                new.choice.top_percent = MaskChoice::default().top_percent;
+            }
+            response.on_hover_text("Share of the deepest pixels. Default 15.0; double-click resets");
+        }
+        MaskSource::Cad => {
+            let mut mm = new.choice.cad_distance_m * 1e3;
+            let slider = egui::Slider::new(&mut mm, 0.0..=5.0).fixed_decimals(2).suffix(" mm");
+            let response = ui.add(slider).accessible_name("CAD distance");
+            if response.double_clicked() {
+                mm = MaskChoice::default().cad_distance_m * 1e3;
+            }
+            new.choice.cad_distance_m = mm * 1e-3;
+            response
+                .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
+        }
+        MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
+        MaskSource::Truth => {}
+    }
+    if let Err(absent) = results::mask_recipe(cx.state, finger) {
+        ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
+    }
+    if new != *settings {
+        cx.push(prefer(move |s| s.mask = new.clone()));
+    }
+    for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
+        let several = results::imprint(cx.state, ImprintSource::Predicted, finger).ready().is_some();
+        for source in ImprintSource::iter() {
+            if several || source == results::worked_on(cx.state, finger) {
+                in_force(cx, ui, source, finger);
+            }
+        }
+    }
+}
+
+/// Origin of the mask of one imprint.
+fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
+    let text = match results::mask_in_force(cx.state, source, finger) {
+        Ok(mask) => mask.label,
+        Err(Lookup::Failed(err)) => err.why.clone(),
+        Err(Lookup::Absent(absent)) => absent.text().to_owned(),
+        Err(_) => "…".to_owned(),
+    };
+    let color = if results::drawn_mask(cx.state, source, finger).is_some() { cx.p.strong } else { cx.p.weak };
+    let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
+    let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
+    ui.add(label).on_hover_text(format!("The mask in force. {text}"));
+}
+
+/// From which probability on the mask model's pixels are contact.
+fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
+    /// Probability at which somebody starts who chooses it himself.
+    const START: f32 = 0.5;
+    ui.horizontal(|ui| {
+        let mut own = choice.probability.is_some();
+        let tip = "Choose the probability from which a pixel is contact; off, it is as the mask model's bundle says";
+        if ui.checkbox(&mut own, "probability").on_hover_text(tip).changed() {
+            choice.probability = own.then_some(START);
+        }
+        if let Some(least) = &mut choice.probability {
+            ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
+            let slider = egui::Slider::new(least, 0.0..=1.0).fixed_decimals(2);
+            ui.add(slider).accessible_name("Probability").on_hover_text("Least probability of contact, 0 to 1");
+        }
+    });
+}
+
+fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    let finger = cx.state.selection.finger;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        ui.label(section(&format!("Correct, {}", cx.state.finger_name(finger)), cx.p));
+        let worked_on = results::worked_on(cx.state, finger);
+        for source in ImprintSource::iter() {
+            let there = results::imprint(cx.state, source, finger).ready().is_some();
+            let button = ui.add_enabled(there, egui::Button::selectable(worked_on == source, source.name()));
+            let button = button.accessible_name(format!("Correct the {} imprint's mask", source.key()));
+            let tip =
+                "The imprint that the buttons below work on: the last one painted on. Each imprint has its own mask";
+            if button.on_hover_text(tip).on_disabled_hover_text("There is no such imprint yet").clicked() {
+                cx.push(ViewCommand::SelectImprint(source));
+            }
+        }
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
+        cx.action_button(ui, Action::TakeOver, "Other's mask");
+    });
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        cx.action_button(ui, Action::ResetMask, "Remove");
+        let (name, shown) = (cx.state.pair_name(), results::mask_places(cx.state));
+        let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
+        let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
+        for (action, text, what) in [(Action::Undo, "Undo", undo), (Action::Redo, "Redo", redo)] {
+            let response = cx.action_button(ui, action, text);
+            if let Some(what) = what {
+                response.on_hover_text(format!("{text} {what}"));
+            }
+        }
+    });
+    effect(cx, ui);
+}
+
+/// Effect of the last change of a mask on the pose, as soon as that is registered again.
+fn effect(cx: &Cx<'_>, ui: &mut Ui) {
+    let Some(changed) = cx.state.document.changed.as_ref().filter(|c| c.pair == cx.state.pair_name()) else { return };
+    let deg = |rad: f64| units::text_deg(rad);
+    let before = changed.before.as_ref().and_then(|key| cx.state.results.poses.get(key));
+    let provisional = results::provisional_pose(cx.state, changed.source);
+    let now = provisional.map_or_else(|| results::pose(cx.state, changed.source), |pose| Lookup::Ready(&**pose));
+    let (text, color) = match (now, before) {
+        (Lookup::Ready(pose), Some(before)) => {
+            let (from, to) = (before.angle_rad, pose.angle_rad);
+            let mut text = format!("{}: angle {:+.2}° to {}", changed.name, (to - from).to_degrees(), deg(to));
+            let mut color = cx.p.text;
+            if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
+                let [before, now] = [from, to].map(deg);
+                text += &format!("; error {before} to {now}");
+                color = match before == now {
+                    true => cx.p.text,
+                    false if to < from => cx.p.good,
+                    false => cx.p.caution,
+                };
+            }
+            if provisional.is_some() {
+                text += "; being proved…";
+            }
+            (text, color)
+        }
+        (Lookup::Stale(_) | Lookup::Waiting, _) => (format!("{}: registering…", changed.name), cx.p.weak),
+        (Lookup::Failed(err), _) => (format!("{}: no pose: {}", changed.name, err.why), cx.p.caution),
+        (Lookup::Absent(_), _) | (Lookup::Ready(_), None) => return,
+    };
+    let label = egui::Label::new(RichText::new(text).size(SMALL).color(color)).wrap();
+    ui.add(label).on_hover_text("What the last change of the mask did to the registered angle");
+}
+
+/// `saved 12:03:11`, or what is not saved yet.
+pub(crate) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
+    let (text, color) = if cx.state.document.stroke.is_some() {
+        ("unsaved stroke".to_owned(), cx.p.caution)
+    } else {
+        crate::ui::parts::saved::text(&cx.shared.saved, &cx.state.document, cx.state.pair_name(), cx.p)
+    };
+    if !text.is_empty() {
+        ui.label(RichText::new(text).size(SMALL).color(color))
+            .on_hover_text("Labels are written after every change, to a file beside the old one that then replaces it");
+    }
+}
+
+fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    ui.label(section("Clean up", cx.p));
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for (action, text) in [
+            (Action::FillHoles, "Fill holes"),
+            (Action::LargestIsland, "Largest"),
+            (Action::ClearBorder, "No border"),
+            (Action::ClearMask, "Clear"),
+            (Action::DropSmall, "Drop small"),
+            (Action::OpenMask, "Open"),
+            (Action::CloseMask, "Close"),
+            (Action::SmoothMask, "Smooth"),
+            (Action::GrowMask, "Grow"),
+            (Action::ShrinkMask, "Shrink"),
+        ] {
+            cx.action_button(ui, action, text);
+        }
+    });
+    ui.horizontal(|ui| {
+        ui.label(caption("by", cx.p));
+        let mut new = cx.state.settings.mask.clone();
+        ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
+        let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
+        let slider = ui.add(slider).accessible_name("Clean-up size");
+        let tip =
+            "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
+        if slider.on_hover_text(tip).changed() {
+            cx.push(prefer(move |s| s.mask = new.clone()));
+        }
+    });
+}
+
+fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.add_space(2.0);
+    ui.horizontal(|ui| {
+        ui.label(section("Review", cx.p));
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));
+    });
+    let current = cx.state.document.review(cx.state.pair_name());
+    let editable = cx.state.document.is_editable(cx.state.pair_name());
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        for review in Review::iter() {
+            let on = review == current;
+            let color = if on { review_color(cx.p, review) } else { cx.p.text };
+            let text =
+                RichText::new(review.name()).color(if on && review == Review::Skip { cx.p.strong } else { color });
+            let button = ui.add_enabled(editable, egui::Button::selectable(on, text));
+            let button = button.accessible_name(format!("Review: {}", review.name()));
+            if button.on_hover_text("The review state of this pair").clicked() {
+                cx.push(LabelsCommand::SetReview(review));
+            }
+        }
+        cx.action_button(ui, Action::DoneAndNext, "Done, next");
+    });
+}
+
+/// The note of the pair: what is typed becomes part of the document when the field is left, as one change.
+fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
+    let name = cx.state.pair_name();
+    let closing = ui.input(|i| i.viewport().close_requested());
+    // Another pair was chosen meanwhile, or the window closes: the text is of the pair it was typed for.
+    if memory.typing && (memory.pair != name || closing) {
+        memory.typing = false;
+        cx.out.push(LabelsCommand::SetNote(memory.pair.clone(), memory.note.clone()).into());
+    }
+    if !memory.typing {
+        name.clone_into(&mut memory.pair);
+        cx.state.document.note(name).clone_into(&mut memory.note);
+    }
+    let editable = cx.state.document.is_editable(name);
+    let edit = egui::TextEdit::singleline(&mut memory.note)
+        .hint_text("Note")
+        .char_limit(MAX_NOTE)
+        .desired_width(ui.available_width() - 8.0);
+    let response = ui.add_enabled(editable, edit).accessible_name("Note");
+    memory.typing |= response.has_focus();
+    if memory.typing && response.lost_focus() {
+        memory.typing = false;
+        cx.push(LabelsCommand::SetNote(memory.pair.clone(), memory.note.clone()));
+    }
+    let tip = "What is to be said about this pair. The list shows a mark and finds pairs by the words of their notes";
+    response.on_hover_text(tip);
+}
+
+/// Switches of the layers over the imprints.
+fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (settings, selection) = (&cx.state.settings, &cx.state.selection);
+    let switches = [
+        (Action::MaskVisible, "mask", settings.mask_visible),
+        (Action::MaskOutline, "outline", settings.mask_outline),
+        (Action::Ghosts, "before", settings.ghosts),
+        (Action::Influence, "influence", selection.influence),
+        (Action::Lens, "lens", selection.lens),
+        (Action::Footprint, "GelSlim window", settings.footprint_visible),
+    ];
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+        ui.label(caption("Show", cx.p));
+        for (action, text, on) in switches {
+            cx.action_switch(ui, action, text, on);
+        }
+    });
+}
+
+fn opacity(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        ui.label(caption("Opacity", cx.p));
+        let mut opacity = cx.state.settings.mask_opacity;
+        ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
+        let response =
+            ui.add(egui::Slider::new(&mut opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Mask opacity");
+        if response.changed() {
+            cx.push(prefer(move |s| s.mask_opacity = opacity));
+        }
+        response.on_hover_text("How strongly the mask covers the image (- and =). Hold X to hide it");
+    });
+}

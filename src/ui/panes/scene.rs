@@ -1,0 +1,420 @@
+//! The 3D panes: cloud, contact points and CAD model, measured and predicted, with linked cameras.
+
+mod build;
+mod draw;
+mod ghost;
+mod gizmo;
+mod hands;
+mod layers;
+mod legend;
+mod measure;
+mod overlay;
+mod section;
+mod steps;
+mod verdict;
+
+use eframe::egui::{self, Color32, Ui};
+use glam::{DAffine3, DVec3};
+use strum::IntoEnumIterator as _;
+
+use build::{SceneCloud, SceneSurface};
+use ghost::SceneGhost;
+use gizmo::Gizmo;
+use layers::LayerColors;
+use steps::StepLines;
+
+use super::images;
+use crate::app::action::Action;
+use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
+use crate::app::keys::{DatasetSeq, ImprintSource};
+use crate::app::results;
+use crate::app::state::Lookup;
+use crate::app::workbench::WorkbenchCommand;
+use crate::gpu::pick::nearest_point;
+use crate::gpu::view::{Camera, Preset};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::scene_view::{Grip, SceneOutput, SceneView};
+use crate::ui::parts::widget::empty;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::cloud::Clouds;
+
+pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
+pub(crate) use layers::{DISTANCE_MAP, outline};
+pub(crate) use legend::distances;
+pub(crate) use overlay::{angle_text, error_color, pose_details, pose_time};
+
+/// Width of the column of buttons, points.
+const BUTTONS: f32 = 28.0;
+
+/// Distance of the pointer from a point at which it means it, physical pixels.
+const PICK_PX: f64 = 9.0;
+
+/// The views of both sides, and what the renderer holds of the results; lists are by [`ImprintSource`].
+#[derive(Default)]
+pub(crate) struct Memory {
+    /// Cameras and pictures.
+    views: [SceneView; 2],
+    /// Points on the device.
+    clouds: [Option<SceneCloud>; 2],
+    /// Membranes as surfaces, while they are shown.
+    surfaces: [Option<SceneSurface>; 2],
+    /// Contact points that the last change of a mask dropped and added, while they are shown.
+    ghosts: [Option<SceneGhost>; 2],
+    /// The data set that the views were fitted to.
+    fitted: Option<DatasetSeq>,
+    /// Colors of the contact points.
+    layer_colors: [Option<LayerColors>; 2],
+    /// The handles of the pose tool.
+    gizmo: Gizmo,
+    /// The side whose picture the pen draws on now.
+    drawing: Option<ImprintSource>,
+    /// The CAD model on the device.
+    mesh: Option<SceneMesh>,
+    /// Correspondences of the step that the time machine shows.
+    step_lines: Option<StepLines>,
+    /// The pass in which a camera was last moved, and whose.
+    moved: Option<(u64, ImprintSource)>,
+    /// Counts what was made for the renderer.
+    revision: u64,
+}
+
+impl Memory {
+    /// Turns the cameras of all sides, or of `only` one.
+    pub(crate) fn look_from(&mut self, only: Option<ImprintSource>, preset: CameraPreset) {
+        for source in ImprintSource::iter().filter(|source| only.is_none_or(|only| only == *source)) {
+            self.views[source as usize].camera.look_from(match preset {
+                CameraPreset::Left => Preset::Left,
+                CameraPreset::Right => Preset::Right,
+                CameraPreset::Front => Preset::Front,
+                CameraPreset::Top => Preset::Top,
+            });
+        }
+    }
+
+    /// Fits the views to their panes when they are drawn next.
+    pub(crate) fn fit(&mut self) {
+        for view in &mut self.views {
+            view.placed = false;
+        }
+    }
+
+    /// The cameras of both sides as text; empty where a view was not placed yet.
+    pub(crate) fn cameras(&self) -> [String; 2] {
+        [ImprintSource::Measured, ImprintSource::Predicted].map(|side| match self.views[side as usize].placed {
+            true => self.camera_text(side),
+            false => String::new(),
+        })
+    }
+
+    /// Looks at a data set from where a text of [`Self::cameras`] says; what is no camera is left to be fitted.
+    pub(crate) fn resume(&mut self, seq: DatasetSeq, cameras: &[String; 2]) {
+        self.fitted = Some(seq);
+        for (view, text) in self.views.iter_mut().zip(cameras) {
+            if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
+    }
+
+    /// The camera of a side, as text for the clipboard.
+    pub(crate) fn camera_text(&self, source: ImprintSource) -> String {
+        serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
+    }
+
+    /// Lets both sides look from where [`Self::camera_text`] says; what is no camera changes nothing.
+    pub(crate) fn look_as(&mut self, text: &str) {
+        if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
+            for view in &mut self.views {
+                view.camera = camera;
+                view.placed = true;
+            }
+        }
+    }
+
+    /// Follows the pen no further; whether it was drawing.
+    pub(crate) fn lift_pen(&mut self) -> bool {
+        self.drawing.take().is_some()
+    }
+
+    /// Place of a point of the grasp frame (meters) when a side was last drawn.
+    pub(crate) fn on_screen(&self, source: ImprintSource, point: DVec3) -> Option<egui::Pos2> {
+        self.views[source as usize].on_screen(point)
+    }
+}
+
+/// The pane of one side.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
+    let source = if pane == Pane::SceneMeasured { ImprintSource::Measured } else { ImprintSource::Predicted };
+    let device = match cx.device {
+        Ok(device) => device,
+        Err(why) => {
+            empty::show(ui, "No 3D views on this graphics device", why, None);
+            return;
+        }
+    };
+    let state = cx.state;
+    let lookup = results::cloud(state, source);
+    match (lookup, lookup.shown().is_some()) {
+        (Lookup::Failed(err), _) => return images::failed(cx, ui, err),
+        (Lookup::Absent(absent), _) => return images::absent_text(cx, ui, absent),
+        // Without any cloud yet, the view itself would be empty: say that it is on its way.
+        (Lookup::Waiting, _) if memory.clouds[source as usize].is_none() => {
+            empty::show(ui, "Loading…", "", None);
+            return;
+        }
+        _ => {}
+    }
+    update(cx, memory, source);
+    let label = match source {
+        ImprintSource::Measured => "3D view, measured",
+        ImprintSource::Predicted => "3D view, predicted",
+    };
+    let open = state.library.open.as_ref().map(|open| open.seq);
+    if memory.fitted != open {
+        memory.fitted = open;
+        memory.fit();
+    }
+    for view in &mut memory.views {
+        view.camera.orthographic = state.settings.scene.orthographic;
+    }
+    verdict::line(cx, ui, source);
+    section::bar(cx, ui, source);
+    let held = match (draw::is_ready(state), memory.drawing == Some(source)) {
+        (true, true) => Grip::Stroke,
+        (true, false) => Grip::Pen,
+        (false, _) if memory.gizmo.holds(source) => Grip::Primary,
+        (false, _) => Grip::Nothing,
+    };
+    // The buttons and the strip of the pose in hand stand beside the picture, not on it.
+    let area = ui.available_rect_before_wrap();
+    let column = area.with_min_x((area.right() - BUTTONS).max(area.left()));
+    let footer = hands::strip_height(cx.state, source).min(area.height() / 2.0);
+    let picture = egui::Rect::from_min_max(area.min, egui::pos2(column.left(), area.bottom() - footer));
+    let strip = picture.with_min_y(picture.bottom()).with_max_y(area.bottom());
+    let builder = egui::UiBuilder::new().max_rect(picture);
+    let output = ui.scope_builder(builder, |ui| memory.views[source as usize].interact(ui, label, held)).inner;
+    if output.pointer.is_some() && state.workbench.side != source && memory.gizmo.is_free() {
+        cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
+    }
+    let seconds = ui.input(|i| i.time);
+    if state.workbench.animate_weakest
+        && results::pose(state, source).shown().is_some_and(|p| p.report.observability.is_some())
+    {
+        // The only thing that moves by itself, and only while a person asked for it.
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
+    }
+    let mut scene = build::scene_of(cx, memory, source, seconds);
+    place_camera(cx, ui, memory, source, &output, scene.bounds());
+    // A linked camera may be drawn before the one that leads it: it moves in the next frame.
+    let pass = ui.ctx().cumulative_pass_nr();
+    if output.moved {
+        memory.moved = Some((pass, source));
+    }
+    let linked = state.settings.cameras_linked;
+    scene.moving = memory.moved.is_some_and(|(last_pass, by)| pass <= last_pass + 1 && (by == source || linked));
+    if scene.moving {
+        // Moving views are drawn coarsely: draw all there is once they rest.
+        ui.ctx().request_repaint_after(std::time::Duration::from_millis(120));
+    }
+    memory.views[source as usize].draw(ui, device, &output, &scene);
+    // While a stroke is drawn, what is shown is of the move before.
+    if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) && state.document.stroke.is_none() {
+        ui.painter().rect_filled(output.response.rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
+    }
+    if let Lookup::Ready(clouds) = lookup {
+        pick(cx, ui, memory, source, &output, clouds);
+        measure::click(cx, memory, source, &output, clouds);
+    }
+    overlay::show(cx, ui, memory, source, &output);
+    let rect = output.response.rect;
+    overlay::sides(cx, ui, source, column);
+    measure::marks(cx, ui, memory, source, &output);
+    gizmo::show(cx, ui, memory, source, &output);
+    hands::tools(cx, ui, source, column);
+    hands::strip(cx, ui, source, strip);
+    if let Some(clouds) = lookup.shown() {
+        draw::show(cx, ui, memory, source, &output, clouds);
+    }
+    if let Lookup::Ready(clouds) = lookup {
+        measure::card(cx, ui, source, rect, clouds);
+    }
+}
+
+/// Moves the camera of a side to where it was pasted, aimed or fitted to; a linked one follows.
+fn place_camera(
+    cx: &mut Cx<'_>,
+    ui: &Ui,
+    memory: &mut Memory,
+    source: ImprintSource,
+    output: &SceneOutput,
+    bounds: Option<[DVec3; 2]>,
+) {
+    let pasted = pasted(ui, output);
+    if let Some(camera) = pasted {
+        let orthographic = memory.views[source as usize].camera.orthographic;
+        memory.views[source as usize].camera = Camera { orthographic, ..camera };
+        memory.views[source as usize].placed = true;
+        if camera.orthographic != orthographic {
+            cx.act(Action::Parallel);
+        }
+    }
+    let aimed = match (output.fit, output.pointer, results::cloud(cx.state, source)) {
+        (true, Some(pointer), Lookup::Ready(clouds)) => aim(memory, source, output, pointer, clouds),
+        _ => false,
+    };
+    let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
+    if place && let Some(bounds) = bounds {
+        let view = &mut memory.views[source as usize];
+        view.camera.fit(bounds, output.size);
+        view.placed = true;
+    }
+    if (output.moved || place || aimed || pasted.is_some()) && cx.state.settings.cameras_linked {
+        let camera = memory.views[source as usize].camera;
+        let other = &mut memory.views[1 - source as usize];
+        other.camera = camera;
+        other.placed |= memory.clouds[1 - source as usize].is_some();
+    }
+}
+
+/// Brings what the view draws up to date.
+fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
+    let state = cx.state;
+    if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, source), results::cloud_key(state, source)) {
+        build::update_cloud(cx, memory, source, key, clouds);
+    }
+    if state.workbench.both_clouds {
+        let other = other_side(source);
+        if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, other), results::cloud_key(state, other))
+        {
+            build::update_cloud(cx, memory, other, key, clouds);
+        }
+    }
+    build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
+    layers::update(cx, memory, source);
+    ghost::update(cx, memory, source);
+    steps::update(cx, memory, source);
+}
+
+/// A camera that was pasted over a view.
+fn pasted(ui: &Ui, output: &SceneOutput) -> Option<Camera> {
+    output.pointer?;
+    ui.input(|i| {
+        i.events.iter().find_map(|event| match event {
+            egui::Event::Paste(text) => serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid),
+            _ => None,
+        })
+    })
+}
+
+/// Centers a view on the point under the pointer; whether there is one.
+fn aim(
+    memory: &mut Memory,
+    source: ImprintSource,
+    output: &SceneOutput,
+    pointer: glam::DVec2,
+    clouds: &Clouds,
+) -> bool {
+    let camera = &mut memory.views[source as usize].camera;
+    let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else { return false };
+    let Some(point) = clouds.finger(finger).and_then(|cloud| cloud.points.get(index)) else { return false };
+    camera.target = *point;
+    true
+}
+
+fn other_side(source: ImprintSource) -> ImprintSource {
+    match source {
+        ImprintSource::Measured => ImprintSource::Predicted,
+        ImprintSource::Predicted => ImprintSource::Measured,
+    }
+}
+
+/// The point of a cloud that is meant by a position in the picture, physical pixels: finger and index.
+fn nearest(clouds: &Clouds, camera: &Camera, size: [u32; 2], pointer: glam::DVec2) -> Option<(PadId, usize)> {
+    let mut best: Option<(PadId, usize, f64, f64)> = None;
+    for (finger, cloud) in clouds.fingers.entries() {
+        let hit = nearest_point(&cloud.points, &DAffine3::IDENTITY, camera, size, pointer, PICK_PX);
+        if let Some(hit) = hit {
+            let better = best.is_none_or(|(_, _, px, depth)| {
+                hit.distance_px < px - 1.0 || (hit.distance_px < px + 1.0 && hit.depth_m < depth)
+            });
+            if better {
+                best = Some((finger, hit.index, hit.distance_px, hit.depth_m));
+            }
+        }
+    }
+    best.map(|(finger, index, _, _)| (finger, index))
+}
+
+/// The point under the pointer becomes the pixel under the pointer of all images.
+fn pick(cx: &mut Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {
+    let Some(pointer) = output.pointer else { return };
+    if ui.input(|i| i.pointer.delta() == egui::Vec2::ZERO) || output.moved {
+        // At rest, or while the view turns, the mark stays where it is.
+        cx.shared.hover_claimed = true;
+        let marked = cx.state.selection.hover.filter(|_| cx.state.selection.hover_point.is_some());
+        let point = marked.and_then(|hover| {
+            let [x, y] = hover.at_px.map(|v| v.round().max(0.0) as usize);
+            Some((hover.finger, clouds.finger(hover.finger)?.at_pixel(x, y)?))
+        });
+        if let Some((finger, index)) = point {
+            say(cx, source, finger, index, clouds);
+        }
+        return;
+    }
+    let camera = &memory.views[source as usize].camera;
+    let Some((finger, index)) = nearest(clouds, camera, output.size, pointer) else {
+        if cx.state.selection.hover_point.is_some() {
+            cx.push(ViewCommand::HoverPoint(None));
+        }
+        return;
+    };
+    let Some((point, pixel)) = clouds.finger(finger).and_then(|c| Some((*c.points.get(index)?, *c.pixels.get(index)?)))
+    else {
+        return;
+    };
+    cx.shared.hover_claimed = true;
+    let hover = Some(Hover { finger, at_px: [f32::from(pixel[0]), f32::from(pixel[1])] });
+    if cx.state.selection.hover != hover {
+        cx.push(ViewCommand::HoverPixel(hover));
+        cx.push(ViewCommand::HoverPoint(Some(point)));
+    }
+    say(cx, source, finger, index, clouds);
+}
+
+/// Puts the figures of a point into the status bar.
+fn say(cx: &mut Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) {
+    let cloud = clouds.finger(finger);
+    let Some((point, pixel)) = cloud.and_then(|cloud| Some((*cloud.points.get(index)?, *cloud.pixels.get(index)?)))
+    else {
+        return;
+    };
+    let off = distance_at(cx, source, finger, index, clouds);
+    let off = off.map_or(String::new(), |off| format!("   {} from the model", units::text_mm(off)));
+    cx.shared.readout = Some(format!(
+        "3D {} ({}, {})   x {:.2}  y {:.2}  z {:.2} mm in the grasp frame{off}",
+        cx.state.finger_name(finger),
+        pixel[0],
+        pixel[1],
+        units::mm(point.x),
+        units::mm(point.y),
+        units::mm(point.z)
+    ));
+}
+
+/// Distance of a point from the registered model where distances are shown, meters; `None` of one outside the contact.
+fn distance_at(cx: &Cx<'_>, source: ImprintSource, finger: PadId, index: usize, clouds: &Clouds) -> Option<f64> {
+    let deviation =
+        results::deviation(cx.state, source).ready().filter(|_| results::shows_deviation(cx.state, source))?;
+    let contact = &clouds.finger(finger)?.contact;
+    // Distances are of the contact points alone, in their order.
+    let contact_index = contact.get(..index)?.iter().filter(|contact| **contact).count();
+    let off = contact[index].then(|| deviation.points[finger].as_ref()?.get(contact_index).copied())??;
+    Some(f64::from(off)).filter(|off| off.is_finite())
+}
+
+/// A color as the renderer takes it.
+pub(crate) fn rgb(c: Color32) -> [f32; 3] {
+    [f32::from(c.r()) / 255.0, f32::from(c.g()) / 255.0, f32::from(c.b()) / 255.0]
+}

@@ -1,0 +1,407 @@
+//! Content of a 3D pane, as data for the renderer.
+
+use std::sync::Arc;
+
+use eframe::egui::Color32;
+use glam::{DAffine3, DVec3};
+
+use super::{Memory, layers, other_side, rgb, steps};
+use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
+use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
+use crate::app::workbench::Layer;
+use crate::app::{labels, results};
+use crate::gpu::edges::EdgeStyle;
+use crate::gpu::guides;
+use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
+use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
+use crate::gpu::scene::SceneData;
+use crate::gpu::view::Plane;
+use crate::ui::parts::cx::{Cx, side_color};
+use crate::ui::parts::theme::{self, CONTACT, GHOST, Palette};
+use touch2touch_core::cloud::surface;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::rig::PerPad;
+use touch2touch_work::cloud::{Clouds, FingerCloud};
+
+/// Points as the renderer takes them, made once per cloud.
+pub(super) struct SceneCloud {
+    /// The cloud.
+    pub key: CloudKey,
+    /// Counts up with every new cloud.
+    pub revision: u64,
+    /// Per finger: the membrane and the contact.
+    pub fingers: PerPad<[Arc<[DVec3]>; 2]>,
+    /// Window of the GelSlims on it: smallest and largest y and z, grasp frame.
+    pub window: Option<[DVec3; 2]>,
+}
+
+/// The membranes of a cloud as surfaces, made only while they are shown.
+pub(super) struct SceneSurface {
+    key: CloudKey,
+    revision: u64,
+    fingers: PerPad<Arc<TriMesh>>,
+}
+
+/// A CAD model as the renderer takes it.
+pub(crate) struct SceneMesh {
+    /// The data set and the tool.
+    pub key: (DatasetSeq, String),
+    /// Counts up with every new model.
+    pub revision: u64,
+    /// The model.
+    pub mesh: Arc<TriMesh>,
+}
+
+/// Points for the renderer, made again only for another cloud.
+pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
+    let surfaces = cx.state.settings.scene.layer(SceneLayer::Surface).shown;
+    let held = &mut memory.surfaces[source as usize];
+    if !surfaces {
+        *held = None;
+    } else if held.as_ref().is_none_or(|h| h.key != key) {
+        memory.revision += 1;
+        let fingers =
+            clouds.fingers.as_ref().map(|cloud| cloud.map(|cloud| Arc::new(surface(&cloud.points, &cloud.pixels))));
+        *held = Some(SceneSurface { key: key.clone(), revision: memory.revision, fingers });
+    }
+    let held = &mut memory.clouds[source as usize];
+    if held.as_ref().is_some_and(|h| h.key == key) {
+        return;
+    }
+    memory.revision += 1;
+    *held = Some(SceneCloud { key, revision: memory.revision, fingers: parts(clouds), window: window(cx, clouds) });
+}
+
+/// The points of each finger apart: membrane and contact.
+pub(crate) fn parts(clouds: &Clouds) -> PerPad<[Arc<[DVec3]>; 2]> {
+    let part = |f: &FingerCloud, contact: bool| {
+        let indices: Vec<usize> = (0..f.points.len()).filter(|i| f.contact.get(*i) == Some(&contact)).collect();
+        // The membrane only has to be seen, and seen through: every other pixel of every other row.
+        let kept = |i: &usize| contact || f.pixels.get(*i).is_some_and(|p| p[0] % 2 == 0 && p[1] % 2 == 0);
+        indices.into_iter().filter(kept).filter_map(|i| f.points.get(i).copied()).collect::<Arc<[DVec3]>>()
+    };
+    clouds.fingers.as_ref().map(|cloud| cloud.map(|f| [part(f, false), part(f, true)]))
+}
+
+/// The box around the points that the color sensors see; x is left open.
+fn window(cx: &Cx<'_>, clouds: &Clouds) -> Option<[DVec3; 2]> {
+    let rig = cx.state.rig();
+    let size = rig.depth()?.size();
+    let mut bounds: Option<[DVec3; 2]> = None;
+    for (pad, cloud) in clouds.fingers.entries() {
+        let Some(seen) = rig.seen_mask(pad, size) else { continue };
+        for (p, pixel) in cloud.points.iter().zip(&cloud.pixels).filter(|(p, _)| p.is_finite()) {
+            if seen.get(pixel[0].into(), pixel[1].into()) == Some(&true) {
+                let [lo, hi] = bounds.unwrap_or([*p, *p]);
+                bounds = Some([lo.min(*p), hi.max(*p)]);
+            }
+        }
+    }
+    bounds
+}
+
+/// Makes the CAD model for the renderer, where it is another one.
+pub(crate) fn update_mesh(cx: &Cx<'_>, held: &mut Option<SceneMesh>, revision: &mut u64) {
+    let Some(tool) = results::tool(cx.state).shown() else { return };
+    let Some(open) = &cx.state.library.open else { return };
+    if held.as_ref().is_some_and(|m| m.key.0 == open.seq && m.key.1 == tool.name) {
+        return;
+    }
+    *revision += 1;
+    let key = (open.seq, tool.name.clone());
+    *held = Some(SceneMesh { key, revision: *revision, mesh: Arc::new(tool.model.mesh.clone()) });
+}
+
+/// The color of a layer: the person's, else the theme's. No two layers share one.
+pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Color32 {
+    if let Some([r, g, b]) = cx.state.settings.scene.layer(layer).color {
+        return Color32::from_rgb(r, g, b);
+    }
+    let p = cx.p;
+    match layer {
+        // The membrane recedes, the contact stands out.
+        SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
+        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.45),
+        SceneLayer::Contact => CONTACT,
+        SceneLayer::OtherContact => side_color(p, other_side(source)),
+        SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => p.good,
+        SceneLayer::Cad | SceneLayer::Registered => p.cad,
+        SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
+        SceneLayer::TrueCad => p.strong,
+        SceneLayer::Before => theme::mix(p.strong, GHOST, 0.8),
+        SceneLayer::Dropped => theme::mix(p.strong, GHOST, 0.5),
+        SceneLayer::Added => theme::mix(p.strong, p.good, 0.6),
+        SceneLayer::Pins => p.pins[0],
+        SceneLayer::Guides => p.weak,
+    }
+}
+
+/// Everything one side shows at time `seconds`.
+pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64) -> SceneData {
+    let look = &cx.state.settings.scene;
+    let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
+    scene.cut = cut(cx, memory, source);
+    clouds(cx, memory, source, &mut scene);
+    changed(cx, memory, source, &mut scene);
+    surfaces(cx, memory, source, &mut scene);
+    pointed(cx, source, &mut scene);
+    picked(cx, source, &mut scene);
+    meshes(cx, memory, source, seconds, &mut scene);
+    scene.lines.extend(layers::ellipse(cx, source));
+    steps::add(cx, memory, source, &mut scene);
+    if look.layer(SceneLayer::Guides).shown {
+        guides(cx, &mut scene);
+    }
+    scene
+}
+
+/// The planes that cut a view open.
+pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
+    let mut planes = Vec::new();
+    if let Some(section) = cx.state.workbench.section {
+        let axis = section.axis.unit();
+        let side = if section.flipped { axis } else { -axis };
+        planes.push(Plane::through(axis * section.at_m, side));
+    }
+    let window = memory.clouds[source as usize].as_ref().and_then(|cloud| cloud.window);
+    if let Some([lo, hi]) = window.filter(|_| cx.state.settings.scene.only_window) {
+        for axis in [DVec3::Y, DVec3::Z] {
+            planes.extend([Plane::through(lo, axis), Plane::through(hi, -axis)]);
+        }
+    }
+    planes
+}
+
+fn point_size(size: LayerSize) -> PointSize {
+    match size {
+        LayerSize::Px(px) => PointSize::Px(px),
+        LayerSize::Mm(mm) => PointSize::Meters(mm * 1e-3),
+    }
+}
+
+fn cloud_style(look: LayerLook, color: Color32) -> CloudStyle {
+    CloudStyle { color: rgb(color), size: point_size(look.size), opacity: look.opacity, ..CloudStyle::default() }
+}
+
+/// Membrane and contact points of both fingers.
+fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    if let Some(cloud) = &memory.clouds[source as usize] {
+        for (finger, parts) in cloud.fingers.entries() {
+            for (part, (layer, name)) in
+                parts.iter().zip([(SceneLayer::Membrane, "membrane"), (SceneLayer::Contact, "contact")])
+            {
+                let look = cx.state.settings.scene.layer(layer);
+                if !look.shown {
+                    continue;
+                }
+                let mut item = CloudItem {
+                    name: format!("{name} {}", cx.state.finger_name(finger)),
+                    revision: cloud.revision,
+                    points: part.clone(),
+                    colors: PointColors::One,
+                    style: cloud_style(look, color(cx, source, layer)),
+                };
+                if layer == SceneLayer::Contact {
+                    layers::paint(memory, source, finger, &mut item);
+                }
+                scene.clouds.push(item);
+            }
+        }
+    }
+    if cx.state.workbench.both_clouds {
+        other_cloud(cx, memory, source, scene);
+    }
+}
+
+/// The contact points that the last change dropped and added.
+fn changed(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let Some(ghost) = &memory.ghosts[source as usize] else { return };
+    for (layer, points) in &ghost.points {
+        let look = cx.state.settings.scene.layer(*layer);
+        if look.shown && !points.is_empty() {
+            scene.clouds.push(CloudItem {
+                name: format!("{layer:?}").to_lowercase(),
+                revision: ghost.revision,
+                points: points.clone(),
+                colors: PointColors::One,
+                style: cloud_style(look, color(cx, source, *layer)),
+            });
+        }
+    }
+}
+
+/// The membranes as surfaces.
+fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let look = cx.state.settings.scene.layer(SceneLayer::Surface);
+    let Some(held) = memory.surfaces[source as usize].as_ref().filter(|_| look.shown) else { return };
+    let color = rgb(color(cx, source, SceneLayer::Surface));
+    for (finger, mesh) in held.fingers.entries() {
+        scene.meshes.push(MeshItem {
+            name: format!("surface {}", cx.state.finger_name(finger)),
+            revision: held.revision,
+            mesh: mesh.clone(),
+            shading: Shading::Smooth,
+            values: Arc::default(),
+            style: MeshStyle { color, opacity: look.opacity, closed: false, ..MeshStyle::default() },
+        });
+    }
+}
+
+/// The contact points of the other side, in its color, where both are shown in one view.
+fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
+    let other = other_side(source);
+    let look = cx.state.settings.scene.layer(SceneLayer::OtherContact);
+    let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| look.shown) else { return };
+    // What is of another pair is no comparison.
+    if results::cloud_key(cx.state, other) != Ok(Some(cloud.key.clone())) {
+        return;
+    }
+    for (finger, [_, contact]) in cloud.fingers.entries() {
+        scene.clouds.push(CloudItem {
+            name: format!("other contact {}", cx.state.finger_name(finger)),
+            revision: cloud.revision,
+            points: contact.clone(),
+            colors: PointColors::One,
+            style: cloud_style(look, color(cx, source, SceneLayer::OtherContact)),
+        });
+    }
+}
+
+/// The point that was clicked.
+fn picked(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    let point = cx.state.workbench.picked.filter(|picked| picked.source == source).and_then(|picked| {
+        let cloud = results::cloud(cx.state, source).ready()?.finger(picked.finger)?;
+        cloud.points.get(cloud.at_pixel(picked.pixel[0].into(), picked.pixel[1].into())?).copied()
+    });
+    if let Some(point) = point {
+        scene.clouds.push(one_point("picked", point, cx.p.accent, 11.0));
+    }
+}
+
+/// A cloud of a single point, as large on the screen at any distance.
+fn one_point(name: &str, point: DVec3, color: Color32, px: f32) -> CloudItem {
+    let bits = point.to_array().map(f64::to_bits);
+    CloudItem {
+        name: name.into(),
+        revision: bits[0] ^ bits[1].rotate_left(21) ^ bits[2].rotate_left(42),
+        points: [point].into(),
+        colors: PointColors::One,
+        style: CloudStyle { color: rgb(color), size: PointSize::Px(px), ..CloudStyle::default() },
+    }
+}
+
+/// The pixel under the pointer, as a point of its own: it must not drown among the others.
+fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
+    let state = cx.state;
+    let pointed = state.selection.hover.and_then(|h| {
+        let cloud = results::cloud(state, source).ready()?.finger(h.finger)?;
+        let (x, y) = (h.at_px[0].round().max(0.0) as usize, h.at_px[1].round().max(0.0) as usize);
+        cloud.points.get(cloud.at_pixel(x, y)?).copied()
+    });
+    if let Some(point) = pointed {
+        scene.clouds.push(one_point("pointer", point, cx.p.strong, 9.0));
+    }
+}
+
+/// The models that a side can show now, each with its pose: the shaded one is [`SceneLayer::Cad`], the others are
+/// outlines to compare it with.
+pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(SceneLayer, DAffine3)> {
+    let state = cx.state;
+    let mut models = Vec::new();
+    // The step that is looked at, else what was registered.
+    let registered = steps::pose(cx, source).or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object));
+    let held = state.workbench.hand(source).map(|hand| hand.pose);
+    match (held.or_else(|| results::by_hand(state, source)), registered) {
+        (Some(pose), registered) => {
+            models.push((SceneLayer::Cad, pose.to_affine()));
+            models.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
+        }
+        (None, Some(pose)) => {
+            models.push((SceneLayer::Cad, layers::swayed(cx, source, pose, seconds).to_affine()));
+        }
+        (None, None) => {}
+    }
+    let other = results::pose(state, other_side(source)).ready().filter(|_| state.workbench.both_clouds);
+    models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
+    let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
+    models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
+    let before = labels::ghost(state, source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
+    let before = before.filter(|before| registered != Some(*before));
+    models.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
+    models
+}
+
+/// The model, shaded where the tool is and as outlines where else it could be.
+fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
+    let state = cx.state;
+    let tool_now = results::tool(state).ready().map(|t| t.name.as_str());
+    let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
+    let settings = &state.settings.scene;
+    for (layer, world_from_mesh) in models(cx, source, seconds) {
+        let look = settings.layer(layer);
+        if !look.shown {
+            continue;
+        }
+        let color = color(cx, source, layer);
+        let mut item = MeshItem {
+            name: format!("CAD {layer:?}"),
+            revision: mesh.revision,
+            mesh: mesh.mesh.clone(),
+            shading: Shading::Smooth,
+            values: Arc::default(),
+            style: layers::outline(world_from_mesh, color, look),
+        };
+        if layer == SceneLayer::Cad {
+            // Where the points' own colors are looked at, the model lets them through.
+            let through = memory.layer_colors[source as usize].is_some()
+                && matches!(state.workbench.layer, Layer::Residuals | Layer::Reasons);
+            item.style = MeshStyle {
+                look: if through { Look::XRay } else { Look::Solid },
+                opacity: if through { 0.6 } else { look.opacity },
+                edges: settings.edges.then(|| model_edges(cx, color)),
+                ..item.style
+            };
+            layers::paint_model(memory, source, world_from_mesh, &mut item);
+        }
+        scene.meshes.push(item);
+    }
+}
+
+/// The edges of a shaded model of a color.
+pub(crate) fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
+    EdgeStyle { color: rgb(theme::mix(color, cx.p.canvas, 0.7)), opacity: 0.9, width_px: 1.2, creases: true }
+}
+
+/// Floor grid and axes.
+pub(crate) fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
+    scene.lines.push(LinesItem {
+        name: "grid".into(),
+        revision: u64::from(*cx.p == theme::DARK),
+        segments: grid(cx.p).into(),
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity: 1.0, overlay: false },
+    });
+    scene.lines.push(LinesItem {
+        name: "axes".into(),
+        revision: 1,
+        segments: guides::axes(axes_origin(), AXIS).into(),
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },
+    });
+}
+
+/// Length of the drawn axes, meters.
+pub(super) const AXIS: f64 = 0.01;
+
+/// A corner of the floor grid: in the middle the axes would hide the contact.
+pub(super) fn axes_origin() -> DVec3 {
+    DVec3::new(-0.05, -0.05, FLOOR)
+}
+
+/// Height of the floor grid, meters along +z (down).
+const FLOOR: f64 = 0.045;
+
+fn grid(p: &Palette) -> Vec<Segment> {
+    let c = theme::mix(p.canvas, p.weak, 0.45);
+    guides::grid(DVec3::new(0.0, 0.0, FLOOR), [DVec3::X, DVec3::Y], 0.01, 5, [c.r(), c.g(), c.b()])
+}

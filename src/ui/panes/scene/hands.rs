@@ -1,0 +1,161 @@
+//! Hands on: the buttons of the tools in a 3D view, and the strip of the pose that a hand holds.
+
+use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
+
+use super::overlay::SIDES;
+use crate::app::action::Action;
+use crate::app::keys::ImprintSource;
+use crate::app::results;
+use crate::app::settings::SceneLayer;
+use crate::app::state::State;
+use crate::app::workbench::{Layer, ManualTry, SceneTool};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{SMALL, caption};
+use touch2touch_core::manual::{ManualCost, ManualPose, PoseDifference};
+use touch2touch_core::units;
+
+/// The tools, below the buttons that turn the view; those that do not fit are left to menu and keys.
+pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column: Rect) {
+    let place = column.shrink2(vec2(2.0, 4.0)).with_min_y(column.top() + SIDES);
+    let fit = (place.height() / 26.0).floor().max(0.0) as usize;
+    let builder = UiBuilder::new().max_rect(place).id_salt(("tools", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.spacing_mut().item_spacing.y = 2.0;
+        let side = source.name().to_lowercase();
+        let bench = &cx.state.workbench;
+        let scene = &cx.state.settings.scene;
+        let (tool, both, layer) = (bench.tool, bench.both_clouds, bench.layer);
+        for (action, letter, on) in [
+            (Action::PoseTool, "P", tool == SceneTool::Pose),
+            (Action::MeasureDistance, "D", tool == SceneTool::Distance),
+            (Action::MeasureAngle, "A", tool == SceneTool::Angle),
+            (Action::PaintIn3d, "B", tool == SceneTool::Paint),
+            (Action::NextLayer, "V", layer != Layer::None),
+            (Action::BothClouds, "2", both),
+            (Action::Section, "X", cx.state.workbench.section.is_some()),
+            (Action::WindowOnly, "W", scene.only_window),
+            (Action::MembraneSurface, "M", scene.layer(SceneLayer::Surface).shown),
+            (Action::Parallel, "I", scene.orthographic),
+        ]
+        .into_iter()
+        .take(fit)
+        {
+            let color = if on { cx.p.strong } else { cx.p.weak };
+            let text = RichText::new(letter).size(11.0).color(color);
+            let fill = if on { cx.p.selected } else { cx.p.panel };
+            let button = Button::new(text).min_size(vec2(24.0, 18.0)).fill(fill);
+            let response = ui.add_enabled(action.command(cx.state).is_some(), button);
+            let response = response.accessible_name(format!("{}, {side}", action.name()));
+            if response.on_hover_text(cx.keys().help(action)).clicked() {
+                cx.act(action);
+            }
+        }
+    });
+}
+
+/// The pose that a hand holds on a side, or would hold.
+fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {
+    let bench = &state.workbench;
+    if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
+        return None;
+    }
+    Some(bench.hand(source).map_or_else(|| results::manual_begins(state, source), |hand| hand.pose))
+}
+
+/// Height of the strip of the pose in hand, points; 0 where there is none.
+pub(super) fn strip_height(state: &State, source: ImprintSource) -> f32 {
+    let lines = |pose: ManualPose| if pose.is_planar() { 4.0 } else { 5.0 };
+    held(state, source).map_or(0.0, |pose| 25.0 + 14.0 * lines(pose))
+}
+
+/// The pose in hand: where it is, what it costs, and what can be done with it.
+pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Rect) {
+    let Some(pose) = held(cx.state, source) else { return };
+    let hand = cx.state.workbench.hand(source).cloned();
+    let place = rect.shrink(2.0);
+    let builder = UiBuilder::new().max_rect(place).id_salt(("hand", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.painter().rect(place, 4.0, cx.p.panel.gamma_multiply(0.95), (1.0, cx.p.accent), egui::StrokeKind::Inside);
+        let inner = place.shrink2(vec2(8.0, 4.0));
+        ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
+            ui.set_clip_rect(place.intersect(ui.clip_rect()));
+            ui.spacing_mut().item_spacing = vec2(4.0, 1.0);
+            let mut text = place_text(pose);
+            if let Some(off) = off_truth(cx.state, pose) {
+                let (angle, position) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
+                text += &format!("   ({angle}, {position} off truth)");
+            }
+            ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
+            if !pose.is_planar() {
+                ui.label(RichText::new(tilt_text(pose)).size(SMALL).color(cx.p.strong));
+            }
+            let (text, color) = cost_text(cx, hand.as_ref());
+            ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(
+                "Outline: distance of the contact points to the tool's outline in the plane, inside counted as zero. \
+                 Surface: distance to the tool's surface in space. Of at most 512 contact points",
+            );
+            ui.horizontal(|ui| {
+                let busy = hand.as_ref().is_some_and(|hand| hand.icp.is_some());
+                let icp = if busy { "Registering…" } else { "ICP from here" };
+                for (action, text) in
+                    [(Action::IcpFromHere, icp), (Action::Accept, "Accept"), (Action::RevertHand, "Revert")]
+                {
+                    small_button(cx, ui, action, text, source, false);
+                }
+                let six_dof = cx.state.workbench.six_dof;
+                small_button(cx, ui, Action::SixDof, "6-DoF", source, six_dof);
+            });
+            let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
+                        Shift ×10 · Ctrl ÷10";
+            ui.label(caption(cx.keys().fill(keys), cx.p));
+        });
+    });
+}
+
+fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource, on: bool) {
+    let button = Button::selectable(on, RichText::new(text).size(SMALL)).frame_when_inactive(true);
+    let name = format!("{}, {}", action.name(), source.name().to_lowercase());
+    cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
+}
+
+/// The three numbers out of the plane.
+fn tilt_text(pose: ManualPose) -> String {
+    let (pitch, yaw) = (pose.pitch_rad.to_degrees(), pose.yaw_rad.to_degrees());
+    format!("x {:+.2} mm   pitch {pitch:+.1}°   yaw {yaw:+.1}°", units::mm(pose.x_m))
+}
+
+/// The three numbers in the plane.
+pub(super) fn place_text(pose: ManualPose) -> String {
+    let planar = pose.planar;
+    // The angle as everywhere on screen: of the tool's inverse motion, as the lab reports it.
+    let angle = planar.inverse().theta_rad;
+    format!("y {:+.2}  z {:+.2} mm   angle {:+.1}°", units::mm(planar.y_m), units::mm(planar.z_m), angle.to_degrees())
+}
+
+/// Cost of the pose, against where it began.
+fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
+    let Some(hand) = hand else {
+        return ("Move the tool by keys or by its handles".into(), cx.p.weak);
+    };
+    let text = match (hand.cost, hand.began_cost) {
+        (Some(now), Some(before)) => costs(now, before),
+        _ => "cost: the contact points are not there yet".into(),
+    };
+    let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
+    (text, if better { cx.p.good } else { cx.p.caution })
+}
+
+fn costs(now: ManualCost, before: ManualCost) -> String {
+    format!(
+        "outline {:.2} (was {:.2}) mm · {:.0} % inliers · surface {:.2} mm",
+        units::mm(now.outline_rms_m),
+        units::mm(before.outline_rms_m),
+        now.inlier_share * 100.0,
+        units::mm(now.surface_rms_m)
+    )
+}
+
+/// Difference of the planar part of a pose from the truth.
+pub(super) fn off_truth(state: &State, pose: ManualPose) -> Option<PoseDifference> {
+    Some(PoseDifference::between(pose.planar, results::truth(state)?))
+}

@@ -1,0 +1,265 @@
+//! The list of what a 3D view draws: what each color means, and switches for it; below it the bar of the color map.
+
+use crate::app::results;
+use crate::app::settings::prefer;
+use eframe::egui::containers::menu::MenuButton;
+use eframe::egui::{
+    self, Align2, Button, Color32, DragValue, FontId, Painter, Rect, RichText, Role, Sense, Slider, Stroke, Ui,
+    UiBuilder, WidgetInfo, pos2, vec2,
+};
+use strum::IntoEnumIterator as _;
+
+use super::{Memory, build, ghost, layers, other_side, steps};
+use crate::app::keys::ImprintSource;
+use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
+use crate::app::workbench::Layer;
+use crate::ui::panes::layers::{RESIDUAL_MAP, reason_rgb};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{SMALL, caption};
+use crate::ui::parts::widget::colorbar::gradient;
+use touch2touch_core::align::reason::Reason;
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::units;
+
+/// Height of a row, points.
+const ROW: f32 = 17.0;
+/// Width of the list, points.
+const WIDTH: f32 = 152.0;
+
+/// A line of the list.
+struct Row {
+    /// Layer that it switches; `None` explains a color only.
+    layer: Option<SceneLayer>,
+    color: Color32,
+    text: String,
+}
+
+/// The list at the lower left corner, and the bar of the color map at the lower right one.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
+    let rows = rows(cx, memory, source);
+    // A small pane keeps its picture.
+    let most = ((rect.height() * 0.6) / ROW).floor().max(1.0) as usize;
+    let height = rows.len().min(most) as f32 * ROW;
+    let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - height), vec2(WIDTH, height));
+    ui.painter().rect_filled(place.expand(2.0), 3.0, cx.p.canvas.gamma_multiply(0.6));
+    let builder = UiBuilder::new().max_rect(place).id_salt(("legend", source as usize));
+    ui.scope_builder(builder, |ui| {
+        ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
+        ui.spacing_mut().interact_size.y = ROW;
+        ui.spacing_mut().button_padding = vec2(2.0, 0.0);
+        for row in rows.into_iter().take(most) {
+            line(cx, ui, source, &row);
+        }
+    });
+    match cx.state.workbench.layer {
+        Layer::Residuals if memory.layer_colors[source as usize].is_some() => {
+            residuals(cx, &ui.painter_at(rect), source, rect)
+        }
+        Layer::Distance if memory.layer_colors[source as usize].is_some() => {
+            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
+        }
+        _ => {}
+    }
+}
+
+/// Rows for everything that is drawn, or could be.
+fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
+    let state = cx.state;
+    let mut rows = Vec::new();
+    let mut add = |layer: SceneLayer, text: &str| {
+        rows.push(Row { layer: Some(layer), color: build::color(cx, source, layer), text: text.to_owned() });
+    };
+    if memory.clouds[source as usize].is_some() {
+        add(SceneLayer::Membrane, "membrane, points");
+        add(SceneLayer::Surface, "membrane, surface");
+        add(SceneLayer::Contact, "contact points");
+    }
+    if state.workbench.both_clouds {
+        let other =
+            if other_side(source) == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
+        add(SceneLayer::OtherContact, other);
+    }
+    for (layer, text) in ghost::legend_entries(memory, source) {
+        add(layer, &text);
+    }
+    if memory.mesh.is_some() {
+        for (layer, _) in build::models(cx, source, 0.0) {
+            add(layer, model_name(cx, source, layer));
+        }
+    }
+    let pins = steps::legend_entries(cx, source);
+    let pinned = state.settings.scene.layer(SceneLayer::Pins).color.is_none();
+    for (i, (color, text)) in pins.into_iter().enumerate() {
+        let color = if pinned { color } else { build::color(cx, source, SceneLayer::Pins) };
+        rows.push(Row { layer: (i == 0).then_some(SceneLayer::Pins), color, text: text.to_owned() });
+    }
+    if state.workbench.layer == Layer::Reasons
+        && memory.layer_colors[source as usize].is_some()
+        && let Some(layers) = results::layers(state, source).ready()
+    {
+        // The reasons of the points that are drawn, with their counts.
+        for reason in Reason::iter().filter(|r| !matches!(r, Reason::OutsideMask | Reason::InvalidDepth)) {
+            let count: usize = layers.counts.iter().flatten().map(|counts| counts[reason as usize]).sum();
+            if count > 0 {
+                let [r, g, b] = reason_rgb(reason);
+                rows.push(Row { layer: None, color: Color32::from_rgb(r, g, b), text: format!("{reason}: {count}") });
+            }
+        }
+    }
+    rows.push(Row { layer: Some(SceneLayer::Guides), color: cx.p.weak, text: "grid and axes".into() });
+    rows
+}
+
+fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static str {
+    match layer {
+        SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, accepted by hand",
+        SceneLayer::TrueCad => "CAD, true pose",
+        SceneLayer::Before => "CAD, before",
+        SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
+        SceneLayer::OtherCad => "CAD, measured side",
+        _ => "CAD, aligned",
+    }
+}
+
+/// A swatch that switches, the name, and a menu for the rest.
+fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
+    let scene = &cx.state.settings.scene;
+    let look = row.layer.map(|layer| scene.layer(layer));
+    let shown = look.is_none_or(|look| look.shown);
+    ui.horizontal(|ui| {
+        ui.set_height(ROW);
+        let sense = if look.is_some() { Sense::click() } else { Sense::hover() };
+        let (dot, swatch) = ui.allocate_exact_size(vec2(16.0, ROW), sense);
+        if shown {
+            ui.painter().circle_filled(dot.center(), 4.5, row.color);
+        } else {
+            ui.painter().circle_stroke(dot.center(), 4.0, Stroke::new(1.5, row.color));
+        }
+        let color = if shown { cx.p.text } else { cx.p.weak };
+        let Some((layer, look)) = row.layer.zip(look) else {
+            ui.label(RichText::new(&row.text).size(SMALL).color(color));
+            return;
+        };
+        let name = format!("{}, {}", row.text, source.name().to_lowercase());
+        swatch.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, format!("Show {name}")));
+        let text = Button::new(RichText::new(&row.text).size(SMALL).color(color)).frame(false).min_size(vec2(0.0, ROW));
+        let text =
+            ui.add(text).on_hover_text("Shows or hides it; the dots at its right change color, size and opacity");
+        if swatch.clicked() || text.clicked() {
+            cx.push(prefer(move |s| s.scene.set(layer, LayerLook { shown: !shown, ..look })));
+        }
+        let dots = Button::new(RichText::new("…").size(SMALL).color(cx.p.weak)).frame(false);
+        let (menu, _) = MenuButton::from_button(dots).ui(ui, |ui| {
+            if let Some(changed) = change(ui, row, layer, look, cx.p.weak) {
+                cx.push(prefer(move |s| s.scene.set(layer, changed)));
+            }
+        });
+        menu.accessible_name(format!("Look of {name}"));
+    });
+}
+
+/// Color, size and opacity of a layer; what was changed.
+fn change(ui: &mut Ui, row: &Row, layer: SceneLayer, look: LayerLook, weak: Color32) -> Option<LayerLook> {
+    let mut new = look;
+    ui.set_min_width(190.0);
+    if layer != SceneLayer::Guides {
+        ui.horizontal(|ui| {
+            let mut rgb = [row.color.r(), row.color.g(), row.color.b()];
+            if ui.color_edit_button_srgb(&mut rgb).changed() {
+                new.color = Some(rgb);
+            }
+            ui.label("Color");
+            if ui.add_enabled(new.color.is_some(), Button::new("Theme's").small()).clicked() {
+                new.color = None;
+            }
+        });
+        ui.add(Slider::new(&mut new.opacity, 0.05..=1.0).fixed_decimals(2).text("opacity"));
+    }
+    if layer.has_size() {
+        let mut value = new.size.value();
+        let unit = if matches!(new.size, LayerSize::Px(_)) { " px" } else { " mm" };
+        ui.add(Slider::new(&mut value, LayerSize::RANGE).logarithmic(true).fixed_decimals(1).suffix(unit).text("size"));
+        new.size = new.size.with(value);
+        if layer.has_points() {
+            ui.horizontal(|ui| {
+                ui.label(RichText::new("Size in").color(weak));
+                for (name, size) in [("pixels", LayerSize::Px(2.0)), ("millimeters", LayerSize::Mm(0.4))] {
+                    let same = std::mem::discriminant(&size) == std::mem::discriminant(&new.size);
+                    if ui.selectable_label(same, name).clicked() && !same {
+                        new.size = size;
+                    }
+                }
+            });
+        }
+    }
+    if ui.add_enabled(new != layer.preset(), Button::new("As at first")).clicked() {
+        new = layer.preset();
+    }
+    (new != look).then_some(new)
+}
+
+/// The place of the bar.
+fn bar(rect: Rect) -> Rect {
+    Rect::from_min_size(pos2(rect.right() - 160.0, rect.bottom() - 62.0), vec2(148.0, 9.0))
+}
+
+fn ends(painter: &Painter, bar: Rect, texts: [String; 3], color: Color32) {
+    let anchors = [(0.0, Align2::LEFT_TOP), (0.5, Align2::CENTER_TOP), (1.0, Align2::RIGHT_TOP)];
+    for ((share, anchor), text) in anchors.into_iter().zip(texts) {
+        let below = pos2(bar.left() + bar.width() * share, bar.bottom() + 1.0);
+        painter.text(below, anchor, text, FontId::proportional(10.0), color);
+    }
+}
+
+fn colors(painter: &Painter, bar: Rect, map: ColorMap) {
+    gradient(painter, bar, 32, |share| {
+        let [r, g, b] = map.rgb8(share);
+        Color32::from_rgb(r, g, b)
+    });
+}
+
+/// Bar of the residuals' colors, with the width of the kernel.
+fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) {
+    let Some(layers) = results::layers(cx.state, source).ready() else { return };
+    let bar = bar(rect);
+    colors(painter, bar, RESIDUAL_MAP);
+    let end = units::mm(layers.range_m);
+    ends(painter, bar, ["0".into(), format!("{:.0}", end / 2.0), format!("{end:.0} mm")], cx.p.text);
+    let font = FontId::proportional(10.0);
+    painter.text(bar.right_top() - vec2(0.0, 3.0), Align2::RIGHT_BOTTOM, "residual", font, cx.p.text);
+    if let Some(kernel) = layers.kernel_m {
+        let x = bar.left() + bar.width() * (kernel / layers.range_m) as f32;
+        painter.vline(x, bar.top() - 3.0..=bar.bottom(), Stroke::new(1.5, cx.p.strong));
+    }
+}
+
+/// Bar of the signed distances' colors, `below` being what negative ones are called; the reach is one for all views,
+/// and can be changed.
+pub(crate) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
+    let bar = bar(rect);
+    let painter = ui.painter_at(rect);
+    colors(&painter, bar, layers::DISTANCE_MAP);
+    let look: &SceneLook = &cx.state.settings.scene;
+    let mut mm = units::mm(f64::from(look.distance_m));
+    let texts = [format!("{below}-{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];
+    ends(&painter, bar, texts, cx.p.text);
+    let place = Rect::from_min_max(pos2(bar.left(), bar.top() - 20.0), pos2(bar.right(), bar.top() - 2.0));
+    let builder = UiBuilder::new().max_rect(place).id_salt(("distances", view));
+    ui.scope_builder(builder, |ui| {
+        ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+            let drag =
+                DragValue::new(&mut mm).speed(0.02).range(0.01..=50.0).fixed_decimals(2).prefix("± ").suffix(" mm");
+            let drag = ui.add(drag).accessible_name(format!("Reach of the distances, {view}"));
+            let drag = drag.on_hover_text("Signed distance that has the last color, in all views; double-click: 1 mm");
+            let mut changed = drag.changed();
+            if drag.double_clicked() {
+                (mm, changed) = (1.0, true);
+            }
+            if changed {
+                cx.push(prefer(move |s| s.scene.distance_m = (mm * 1e-3) as f32));
+            }
+            ui.label(caption("distance", cx.p));
+        });
+    });
+}

@@ -1,0 +1,123 @@
+//! The verdict on a pose: one line above the picture, colored by the worst of what is known; the rest on demand.
+
+use crate::app::results;
+use crate::app::settings::prefer;
+use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
+
+use super::hands;
+use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
+use crate::app::action::Action;
+use crate::app::keys::ImprintSource;
+use crate::app::settings::MaskSource;
+use crate::app::state::{Absent, Lookup, State};
+use crate::ui::panes::images;
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{SMALL, grade_color};
+use touch2touch_core::align::MIN_POINTS;
+use touch2touch_core::units;
+use touch2touch_work::verdict::Verdict;
+
+/// Height of the line, points.
+const HEIGHT: f32 = 22.0;
+/// True where there is no pose because the mask has too few contact points.
+fn lacks_contact(state: &State, source: ImprintSource) -> bool {
+    match results::pose(state, source) {
+        Lookup::Absent(Absent::NoContact) => true,
+        Lookup::Failed(_) => {
+            results::cloud(state, source).ready().is_some_and(|clouds| clouds.contact_points().len() < MIN_POINTS)
+        }
+        _ => false,
+    }
+}
+
+/// The line; takes its height from the top of the pane.
+pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+    let (text, color, details) = said(cx, source);
+    let width = ui.available_width();
+    let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
+    ui.painter().rect_filled(rect, 0.0, cx.p.frame);
+    ui.painter().circle_filled(rect.left_center() + vec2(12.0, 0.0), 4.0, color);
+    let mut inner = rect.with_min_x(rect.left() + 22.0).shrink2(vec2(4.0, 2.0));
+    // Too few contact points: the mask is where that is mended.
+    if lacks_contact(cx.state, source) {
+        let threshold = cx.state.settings.mask.choice.source == MaskSource::Threshold;
+        let mut offer = |name, tip: &str| {
+            let place = inner.with_min_x(inner.right() - 92.0);
+            inner.set_right(place.left() - 4.0);
+            let button = Button::new(RichText::new(name).size(SMALL)).small().min_size(vec2(88.0, 16.0));
+            ui.put(place, button).on_hover_text(tip).clicked()
+        };
+        if offer("Open in Label", "The mask can be corrected there, or another source chosen") {
+            cx.act(Action::LabelWorkspace);
+        }
+        let tip = "Marks what is deeper than the threshold as contact, here and on the other pairs";
+        if !threshold && offer("Use threshold", tip) {
+            cx.push(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
+        }
+    }
+    // The CAD model is in another unit: it is said in which, and that is all.
+    let units = match results::pose(cx.state, source) {
+        Lookup::Failed(err) => err.units.clone(),
+        _ => None,
+    };
+    if let Some(offer) = units {
+        let right = Layout::right_to_left(Align::Center);
+        let place = UiBuilder::new().max_rect(inner).layout(right);
+        let side = source.name().to_lowercase();
+        let used = ui.scope_builder(place, |ui| {
+            ui.spacing_mut().interact_size.y = 16.0;
+            ui.spacing_mut().button_padding.y = 0.0;
+            images::unit_buttons(cx, ui, &offer, &side);
+        });
+        let used = used.response.rect;
+        inner.set_right(used.left() - 4.0);
+    }
+    ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
+        ui.set_clip_rect(inner.intersect(ui.clip_rect()));
+        ui.add(eframe::egui::Label::new(RichText::new(text).size(12.0).color(color)).truncate());
+    });
+    if !details.is_empty() {
+        response.on_hover_ui(|ui| {
+            for line in details {
+                ui.label(RichText::new(line).size(SMALL));
+            }
+        });
+    }
+}
+
+/// The line, its color, and what there is besides.
+fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
+    let state = cx.state;
+    if let Some((text, color, details)) = step_text(cx, source) {
+        return (text, color, vec![details]);
+    }
+    let (text, color, mut details) = match results::pose(state, source) {
+        Lookup::Ready(pose) | Lookup::Stale(pose) => {
+            let verdict = Verdict::of(pose, results::truth(state));
+            let mut text = match verdict.findings.is_empty() {
+                false => format!("{} · {}", units::text_deg(pose.angle_rad), verdict.text()),
+                true => format!("{} · residual {}", units::text_deg(pose.angle_rad), units::text_mm(pose.rms_m)),
+            };
+            if results::provisional_pose(state, source).is_some() {
+                text += " · being proved…";
+            }
+            let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
+            details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
+            (text, grade_color(cx.p, verdict.grade), details)
+        }
+        Lookup::Waiting => ("Pose: computing…".to_owned(), cx.p.weak, Vec::new()),
+        Lookup::Failed(err) => (format!("No pose: {}", err.why), cx.p.wrong, vec![err.to_string()]),
+        Lookup::Absent(absent) => (format!("No pose: {}", lower_first(absent)), cx.p.weak, Vec::new()),
+    };
+    let mut text = text;
+    if let Some(pose) = results::by_hand(state, source) {
+        text = format!("By hand: {} · {text}", hands::place_text(pose));
+        if let Some(off) = hands::off_truth(state, pose) {
+            details.push(difference("The pose by hand", "off the truth", off));
+        }
+    }
+    if let Some(apart) = results::sides_apart(state) {
+        details.push(difference("Measured and predicted", "apart", apart));
+    }
+    (text, color, details)
+}

@@ -1,0 +1,131 @@
+//! Preferences.
+
+use crate::app::settings::prefer;
+use eframe::egui::{self, RichText, ScrollArea, Ui};
+use strum::IntoEnumIterator as _;
+
+use crate::app::action::Action;
+use crate::app::command::Pane;
+use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{caption, section};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::labels::system_person;
+
+const REPEATS: &str = "Share of the pairs that you marked done that come back as todo, without their mask and unannounced. \
+                       The first mask stays; both are compared under Progress of the Mask pane. 0 switches it off. Default 5 %";
+
+/// Nothing is kept between frames.
+pub(crate) type Memory = ();
+
+/// The pane.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().id_salt("settings").show(ui, |ui| body(cx, ui));
+    });
+}
+
+/// Who labels.
+pub(crate) fn person(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Your name").color(cx.p.weak));
+        let mut name = cx.state.settings.person.clone();
+        let hint = system_person().unwrap_or_default();
+        let edit = egui::TextEdit::singleline(&mut name).hint_text(hint).desired_width(f32::INFINITY);
+        let edit = ui.add(edit).accessible_name("Your name");
+        if edit.on_hover_text("Stands with every mask and in the journal of every pair").changed() {
+            cx.push(prefer(move |s| s.person = name.clone()));
+        }
+    });
+}
+
+fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let settings = &cx.state.settings;
+    if cx.state.own.is_some() {
+        ui.label(caption("A case is open: these are its preferences. Yours come back with the next data set.", cx.p));
+        cx.action_button(ui, Action::OwnPreferences, Action::OwnPreferences.name());
+    }
+    ui.label(section("Window", cx.p));
+    ui.horizontal(|ui| {
+        for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {
+            if ui.radio(settings.theme == theme, name).on_hover_text("Colors of the window").clicked() {
+                cx.out.push(prefer(move |s| s.theme = theme).into());
+            }
+        }
+        let mut zoom = settings.ui_zoom;
+        let drag = egui::DragValue::new(&mut zoom).speed(0.01).range(0.5..=4.0).fixed_decimals(2).prefix("zoom ");
+        // The whole window is scaled: while the number is dragged the pointer must not slip off it.
+        let response = ui.add(drag.update_while_editing(false)).accessible_name("Zoom");
+        if response.changed() {
+            cx.out.push(prefer(move |s| s.ui_zoom = zoom).into());
+        }
+        response.on_hover_text("Scale of the whole window (Ctrl + and Ctrl -). Default 1.00");
+    });
+    ui.label(section("Images", cx.p));
+    ui.horizontal(|ui| {
+        for map in ColorMap::iter() {
+            let radio = ui.radio(settings.color_map == map, map.name());
+            if radio.on_hover_text("Colors of depth").clicked() {
+                cx.out.push(prefer(move |s| s.color_map = map).into());
+            }
+        }
+    });
+    let mut footprint = settings.footprint_visible;
+    if ui
+        .checkbox(&mut footprint, "GelSlim window on bubble images")
+        .on_hover_text(Action::Footprint.tooltip())
+        .changed()
+    {
+        cx.out.push(prefer(move |s| s.footprint_visible = footprint).into());
+    }
+    let mut mask = settings.mask_visible;
+    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
+        cx.out.push(prefer(move |s| s.mask_visible = mask).into());
+    }
+    let mut linked = settings.cameras_linked;
+    if ui.checkbox(&mut linked, "3D views move together").on_hover_text(Action::LinkCameras.tooltip()).changed() {
+        cx.out.push(prefer(move |s| s.cameras_linked = linked).into());
+    }
+    ui.label(section("Models", cx.p));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Runtime").color(cx.p.weak));
+        let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
+        let response = combo.show_ui(ui, |ui| {
+            for runtime in EngineChoice::iter() {
+                if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
+                    cx.out.push(prefer(move |s| s.runtime = runtime).into());
+                }
+            }
+        });
+        response.response.accessible_name("Runtime").on_hover_text("What runs the models");
+    });
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Keep predictions").color(cx.p.weak));
+        let mut mib = settings.cache_mib;
+        let drag = egui::DragValue::new(&mut mib).speed(8.0).range(0..=MAX_CACHE_MIB).suffix(" MiB");
+        let response = ui.add(drag.update_while_editing(false)).accessible_name("Keep predictions");
+        if response.changed() {
+            cx.out.push(prefer(move |s| s.cache_mib = mib).into());
+        }
+        response.on_hover_text(
+            "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",
+        );
+    });
+    ui.label(section("Labels", cx.p));
+    person(cx, ui);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Blind repeats").color(cx.p.weak));
+        let mut percent = cx.state.settings.repeats_percent;
+        let drag = egui::DragValue::new(&mut percent).speed(0.1).range(0.0..=100.0).fixed_decimals(1).suffix(" %");
+        if ui.add(drag).accessible_name("Blind repeats").on_hover_text(REPEATS).changed() {
+            cx.push(prefer(move |s| s.repeats_percent = percent));
+        }
+    });
+    if let Ok(device) = cx.device {
+        ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
+    }
+    ui.add_space(4.0);
+    cx.action_button(ui, Action::ResetWorkspace, "Reset workspace");
+    cx.action_button(ui, Action::ResetSettings, "Reset preferences");
+}

@@ -1,0 +1,214 @@
+//! The training of the mask model: what it would learn from, how it goes, and what it is worth on pairs that it did not
+//! see.
+
+use eframe::egui::{self, DragValue, Label, RichText, ScrollArea, Ui, vec2};
+
+use crate::app::action::Action;
+use crate::app::command::{LibraryCommand, Pane, TrainCommand};
+use crate::app::state::Lookup;
+use crate::app::tasks::TaskKind;
+use crate::app::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainForm};
+use crate::app::{recipe, results, train};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{SMALL, caption, section};
+use crate::ui::parts::widget::curves;
+use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::train::{MaskScore, Trained};
+
+/// Nothing is kept between frames.
+pub(crate) type Memory = ();
+
+/// Masks that are listed, the worst first.
+const LISTED: usize = 200;
+
+/// The pane.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
+        ui.set_min_size(ui.available_size());
+        ScrollArea::vertical().auto_shrink(false).id_salt("train").show(ui, |ui| {
+            choices(cx, ui);
+            plan(cx, ui);
+            start(cx, ui);
+            how_it_goes(cx, ui);
+            if let Some(trained) = cx.state.train.result.clone() {
+                worth(cx, ui, &trained);
+            }
+        });
+    });
+}
+
+fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let before = cx.state.train.form;
+    let mut form = before;
+    let begins = match recipe::bundle(cx.state, BundleKind::Mask) {
+        Ok(bundle) => format!("begins from {}", bundle.name),
+        Err(_) => "there is no mask model to begin from".to_owned(),
+    };
+    ui.add(Label::new(caption(begins, cx.p)).wrap());
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
+        budget(cx, ui, &mut form);
+    });
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
+        ui.label(caption("Left out", cx.p));
+        let percent = DragValue::new(&mut form.choice.held_out_percent).range(0..=MOST_HELD_OUT).suffix(" %");
+        let percent = ui.add(percent).accessible_name("Pairs left out for the score");
+        percent
+            .on_hover_text("Of the pairs so many are not learned from, both fingers together: the score is of these");
+        ui.label(caption("Seed", cx.p));
+        let seed = ui.add(DragValue::new(&mut form.choice.seed).range(0..=999_999));
+        seed.accessible_name("Seed of the training")
+            .on_hover_text("Decides which pairs are left out, and the order and variation of the masks");
+    });
+    let tip = "Else pairs that the data set keeps for tests (test_only) are left out, so that no score is of what was \
+               trained on";
+    ui.checkbox(&mut form.choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
+    if form != before {
+        cx.push(TrainCommand::SetForm(form));
+    }
+}
+
+/// For how long.
+fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
+    ui.label(caption("Train for", cx.p));
+    let tip = "A few steps are timed first; the rates fall toward the end of the time";
+    if ui.radio(!form.by_steps, "minutes").on_hover_text(tip).clicked() {
+        form.by_steps = false;
+    }
+    if ui.radio(form.by_steps, "steps").on_hover_text("The same result on any machine of a kind").clicked() {
+        form.by_steps = true;
+    }
+    let drag = match form.by_steps {
+        false => DragValue::new(&mut form.minutes).range(MINUTES).suffix(" min"),
+        true => DragValue::new(&mut form.steps).range(STEPS).suffix(" steps"),
+    };
+    let name = if form.by_steps { "Steps of training" } else { "Minutes of training" };
+    ui.add(drag).accessible_name(name).on_hover_text("Ten minutes are about right for twenty masks on two free cores");
+}
+
+/// Plan of the training.
+fn plan(cx: &Cx<'_>, ui: &mut Ui) {
+    if cx.state.tasks.of_kind(TaskKind::Train).is_some() {
+        return;
+    }
+    let Some(key) = results::train_plan_key(cx.state) else { return };
+    let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
+    match cx.state.look(key) {
+        Lookup::Ready(plan) | Lookup::Stale(plan) => {
+            for line in plan.lines() {
+                say(line, cx.p.text);
+            }
+            for warning in plan.warnings() {
+                say(warning, cx.p.caution);
+            }
+            if plan.masks() == 0 {
+                let what =
+                    "Nothing to learn from yet: correct masks and mark their pairs \"done\" ([[done_and_next]]).";
+                say(cx.keys().fill(what), cx.p.caution);
+            }
+        }
+        Lookup::Failed(err) => {
+            say(err.to_string(), cx.p.wrong);
+        }
+        Lookup::Waiting | Lookup::Absent(_) => {
+            say("…".into(), cx.p.weak);
+        }
+    }
+}
+
+fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
+        match cx.state.tasks.of_kind(TaskKind::Train) {
+            Some((ticket, task)) => {
+                let tip = "Stop; the same training goes on from here when it is asked for again";
+                cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
+            }
+            None => {
+                cx.action_button(ui, Action::StartTraining, "Start training");
+                if train::uses_trained(cx.state) {
+                    let tip = "The trained model makes the automatic masks now";
+                    ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
+                } else if train::trained(cx.state).is_some() {
+                    cx.action_button(ui, Action::UseTrained, "Use the trained model");
+                }
+            }
+        }
+    });
+}
+
+fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui) {
+    let all = train::curves(cx.state);
+    if all.is_empty() {
+        return;
+    }
+    let of = |unit: &str| all.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
+    let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(110.0, 300.0), 90.0);
+    ui.horizontal_wrapped(|ui| {
+        curves::show(ui, size, "Loss", &of("loss"));
+        curves::show(ui, size, "Dice on pairs left out", &of("Dice"));
+    });
+}
+
+/// Scores of the new model on masks that were not trained on.
+fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
+    ui.add_space(6.0);
+    ui.label(section("On pairs that were left out", cx.p));
+    let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
+    for warning in &trained.warnings {
+        say(warning.clone(), cx.p.caution);
+    }
+    for remark in &trained.unusable {
+        say(format!("not used: {}: {}", remark.name, remark.why), cx.p.caution);
+    }
+    let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
+    let mut select = None;
+    egui::Grid::new("held out").num_columns(3).spacing(vec2(12.0, 3.0)).striped(true).show(ui, |ui| {
+        for (heading, tip) in [
+            ("IoU", "Pixels in both masks over pixels in either: the model as it was, and the trained one"),
+            ("Dice", "Twice the pixels in both masks over the pixels of each together"),
+            ("pair, the worst first", "A click shows the pair"),
+        ] {
+            ui.label(caption(heading, cx.p)).on_hover_text(tip);
+        }
+        ui.end_row();
+        let row = |ui: &mut Ui, before: MaskScore, after: MaskScore| {
+            let color = if after.iou < before.iou { cx.p.caution } else { cx.p.text };
+            ui.label(RichText::new(change(before.iou, after.iou)).color(color).size(SMALL));
+            ui.label(RichText::new(change(before.dice, after.dice)).color(color).size(SMALL));
+        };
+        if let (Some(before), Some(after)) = (trained.before, trained.after) {
+            row(ui, before, after);
+            ui.label(RichText::new(format!("mean of {}", trained.held_out.len())).size(SMALL).strong());
+            ui.end_row();
+        }
+        for one in trained.held_out.iter().take(LISTED) {
+            row(ui, one.before, one.after);
+            let predicted = if one.imprint == ImprintSource::Predicted { ", predicted" } else { "" };
+            let name = format!("{}, {}{predicted}", one.pair, one.finger);
+            let shown = ui.add(Label::new(RichText::new(&name).size(SMALL)).truncate().sense(egui::Sense::click()));
+            if shown.on_hover_text(name).clicked() {
+                select = Some(one.id);
+            }
+            ui.end_row();
+        }
+    });
+    if let Some(pair) = select {
+        cx.push(LibraryCommand::Select(pair));
+    }
+    if trained.held_out.len() > LISTED {
+        ui.label(caption(format!("and {} better ones", trained.held_out.len() - LISTED), cx.p));
+    }
+    let by = if trained.persons.is_empty() { String::new() } else { format!(" by {}", trained.persons.join(", ")) };
+    let text = format!(
+        "{} masks of {} pairs{by}, {} steps, {:.0} s; the bundle: {}",
+        trained.masks,
+        trained.pairs,
+        trained.steps,
+        trained.seconds,
+        trained.bundle.display()
+    );
+    ui.add(Label::new(caption(text, cx.p)).wrap());
+}

@@ -1,0 +1,340 @@
+//! The pane that holds any two imprints of a touch against each other.
+
+mod choose;
+mod figures;
+mod space;
+
+use crate::app::results;
+use crate::app::settings::prefer;
+use eframe::egui::{self, Align2, Color32, Rect, Sense, Stroke, Ui, UiBuilder, pos2, vec2};
+use strum::IntoEnumIterator as _;
+
+use super::images::link::Link;
+use super::images::{absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
+use crate::app::action::Action;
+use crate::app::keys::VersusKey;
+use crate::app::pane::Pane;
+use crate::app::settings::{Versus, VersusMode};
+use crate::app::state::Lookup;
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::{Palette, SMALL};
+use crate::ui::parts::widget::colorbar;
+use crate::ui::parts::widget::image_canvas::{CanvasOutput, ImageCanvas, Primary, shows_squares};
+use crate::ui::parts::widget::texture::{Histogram, depth_image};
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::rig::PadId;
+use touch2touch_core::units;
+use touch2touch_work::subject::Subject;
+
+/// Memory of the comparison.
+pub(crate) struct Memory {
+    /// Position of the wipe's line, as a share of the picture's width.
+    wipe: f32,
+    /// The 3D view.
+    space: space::Space,
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self { wipe: 0.5, space: space::Space::default() }
+    }
+}
+
+/// One of the two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Letter {
+    A,
+    B,
+}
+
+impl Letter {
+    fn of(self, versus: &Versus) -> &Subject {
+        match self {
+            Self::A => &versus.a,
+            Self::B => &versus.b,
+        }
+    }
+}
+
+/// The color of one of the two: that of its side where it has one, and never that of the other.
+fn color(p: &Palette, versus: &Versus, letter: Letter) -> Color32 {
+    let (own, other) = match letter {
+        Letter::A => (&versus.a, &versus.b),
+        Letter::B => (&versus.b, &versus.a),
+    };
+    match (own, letter) {
+        (Subject::Measured, _) if *other != Subject::Measured || letter == Letter::A => p.truth,
+        (_, Letter::A) => p.prediction,
+        _ if *other == Subject::Measured => p.prediction,
+        _ => p.pins[0],
+    }
+}
+
+/// True while the key is held that shows B in the place of A.
+fn flickers(ui: &Ui) -> bool {
+    let held = ui.input(|i| i.key_down(egui::Key::F) && i.modifiers.is_none());
+    held && !ui.ctx().egui_wants_keyboard_input()
+}
+
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+    let versus = cx.state.settings.compared();
+    let held = egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+        let held = header(cx, ui, &versus);
+        figures::show(cx, ui, &versus);
+        held
+    });
+    let flipped = held.inner || flickers(ui);
+    let full = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(full);
+    if versus.mode.is_3d() {
+        let mut child = ui.new_child(UiBuilder::new().max_rect(full).id_salt("compared in 3D"));
+        return space::show(cx, &mut child, &mut memory.space, &versus, flipped);
+    }
+    let area = full.with_max_y((full.bottom() - colorbar::HEIGHT).max(full.top() + 16.0));
+    let shown = cx.state.fingers();
+    let fingers: Vec<PadId> = cx.state.rig().pads().filter(|f| shown.contains(f)).collect();
+    let height = area.height() / fingers.len().max(1) as f32;
+    let mut histogram = None;
+    for (i, finger) in fingers.iter().enumerate() {
+        let rect = Rect::from_min_size(area.min + vec2(0.0, height * i as f32), vec2(area.width(), height - 1.0));
+        let parts = match versus.mode {
+            VersusMode::Side => {
+                let half = vec2((rect.width() * 0.5 - 0.5).max(8.0), rect.height());
+                let right = Rect::from_min_size(pos2(rect.right() - half.x, rect.top()), half);
+                vec![(Letter::A, Rect::from_min_size(rect.min, half)), (Letter::B, right)]
+            }
+            _ => vec![(Letter::A, rect)],
+        };
+        for (letter, rect) in parts {
+            let mut child = ui.new_child(UiBuilder::new().max_rect(rect).id_salt(("compared", *finger, letter)));
+            child.set_clip_rect(rect.intersect(ui.clip_rect()));
+            let drawn = match versus.mode {
+                VersusMode::Difference => difference(cx, &mut child, &versus, *finger),
+                _ => picture(cx, &mut child, memory, &versus, letter, *finger, flipped),
+            };
+            histogram = drawn.or(histogram);
+        }
+    }
+    let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
+    ui.painter().rect_filled(rect, 0.0, cx.p.panel);
+    let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
+    // The error's range is one for all errors.
+    let pane = if versus.mode == VersusMode::Difference { Pane::Error } else { Pane::Compare };
+    bar::color_bar(cx, &mut child, pane, histogram.as_ref());
+}
+
+/// Choice of what is compared, and how; true while the button is held that shows B in the place of A.
+fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
+    let mut held = false;
+    ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
+    ui.spacing_mut().button_padding = vec2(4.0, 1.0);
+    ui.style_mut().override_font_id = Some(egui::FontId::proportional(SMALL));
+    let width = ui.available_width();
+    ui.horizontal_wrapped(|ui| {
+        for letter in [Letter::A, Letter::B] {
+            if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - 54.0) / 2.0) {
+                cx.push(match letter {
+                    Letter::A => prefer(move |s| s.versus_mut().a = subject.clone()),
+                    Letter::B => prefer(move |s| s.versus_mut().b = subject.clone()),
+                });
+            }
+        }
+        cx.action_button(ui, Action::SwapCompared, "Swap");
+    });
+    ui.horizontal_wrapped(|ui| {
+        for mode in VersusMode::iter() {
+            let tip = cx.keys().fill(&format!("{} ([[compare_mode]]: next)", mode.tooltip()));
+            if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(tip).clicked() {
+                cx.push(prefer(move |s| s.versus_mut().mode = mode));
+            }
+        }
+        let button = ui.button("Hold: B").on_hover_text("While F or this is held, B stands in the place of A");
+        held = button.is_pointer_button_down_on();
+    });
+    held
+}
+
+/// The canvas of a picture of `size` pixels, moved together with all bubble images.
+fn canvas(cx: &mut Cx<'_>, ui: &mut Ui, label: &str, size: [usize; 2]) -> CanvasOutput {
+    let mut view = cx.shared.views.bubble;
+    let canvas = ImageCanvas { label, size, rotated: false, primary: Primary::Pan, background: cx.p.canvas };
+    let output = canvas.show(ui, &mut view);
+    cx.shared.views.bubble = view;
+    output
+}
+
+/// Placeholder for a picture.
+fn instead(cx: &mut Cx<'_>, ui: &mut Ui, lookup: Lookup<'_, DepthMap>) {
+    match lookup {
+        Lookup::Failed(err) => failed(cx, ui, err),
+        Lookup::Absent(absent) => absent_text(cx, ui, absent),
+        Lookup::Ready(_) | Lookup::Stale(_) | Lookup::Waiting => {
+            let rect = ui.available_rect_before_wrap();
+            ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
+            let font = egui::FontId::proportional(12.0);
+            ui.painter().text(rect.center(), Align2::CENTER_CENTER, "Computing…", font, cx.p.weak);
+        }
+    }
+}
+
+/// The picture of one of the two; with a wipe, that of B lies over it at the right of the line.
+fn picture(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &mut Memory,
+    versus: &Versus,
+    letter: Letter,
+    finger: PadId,
+    flipped: bool,
+) -> Option<Histogram> {
+    let letter = if flipped { Letter::B } else { letter };
+    let subject = letter.of(versus);
+    let lookup = results::subject(cx.state, subject, finger);
+    let Some(depth) = lookup.shown() else {
+        instead(cx, ui, lookup);
+        return None;
+    };
+    let label = format!("Compare {letter:?} {}", cx.state.finger_name(finger));
+    let output = canvas(cx, ui, &label, depth.size());
+    let histogram = paint(cx, ui, &output, letter, subject, finger, depth)?;
+    let wiped = versus.mode == VersusMode::Wipe && !flipped;
+    if wiped {
+        wipe(cx, ui, memory, &output, versus, finger);
+    }
+    over(cx, &output, versus, finger);
+    let strong = color(cx.p, versus, letter);
+    output.caption(Align2::LEFT_TOP, &format!("{letter:?}  {}", subject.label()), strong);
+    if wiped {
+        output.caption(Align2::RIGHT_TOP, &format!("B  {}", versus.b.label()), color(cx.p, versus, Letter::B));
+    }
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), Color32::from_gray(235));
+    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    Some(histogram)
+}
+
+/// Paints the imprint of a subject; its histogram.
+fn paint(
+    cx: &mut Cx<'_>,
+    ui: &Ui,
+    output: &CanvasOutput,
+    letter: Letter,
+    subject: &Subject,
+    finger: PadId,
+    depth: &DepthMap,
+) -> Option<Histogram> {
+    let recipe = results::subject_key(cx.state, subject, finger).ok()?;
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let (map, range) = (map_of(cx.state), range_of(cx.state));
+    let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
+    let picture = cx.shared.textures.get(ui.ctx(), ("compared", letter, finger), key, squares, || {
+        (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
+    });
+    output.paint(picture.texture.id(), Color32::WHITE);
+    picture.histogram.clone()
+}
+
+/// B over A at the right of a line, which can be dragged.
+fn wipe(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, output: &CanvasOutput, versus: &Versus, finger: PadId) {
+    const REACH: f32 = 6.0;
+    let image = output.map.image_rect;
+    let clip = output.painter.clip_rect();
+    let x = (image.left() + memory.wipe * image.width()).clamp(clip.left(), clip.right());
+    let handle = Rect::from_min_max(pos2(x - REACH, clip.top()), pos2(x + REACH, clip.bottom()));
+    let drag = ui.interact(handle, ui.scope_id().with("wipe"), Sense::drag());
+    let named = format!("Line between A and B, {}", cx.state.finger_name(finger));
+    drag.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, &named));
+    if drag.hovered() || drag.dragged() {
+        ui.ctx().set_cursor_icon(egui::CursorIcon::ResizeHorizontal);
+    }
+    if drag.dragged() {
+        let moved = drag.drag_delta().x / image.width().max(1.0);
+        memory.wipe = (memory.wipe + moved).clamp(0.0, 1.0);
+    }
+    let right = clip.with_min_x(x);
+    if let Some(depth) = results::subject(cx.state, &versus.b, finger).shown() {
+        let painter = output.painter.with_clip_rect(right);
+        let part = CanvasOutput {
+            response: output.response.clone(),
+            map: output.map,
+            hovered: output.hovered,
+            painter,
+            panning: output.panning,
+        };
+        paint(cx, ui, &part, Letter::B, &versus.b, finger, depth);
+    } else {
+        output.painter.rect_filled(right, 0.0, cx.p.canvas.gamma_multiply(0.8));
+    }
+    let line = clip.y_range();
+    output.painter.vline(x, line, Stroke::new(4.0, Color32::from_black_alpha(140)));
+    output.painter.vline(x, line, Stroke::new(2.0, Color32::WHITE));
+}
+
+/// A minus B.
+fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> Option<Histogram> {
+    for subject in [&versus.a, &versus.b] {
+        let lookup = results::subject(cx.state, subject, finger);
+        if lookup.shown().is_none() {
+            instead(cx, ui, lookup);
+            return None;
+        }
+    }
+    let lookup = results::subjects_compared(cx.state, &versus.a, &versus.b, finger);
+    let Some(compared) = lookup.shown() else {
+        instead(cx, ui, lookup.map(|compared| &compared.error));
+        return None;
+    };
+    let label = format!("A minus B {}", cx.state.finger_name(finger));
+    let output = canvas(cx, ui, &label, compared.error.size());
+    let squares = shows_squares(&output.map, ui.pixels_per_point());
+    let keys = [&versus.a, &versus.b].map(|subject| results::subject_key(cx.state, subject, finger));
+    let [Ok(a), Ok(b)] = keys else { return None };
+    let range = Range::symmetric(cx.shared.views.error_m());
+    let key = (VersusKey { a, b }, range.hi.to_bits());
+    let picture = cx.shared.textures.get(ui.ctx(), ("compared difference", finger), key, squares, || {
+        (depth_image(&compared.error, ColorMap::Diverging, range), Histogram::of(compared.error.as_slice()))
+    });
+    output.paint(picture.texture.id(), Color32::WHITE);
+    let histogram = picture.histogram.clone();
+    over(cx, &output, versus, finger);
+    let light = Color32::from_gray(235);
+    output.caption(Align2::LEFT_TOP, &format!("{} minus {}", versus.a.label(), versus.b.label()), light);
+    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), light);
+    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    histogram
+}
+
+/// Overlay of every picture: GelSlim's window, cross-hair, the values under the pointer.
+fn over(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId) {
+    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
+        output.dashed_rect(link.window, Color32::from_gray(235));
+    }
+    if let Some(px) = output.hovered {
+        readout(cx, output, versus, finger, px);
+        hover(cx, finger, px);
+    }
+    if let Some(point) = cx.state.selection.hover.filter(|h| h.finger == finger) {
+        output.crosshair(point.at_px, Color32::WHITE);
+    }
+}
+
+/// The values of both under the pointer.
+fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadId, px: [f32; 2]) {
+    let Some((x, y)) = output.map.pixel(px) else { return };
+    let value = |subject: &Subject| {
+        let depth = results::subject(cx.state, subject, finger).shown()?;
+        depth.get(x, y).copied().filter(|v| v.is_finite()).map(f64::from)
+    };
+    let (a, b) = (value(&versus.a), value(&versus.b));
+    let text = |v: Option<f64>| v.map_or("–".to_owned(), units::text_mm);
+    let difference = a.zip(b).map(|(a, b)| a - b);
+    let note = scale_note(cx.state);
+    let note = if note.is_empty() { String::new() } else { format!("   ({note})") };
+    cx.shared.readout = Some(format!(
+        "Compare {} ({x}, {y})   A {}   B {}   A - B {}{note}",
+        cx.state.finger_name(finger),
+        text(a),
+        text(b),
+        text(difference)
+    ));
+}

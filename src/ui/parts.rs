@@ -1,0 +1,12 @@
+//! What panes are built from: the context that each is given, widgets, the look, pens and 3D views.
+
+pub(crate) mod cx;
+pub(crate) mod dialogs;
+pub(crate) mod kept;
+pub(crate) mod made_with;
+pub(crate) mod pen;
+pub(crate) mod saved;
+pub(crate) mod scene_view;
+pub mod theme;
+pub(crate) mod thumbnail;
+pub mod widget;

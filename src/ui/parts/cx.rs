@@ -1,0 +1,181 @@
+//! Context of every pane: the state to read, a list to put commands on, and what panes share.
+
+use std::collections::BTreeMap;
+
+use eframe::egui::{self, Response, Ui};
+
+use super::dialogs::Dialogs;
+use super::saved::Saved;
+use super::scene_view::Device;
+use super::theme::Palette;
+use super::widget::image_canvas::ViewTransform;
+use super::widget::progress;
+use super::widget::texture::Textures;
+use crate::app::action::{Action, Bindings};
+use crate::app::command::{Command, TasksCommand};
+use crate::app::keys::ImprintSource;
+use crate::app::state::State;
+use crate::app::state::tasks::{Task, Ticket};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::SensorKind;
+
+/// Context of a pane while it is drawn.
+pub(crate) struct Cx<'a> {
+    /// Everything the studio knows. Read only.
+    pub state: &'a State,
+    /// Executed before the next frame.
+    pub out: &'a mut Vec<Command>,
+    /// Things that panes share.
+    pub shared: &'a mut Shared,
+    /// The graphics device; `None` if the window has none that can draw 3D.
+    pub device: Result<&'a Device, &'a str>,
+    /// The colors of the theme.
+    pub p: &'static Palette,
+}
+
+impl Cx<'_> {
+    /// Puts a command on the list.
+    pub(crate) fn push(&mut self, command: impl Into<Command>) {
+        self.out.push(command.into());
+    }
+
+    /// The keys in force.
+    pub(crate) fn keys(&self) -> &Bindings {
+        &self.state.settings.keys
+    }
+
+    /// Puts an action on the list, if it can do anything now.
+    pub(crate) fn act(&mut self, action: Action) {
+        if let Some(command) = action.command(self.state) {
+            self.out.push(command);
+        }
+    }
+
+    /// A button for an action: its tooltip has the shortcut, and it is grayed out when it can do nothing.
+    pub(crate) fn action_button(&mut self, ui: &mut Ui, action: Action, text: &str) -> Response {
+        self.acting(ui, action, egui::Button::new(text), action.name())
+    }
+
+    /// A button for an action that turns something on or off.
+    pub(crate) fn action_switch(&mut self, ui: &mut Ui, action: Action, text: &str, on: bool) -> Response {
+        self.acting(ui, action, egui::Button::selectable(on, text), action.name())
+    }
+
+    /// A button of any look for an action, under a name for screen readers.
+    pub(crate) fn acting(
+        &mut self,
+        ui: &mut Ui,
+        action: Action,
+        button: egui::Button<'_>,
+        name: impl Into<String>,
+    ) -> Response {
+        let command = action.command(self.state);
+        let response = ui.add_enabled(command.is_some(), button).accessible_name(name);
+        let help = self.keys().help(action);
+        let response = response.on_hover_text(&help).on_disabled_hover_text(help);
+        if response.clicked()
+            && let Some(command) = command
+        {
+            self.out.push(command);
+        }
+        response
+    }
+
+    /// Progress of a task, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
+    /// stopping keeps.
+    pub(crate) fn stoppable(
+        &mut self,
+        ui: &mut Ui,
+        (ticket, task): (Ticket, &Task),
+        widest: f32,
+        (text, tip): (&str, &str),
+    ) {
+        let width = (ui.available_width() - CANCEL).clamp(60.0, widest);
+        progress::bar(ui, width, task.progress.fraction(), if task.cancelling { "stopping" } else { text });
+        let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
+        if cancel.on_hover_text(tip).clicked() {
+            self.push(TasksCommand::Cancel(ticket));
+        }
+    }
+}
+
+/// Room for the button beside a bar, points.
+const CANCEL: f32 = 70.0;
+
+/// Part of the pictures that is seen, and the colors of errors: one for all panes.
+pub(crate) struct Views {
+    /// Of GelSlim images.
+    pub gel: ViewTransform,
+    /// Of bubble images.
+    pub bubble: ViewTransform,
+    /// Half the range of the error's colors, millimeters.
+    pub error_mm: f32,
+    /// Counts how often bubble images were fitted: a 3D view beside them follows.
+    pub fits: u64,
+}
+
+impl Default for Views {
+    fn default() -> Self {
+        let view = ViewTransform::default();
+        Self { gel: view, bubble: view, error_mm: 4.0, fits: 0 }
+    }
+}
+
+impl Views {
+    /// Shows the images whole: all, or those of one kind of sensor.
+    pub(crate) fn fit(&mut self, only: Option<SensorKind>) {
+        if only != Some(SensorKind::Depth) {
+            self.gel = ViewTransform::default();
+        }
+        if only != Some(SensorKind::Color) {
+            self.bubble = ViewTransform::default();
+            self.fits += 1;
+        }
+    }
+
+    /// Half the range of the error's colors, meters.
+    pub(crate) fn error_m(&self) -> f32 {
+        self.error_mm * 1e-3
+    }
+}
+
+/// Things that the panes share and only the window knows.
+pub(crate) struct Shared {
+    /// Part of the pictures that is seen.
+    pub views: Views,
+    /// Pictures on the graphics card.
+    pub textures: Textures,
+    /// Dialogs.
+    pub dialogs: Dialogs,
+    /// The number under the pointer, for the status bar and the clipboard.
+    pub readout: Option<String>,
+    /// True where a pane has the pixel under the pointer in this frame.
+    pub hover_claimed: bool,
+    /// When labels were last written.
+    pub saved: Saved,
+    /// When notes of the log came on the screen, by number: seconds of the window's clock, and the pair that was shown.
+    pub notes: BTreeMap<u64, (f64, Option<PairId>)>,
+}
+
+impl Shared {
+    /// A fresh window's. `native_dialogs`: whether the system's dialogs are tried before the path box.
+    pub(crate) fn new(native_dialogs: bool) -> Self {
+        Self {
+            views: Views::default(),
+            textures: Textures::default(),
+            dialogs: Dialogs::new(native_dialogs),
+            readout: None,
+            hover_claimed: false,
+            saved: Saved::default(),
+            notes: BTreeMap::new(),
+        }
+    }
+}
+
+/// The color of a side.
+pub(crate) fn side_color(p: &Palette, source: ImprintSource) -> egui::Color32 {
+    match source {
+        ImprintSource::Measured => p.truth,
+        ImprintSource::Predicted => p.prediction,
+    }
+}

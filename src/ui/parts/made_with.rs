@@ -1,0 +1,100 @@
+//! The line below each pane that shows a prediction: model, steps and seed; and where the settings in force would make
+//! another one, that it is so, and the way to the new one.
+
+use eframe::egui::{Align2, Button, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
+
+use super::cx::Cx;
+use super::theme::SMALL;
+use super::widget::cut::cut_in_the_middle;
+use crate::app::action::Action;
+use crate::app::keys::{ImprintSource, ShiftMode};
+use crate::app::pane::{Kind, Pane};
+use crate::app::results;
+use crate::app::results::Why;
+
+use touch2touch_core::rig::PadId;
+
+/// Height of the line, points.
+const HEIGHT: f32 = 18.0;
+/// Width of its button.
+const BUTTON: f32 = 64.0;
+
+/// The finger whose prediction a pane shows; `None` of a pane that shows none.
+fn finger_of(cx: &Cx<'_>, pane: Pane) -> Option<PadId> {
+    let predicted = match pane.kind() {
+        Kind::Imprint(source) | Kind::Scene(source) => source == ImprintSource::Predicted,
+        Kind::Error => true,
+        Kind::Steps | Kind::Map => cx.state.inspect.source == ImprintSource::Predicted,
+        Kind::Form => pane == Pane::Ledger,
+        Kind::Color | Kind::Versus => false,
+    };
+    let mut fingers =
+        cx.state.fingers().into_iter().filter(|finger| predicted && results::chosen(cx.state, *finger).is_some());
+    // One that is out of date is said first.
+    fingers.clone().find(|finger| results::outdated(cx.state, *finger).is_some()).or_else(|| fingers.next())
+}
+
+/// A pane's place, and that of the line below it, if it has one.
+pub(crate) fn split(cx: &Cx<'_>, full: Rect, pane: Pane) -> (Rect, Option<Rect>) {
+    if finger_of(cx, pane).is_none() || full.height() < 4.0 * HEIGHT {
+        return (full, None);
+    }
+    let (place, below) = full.split_top_bottom_at_y(full.bottom() - HEIGHT);
+    (place, Some(below))
+}
+
+/// The line; dims the pane above it where its prediction is not the one that is meant.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: Rect) {
+    let Some((finger, recipe)) =
+        finger_of(cx, pane).and_then(|finger| Some((finger, results::chosen(cx.state, finger)?)))
+    else {
+        return;
+    };
+    let shift = cx.state.settings.shift;
+    let model = cx.state.library.model_name(&recipe.bundle);
+    let why = results::outdated(cx.state, finger).map(|outdated| outdated.why);
+    let settings = match why {
+        None => format!(" · {} · {}", recipe.config.text(), shift.label().to_lowercase()),
+        Some(_) => format!(" · {}", recipe.config.text()),
+    };
+    let (lead, tip) = match why {
+        None => ("", "What is shown was predicted so"),
+        Some(Why::OnItsWay) => ("Predicting anew; this is ", "The settings ask for another prediction"),
+        Some(Why::Picked) => ("Picked: ", "Shown until the settings change, or Generate"),
+        Some(Why::Held) => ("As in the case: ", "The case's model is not on this machine"),
+        Some(Why::NotMade) => ("Made with ", "The settings in force would make another prediction"),
+    };
+    let text = format!("{lead}{model}{settings}");
+    if why.is_some_and(|why| !why.is_meant()) {
+        ui.painter().rect_filled(place, 0.0, cx.p.canvas.gamma_multiply(0.45));
+    }
+    ui.painter().rect_filled(line, 0.0, cx.p.frame);
+    let again = matches!(why, Some(Why::NotMade | Why::Picked)) && results::can_generate(cx.state).is_ok();
+    let room = line.with_max_x(line.right() - if again { BUTTON + 6.0 } else { 0.0 });
+    let color = match (why, shift) {
+        (None | Some(Why::Picked), ShiftMode::Raw) | (Some(Why::NotMade | Why::OnItsWay | Why::Held), _) => {
+            cx.p.caution
+        }
+        _ => cx.p.weak,
+    };
+    let painter = ui.painter_at(room);
+    let width = |text: &str| painter.layout_no_wrap(text.to_owned(), FontId::proportional(SMALL), color).size().x;
+    // Names are long, and differ at their ends.
+    let left = (room.width() - 12.0 - width(lead) - width(&settings)).max(40.0);
+    let shown = format!("{lead}{}{settings}", cut_in_the_middle(model, left, width));
+    let start = room.left_center() + vec2(6.0, 0.0);
+    painter.text(start, Align2::LEFT_CENTER, shown, FontId::proportional(SMALL), color);
+    let response = ui.interact(room, ui.scope_id().with((pane, "made with")), Sense::hover());
+    response.widget_info(|| eframe::egui::WidgetInfo::labeled(eframe::egui::Role::Label, true, &text));
+    response.on_hover_text(format!("{text}. {tip}"));
+    if again {
+        let place =
+            Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
+        let button = Button::new(RichText::new("Generate").size(SMALL)).small().min_size(vec2(BUTTON, 16.0));
+        let button = ui.put(place, button).accessible_name(format!("Generate anew, {}", pane.title()));
+        let tip = cx.keys().behind("Predicts with the settings in force", Action::Generate);
+        if button.on_hover_text(tip).clicked() {
+            cx.act(Action::Generate);
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The help mark of a pane: its mouse controls.
+
+use eframe::egui::{self, RichText, Ui};
+
+use crate::app::action::Bindings;
+use crate::ui::parts::theme::{Palette, SMALL, caption};
+
+/// Mouse controls of every image pane.
+pub(crate) const IMAGE: &[(&str, &str)] = &[
+    ("Wheel", "zoom at the pointer"),
+    ("Drag, middle drag or Space + drag", "move all linked images"),
+    ("Double-click or [[fit]]", "fit"),
+    ("Hover", "cross-hair in every image and point in 3D"),
+];
+
+/// Controls of the comparison of any two imprints.
+pub(crate) const VERSUS: &[(&str, &str)] = &[
+    ("Click on A or B", "choose what it is"),
+    ("[[swap_compared]]", "swap A and B"),
+    ("[[compare_mode]]", "side by side, wipe, difference, 3D"),
+    ("Hold F", "B in the place of A"),
+    ("Drag the line", "wipe"),
+    ("Hover", "both values and their difference, in the status bar"),
+    ("Wheel, drag, double-click", "zoom, move, fit; in 3D zoom, orbit, fit"),
+];
+
+/// Mouse controls of an image that can be painted on.
+pub(crate) const PAINT: &[(&str, &str)] = &[
+    ("Drag", "paint with the tool in hand"),
+    ("Ctrl + drag or right drag", "erase"),
+    ("[[brush_smaller]] and [[brush_larger]], or Shift + wheel", "brush size"),
+    ("Wheel", "zoom at the pointer"),
+    ("Middle drag or Space + drag", "move all linked images"),
+    ("[[fit]]", "fit"),
+];
+
+/// Mouse controls of the 3D panes.
+pub(crate) const SCENE: &[(&str, &str)] = &[
+    ("Left drag", "orbit"),
+    ("Right or middle drag", "move"),
+    ("Wheel", "zoom at the pointer"),
+    ("Double-click", "center the point; beside all points, or [[fit]]: fit"),
+    ("[[camera_left]], [[camera_right]], [[camera_front]], [[camera_top]]", "from left, right, front, top"),
+    ("Hover", "cross-hair in the images"),
+    ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
+    ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
+    ("[[next_layer]]", "next layer"),
+    ("[[section]], [[window_only]], [[parallel]]", "cut open, GelSlim's window only, parallel lines"),
+    ("Click in the list", "show or hide; the dots: color, size, opacity"),
+];
+
+/// Controls of the time machine.
+pub(crate) const STEPS: &[(&str, &str)] = &[
+    ("Drag in the curves", "scrub"),
+    ("Click on a curve", "show that start and step"),
+    ("[[step_back]] and [[step_forward]]", "previous and next step"),
+    ("[[first_step]] and [[last_step]]", "first and last step"),
+    ("[[play_steps]]", "play or pause, also over a 3D view"),
+    ("[[pin_step]]", "pin the step for comparison"),
+];
+
+/// Mouse controls of the basin map.
+pub(crate) const BASIN: &[(&str, &str)] = &[
+    ("Hover", "the start asked for, the one applied, and the end"),
+    ("Click", "load that run into the time machine"),
+    ("[[cancel_jobs]]", "give up what is being computed"),
+];
+
+/// A question mark that lists `controls` under the pointer, with the keys in force.
+pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
+    let p = Palette::of(ui);
+    let text = RichText::new("?").size(SMALL).color(p.weak);
+    let button = ui.add(egui::Button::new(text).frame(false).min_size(egui::vec2(16.0, 16.0)));
+    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Mouse controls of {pane}")));
+    button.on_hover_ui(|ui| {
+        ui.label(RichText::new(format!("{pane}: mouse controls")).strong());
+        egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
+            for (control, effect) in controls {
+                ui.label(caption(keys.fill(control), Palette::of(ui)));
+                ui.label(RichText::new(keys.fill(effect)).size(SMALL));
+                ui.end_row();
+            }
+        });
+    });
+}

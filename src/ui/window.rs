@@ -1,0 +1,12 @@
+//! The window around the panes: a frame, bars, the arrangement, keys, and what covers the panes.
+
+pub mod app;
+pub(crate) mod bars;
+pub(crate) mod export;
+pub(crate) mod fuzzy;
+pub(crate) mod layout;
+pub(crate) mod palette;
+pub(crate) mod pane;
+pub(crate) mod screenshot;
+pub(crate) mod shortcuts;
+pub(crate) mod unsaved;

@@ -1,0 +1,218 @@
+//! The docked panes: their memories, title bars, and how they behave in their tree.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
+use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
+
+use crate::app::action::Action;
+use crate::app::pane::{Kind, Pane, panes};
+use crate::ui::parts::cx::{Cx, side_color};
+use crate::ui::parts::theme::{SMALL, medium};
+use crate::ui::parts::widget::help;
+
+macro_rules! views {
+    ($( $file:ident { $( $pane:ident $row:tt )* } )*) => {
+        /// Memories of the files that draw panes, kept from one frame to the next.
+        #[derive(Default)]
+        pub(crate) struct Memories {
+            $( pub $file: crate::ui::panes::$file::Memory, )*
+        }
+
+        /// Draws a pane.
+        fn draw(cx: &mut Cx<'_>, ui: &mut Ui, memories: &mut Memories, pane: Pane) {
+            match pane {
+                $( $( Pane::$pane )|* => crate::ui::panes::$file::show(cx, ui, &mut memories.$file, pane), )*
+            }
+        }
+    };
+}
+panes!(views);
+
+/// The panes of the window.
+#[derive(Default)]
+pub(crate) struct Panes {
+    /// Memories of the files that draw them.
+    pub memories: Memories,
+    /// The pane that fills the window.
+    pub maximized: Option<Pane>,
+    /// The pane under the pointer.
+    pub hovered: Option<Pane>,
+    /// The panes drawn in this frame, so far.
+    pub drawn: BTreeSet<Pane>,
+    /// Rectangle of each pane when it was drawn last, points.
+    pub places: BTreeMap<Pane, egui::Rect>,
+}
+
+/// Draws a pane.
+fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
+    panes.drawn.insert(pane);
+    panes.places.insert(pane, ui.max_rect());
+    if ui.rect_contains_pointer(ui.max_rect()) {
+        panes.hovered = Some(pane);
+    }
+    // How a prediction was made stands below whatever shows it.
+    let (place, below) = crate::ui::parts::made_with::split(cx, ui.max_rect(), pane);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
+        ui.set_clip_rect(place.intersect(ui.clip_rect()));
+        draw(cx, ui, &mut panes.memories, pane);
+    });
+    if let Some(below) = below {
+        crate::ui::parts::made_with::show(cx, ui, pane, place, below);
+    }
+}
+
+/// The help mark of a pane, if it has mouse controls of its own.
+fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
+    let controls = match pane.kind() {
+        Kind::Form => return,
+        Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
+        Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Versus => help::VERSUS,
+        Kind::Scene(_) => help::SCENE,
+        Kind::Steps => help::STEPS,
+        Kind::Map => help::BASIN,
+    };
+    help::mark(ui, pane.title(), controls, cx.keys());
+}
+
+/// Behavior of the panes in their tree.
+pub(crate) struct Docking<'a, 'b> {
+    /// Context that the panes get.
+    pub cx: &'b mut Cx<'a>,
+    /// The panes.
+    pub panes: &'b mut Panes,
+    /// True where a person moved something.
+    pub edited: bool,
+}
+
+impl Behavior<Pane> for Docking<'_, '_> {
+    fn pane_ui(&mut self, ui: &mut Ui, _tile: TileId, pane: &mut Pane) -> UiResponse {
+        let rect = ui.max_rect();
+        ui.painter().rect_filled(rect, 0.0, self.cx.p.panel);
+        show(self.cx, ui, self.panes, *pane);
+        UiResponse::None
+    }
+
+    fn tab_title_for_pane(&mut self, pane: &Pane) -> WidgetText {
+        let color = pane.side().map_or(self.cx.p.text, |side| side_color(self.cx.p, side));
+        RichText::new(pane.tab()).family(medium()).size(12.0).color(color).into()
+    }
+
+    fn on_tab_button(&mut self, tiles: &mut Tiles<Pane>, tile: TileId, response: egui::Response) -> egui::Response {
+        match tiles.get(tile) {
+            Some(Tile::Pane(pane)) => {
+                if response.double_clicked() {
+                    self.panes.maximized = Some(*pane);
+                }
+                let error_m = self.cx.shared.views.error_m();
+                response.context_menu(|ui| super::export::menu(self.cx, ui, *pane, error_m));
+                response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
+            }
+            _ => response,
+        }
+    }
+
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<Pane>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &egui_tiles::Tabs,
+        _scroll: &mut f32,
+    ) {
+        let Some(Tile::Pane(pane)) = tabs.active.and_then(|id| tiles.get(id)) else { return };
+        ui.spacing_mut().item_spacing.x = 2.0;
+        ui.add_space(4.0);
+        let response = ui
+            .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
+            .accessible_name(format!("Maximize {}", pane.title()));
+        let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
+        let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
+        ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
+        let tip = self.cx.keys().behind("Let this pane fill the window", Action::MaximizePane);
+        if response.on_hover_text(tip).clicked() {
+            self.panes.maximized = Some(*pane);
+        }
+        help_mark(self.cx, ui, *pane);
+        super::export::button(self.cx, ui, *pane, self.cx.shared.views.error_m());
+    }
+
+    fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
+        26.0
+    }
+
+    fn tab_title_spacing(&self, _visuals: &egui::Visuals) -> f32 {
+        7.0
+    }
+
+    fn gap_width(&self, _style: &egui::Style) -> f32 {
+        2.0
+    }
+
+    fn min_size(&self) -> f32 {
+        96.0
+    }
+
+    fn simplification_options(&self) -> SimplificationOptions {
+        SimplificationOptions { all_panes_must_have_tabs: true, ..SimplificationOptions::default() }
+    }
+
+    fn tab_bar_color(&self, _visuals: &egui::Visuals) -> Color32 {
+        self.cx.p.frame
+    }
+
+    fn tab_bg_color(&self, _v: &egui::Visuals, tiles: &Tiles<Pane>, id: TileId, state: &TabState) -> Color32 {
+        let alone = tiles.parent_of(id).and_then(|p| tiles.get_container(p)).is_some_and(|c| c.num_children() == 1);
+        if state.active && !alone { self.cx.p.panel } else { Color32::TRANSPARENT }
+    }
+
+    fn tab_outline_stroke(&self, _v: &egui::Visuals, _t: &Tiles<Pane>, _id: TileId, _s: &TabState) -> Stroke {
+        Stroke::NONE
+    }
+
+    fn tab_bar_hline_stroke(&self, _v: &egui::Visuals) -> Stroke {
+        Stroke::new(1.0, self.cx.p.line)
+    }
+
+    fn resize_stroke(&self, _style: &egui::Style, state: egui_tiles::ResizeState) -> Stroke {
+        match state {
+            egui_tiles::ResizeState::Idle => Stroke::new(2.0, self.cx.p.line),
+            _ => Stroke::new(3.0, self.cx.p.accent),
+        }
+    }
+
+    fn on_edit(&mut self, _action: egui_tiles::EditAction) {
+        self.edited = true;
+    }
+}
+
+/// One pane over the whole window, with the way back.
+pub(crate) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
+    let full = ui.available_rect_before_wrap();
+    ui.painter().rect_filled(full, 0.0, cx.p.frame);
+    let bar = egui::Rect::from_min_size(full.min, vec2(full.width(), 26.0));
+    ui.scope_builder(egui::UiBuilder::new().max_rect(bar.shrink2(vec2(8.0, 0.0))), |ui| {
+        ui.horizontal_centered(|ui| {
+            ui.label(crate::ui::parts::theme::title(pane.title()));
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                if ui
+                    .button(RichText::new("Back to all panes").size(SMALL))
+                    .on_hover_text(cx.keys().fill("[[maximize_pane]] or [[cancel_jobs]]"))
+                    .clicked()
+                {
+                    panes.maximized = None;
+                }
+                help_mark(cx, ui, pane);
+                super::export::button(cx, ui, pane, cx.shared.views.error_m());
+            });
+        });
+    });
+    let rest = egui::Rect::from_min_max(bar.left_bottom(), full.max);
+    ui.scope_builder(egui::UiBuilder::new().max_rect(rest), |ui| {
+        ui.set_clip_rect(rest);
+        ui.painter().rect_filled(rest, 0.0, cx.p.panel);
+        show(cx, ui, panes, pane);
+    });
+    ui.advance_cursor_after_rect(full);
+}

@@ -1,0 +1,134 @@
+//! Keys to actions, and the sheet that lists them: both from the one table of actions.
+
+mod sheet;
+
+use eframe::egui::{self, Key as EKey};
+use strum::IntoEnumIterator as _;
+
+pub(crate) use self::sheet::{Memory, sheet};
+use crate::app::action::{Action, Bindings, Key, Shortcut};
+use crate::app::pane::{Kind, Pane};
+
+/// The toolkit's name of a key.
+fn key_of(key: Key) -> EKey {
+    match key {
+        Key::Escape => EKey::Escape,
+        Key::Equals => EKey::Equals,
+        // The names are the same, but for these: the toolkit parses them.
+        other => EKey::from_name(&other.text()).or_else(|| EKey::from_name(&format!("{other:?}"))).unwrap_or(EKey::F35),
+    }
+}
+
+/// The key that the toolkit names so, if actions can have it.
+fn key_named(key: EKey) -> Option<Key> {
+    Key::iter().find(|known| key_of(*known) == key)
+}
+
+/// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
+///
+/// The key of an action that is not `possible` now is left to what else wants it (Enter to a focused button).
+/// While something covers the panes (`covered`) they are its own: Escape closes it and nothing else.
+pub(crate) fn pressed(
+    ctx: &egui::Context,
+    keys: &Bindings,
+    covered: bool,
+    possible: impl Fn(Action) -> bool,
+) -> Vec<Action> {
+    let pressed = |e: &egui::Event| matches!(e, egui::Event::Key { pressed: true, .. } | egui::Event::Copy);
+    if !ctx.input(|input| input.events.iter().any(pressed)) {
+        return Vec::new();
+    }
+    let typing = covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
+    let mut actions = Vec::new();
+    ctx.input_mut(|input| {
+        // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
+        let mut all: Vec<(Action, Shortcut)> = Action::iter()
+            .filter(|a| possible(*a))
+            .flat_map(|a| keys.all(a).into_iter().map(move |s| (a, s)))
+            .collect();
+        all.sort_by_key(|(_, s)| std::cmp::Reverse(u8::from(s.ctrl) + u8::from(s.shift) + u8::from(s.alt)));
+        for (action, s) in all {
+            if typing && !s.ctrl && !s.key.is_function() {
+                continue;
+            }
+            if typing && s.key.is_for_text() {
+                continue;
+            }
+            let mut hit = false;
+            input.events.retain(|event| {
+                let egui::Event::Key { key, pressed: true, modifiers, .. } = event else { return true };
+                let same_key = *key == key_of(s.key)
+                    || (s.key == Key::Questionmark && *key == EKey::Slash && modifiers.shift)
+                    || (s.key == Key::Exclamationmark && *key == EKey::Num1 && modifiers.shift);
+                let shift_fits = s.key.is_shifted() || modifiers.shift == s.shift;
+                let ctrl_fits = (modifiers.ctrl || modifiers.command) == s.ctrl;
+                let fits = same_key && shift_fits && ctrl_fits && modifiers.alt == s.alt && possible(action);
+                hit |= fits;
+                !fits
+            });
+            // Copy and the like arrive as events of their own.
+            if s == (Shortcut { ctrl: true, shift: false, alt: false, key: Key::C }) && !typing {
+                let before = input.events.len();
+                input.events.retain(|e| !matches!(e, egui::Event::Copy));
+                hit |= before != input.events.len();
+            }
+            if hit {
+                actions.push(action);
+            }
+        }
+    });
+    actions
+}
+
+/// True where an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
+pub(crate) fn fits_pane(action: Action, over: Option<Pane>) -> bool {
+    action != Action::PlaySteps || over.is_some_and(|pane| matches!(pane.kind(), Kind::Steps | Kind::Scene(_)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::Modifiers;
+
+    #[test]
+    fn every_key_is_known_to_the_toolkit() {
+        for key in Key::iter() {
+            assert_ne!(key_of(key), EKey::F35, "{key:?}");
+            assert_eq!(key_named(key_of(key)), Some(key));
+        }
+    }
+
+    /// Modifiers of a shortcut, as the toolkit calls them.
+    fn modifiers(s: crate::app::action::Shortcut) -> Modifiers {
+        Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
+    }
+
+    fn press(keys: &Bindings, key: EKey, modifiers: Modifiers) -> Vec<Action> {
+        let ctx = egui::Context::default();
+        let mut raw = egui::RawInput::default();
+        raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
+        let mut got = Vec::new();
+        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), keys, false, |_| true)));
+        // No picture is made, so nobody uploads its textures.
+        output.textures_delta.clear();
+        got
+    }
+
+    #[test]
+    fn a_key_triggers_its_action_and_no_other() {
+        let mut keys = Bindings::default();
+        for changed in [false, true] {
+            for action in Action::iter() {
+                for s in keys.all(action) {
+                    let mut m = modifiers(s);
+                    m.shift |= s.key.is_shifted();
+                    assert_eq!(press(&keys, key_of(s.key), m), vec![action], "{s}");
+                }
+            }
+            assert_eq!(press(&keys, EKey::Slash, Modifiers::SHIFT), vec![Action::ShortcutSheet]);
+            let generate = press(&keys, EKey::G, Modifiers::CTRL);
+            assert_eq!(generate, if changed { vec![] } else { vec![Action::Generate] });
+            keys.bind(Action::Generate, 0, Some("F9".parse().unwrap()));
+        }
+    }
+}
