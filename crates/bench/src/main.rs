@@ -11,6 +11,7 @@ mod labelling;
 mod peers;
 mod registration;
 mod rows;
+mod verdict;
 
 use std::process::ExitCode;
 
@@ -41,6 +42,8 @@ enum Benchmark {
     Labelling(labelling::LabellingArgs),
     /// Number of data sets stored wrongly that the doctor names rightly, and of sound ones that it doubts.
     Doctor(doctor::DoctorArgs),
+    /// Signs of a fault that need no truth (a wrong tool, swapped fingers, a turned camera), each as a detector.
+    Verdict(verdict::VerdictArgs),
     /// Seconds for a whole data set on all cores, on simulated pairs.
     Dataset(dataset::DatasetArgs),
 }
@@ -61,6 +64,7 @@ fn run(benchmark: &Benchmark) -> VerbResult {
         Benchmark::Labelling(args) => labelling::run(args),
         Benchmark::Doctor(args) => doctor::run(args),
         Benchmark::Dataset(args) => dataset::run(args),
+        Benchmark::Verdict(args) => verdict::run(args),
     }
 }
 

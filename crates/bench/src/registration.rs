@@ -335,7 +335,7 @@ fn measure(
     let mut rows = Vec::new();
     for &engine in engines {
         let (mut outcomes, mut offset_mm, mut calls) = (Vec::new(), Vec::new(), 0);
-        let cpu_before = thread_cpu_ms();
+        let mut cpu_ms = Some(0.0);
         for (case, (_, whole)) in prepared.iter().zip(&set.cases) {
             output.step(&engine.to_string());
             let model = &models[&case.tool];
@@ -343,19 +343,20 @@ fn measure(
             let contacts = Contacts { points: &case.points, images: &images };
             // What is made once for a tool is not charged to its first case.
             std::hint::black_box(register(contacts, model, engine, false)).ok();
+            let before = thread_cpu_ms();
             let result = timed(|| register(contacts, model, engine, false));
+            cpu_ms = cpu_ms.zip(thread_cpu_ms().zip(before)).map(|(sum, (after, before))| sum + after - before);
             calls += result.calls;
             offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
             outcomes.push(outcome(case, result));
         }
-        let cpu = thread_cpu_ms().zip(cpu_before).map(|(after, before)| (after - before) / calls as f64);
         rows.push(EngineRow {
             name: engine.to_string(),
             label: engine.label().to_owned(),
             peer: false,
             error_deg: outcomes.iter().map(|o| Some(o.error_deg).filter(|e| e.is_finite())).collect(),
             ms: outcomes.iter().map(|o| Some(o.ms)).collect(),
-            cpu_mean_ms: cpu,
+            cpu_mean_ms: cpu_ms.map(|ms| ms / calls as f64),
             offset_mm,
             summary: Summary::new(&outcomes),
         });

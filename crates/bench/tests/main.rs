@@ -81,7 +81,8 @@ fn the_other_benchmarks_run() {
     let labelling = [&["labelling", "--grasps", "1"][..], &bundle].concat();
     let doctor =
         ["doctor", "--sets", "1", "--sound", "1", "--pairs", "1", "--only", "theta", "--no-generator", "--json"];
-    for arguments in [&generator[..], &labelling, &doctor] {
+    let verdict = ["verdict", "--count", "2", "--json"];
+    for arguments in [&generator[..], &labelling, &doctor, &verdict] {
         let done = run(arguments);
         assert!(done.status.success(), "{arguments:?}: {}", error_text(&done));
         assert!(json(&done).is_object(), "{arguments:?}");

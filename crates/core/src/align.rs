@@ -42,7 +42,7 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
-pub use joint::{Basis, JointConfig, JointFit, MaskWeight};
+pub use joint::{BandEvidence, Basis, Evidence, JointConfig, JointFit, MaskWeight};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};

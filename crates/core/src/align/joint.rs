@@ -9,6 +9,7 @@
 //! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
 
 mod cost;
+mod evidence;
 mod image;
 mod problem;
 mod smooth;
@@ -21,6 +22,7 @@ use serde::{Deserialize, Serialize};
 use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
+pub use evidence::{BandEvidence, Evidence};
 use problem::{Problem, check};
 
 /// Choices of the registration by membrane and mask. The default is what the product uses.

@@ -171,6 +171,11 @@ impl<'a> Problem<'a> {
         Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite }))
     }
 
+    /// The point about which everything turns, `(y, z)`, meters.
+    pub(super) fn centroid(&self) -> DVec2 {
+        self.centroid
+    }
+
     /// Leaves the mask out from now on; whether there was one.
     pub(super) fn forget_mask(&mut self) -> bool {
         self.mask.take().is_some()
@@ -178,10 +183,14 @@ impl<'a> Problem<'a> {
 
     /// The images as a stage compares them.
     fn patches(&self, stage: usize) -> Patches<'_> {
-        let band = stage.min(BANDS.len() - 1);
+        self.patches_of(stage.min(BANDS.len() - 1), self.config.points[stage])
+    }
+
+    /// About `points` places of the images in a band.
+    pub(super) fn patches_of(&self, band: usize, points: usize) -> Patches<'_> {
         let nodes: usize = self.fingers.iter().map(|finger| finger.image.len()).sum();
         let patch = |finger: &Finger| {
-            let count = (self.config.points[stage] * finger.image.len()).div_ceil(nodes.max(1));
+            let count = (points * finger.image.len()).div_ceil(nodes.max(1));
             let places = finger.image.sample(BANDS[band], count);
             Patch::new(places.map(|(place, value)| (place - self.centroid, value)))
         };

@@ -6,7 +6,7 @@ use super::template::template;
 use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
-use crate::align::{Contacts, PadImage};
+use crate::align::{Contacts, Evidence, PadImage};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
@@ -167,4 +167,29 @@ fn the_slope_of_the_joint_cost_is_its_derivative() {
         assert!((numeric - analytic).abs() < 0.03 * analytic.abs() + 0.3, "{axis}: {numeric} {analytic}");
     }
     assert_eq!(joint.lookups, 9 * 296);
+}
+
+#[test]
+fn the_evidence_tells_the_right_tool_from_another_and_a_blank_finger_without_truth() {
+    for (tool, other, seed) in [(0, 7, 3), (3, 0, 4), (7, 3, 5)] {
+        let mut touch = Touch::new(tool, seed);
+        let at = |touch: &Touch, tool: &ToolModel| {
+            let contacts = Contacts { points: &touch.points(), images: &touch.images() };
+            let scene = Scene::new(contacts);
+            let pose = JointConfig::default().run(&scene, tool, Ask::default()).unwrap().grasp_from_object;
+            Evidence::at(&scene, tool, pose)
+        };
+        let middle = |evidence: Evidence| evidence.membrane.unwrap()[1];
+        let right = at(&touch, &touch.tool);
+        let wrong = at(&touch, &ToolModel::new(tools()[other].mesh()).unwrap());
+        assert!(right.on_tool > 0.8 && wrong.on_tool < right.on_tool - 0.05, "{right:?} {wrong:?}");
+        assert!(middle(right).explained > 0.3 && middle(wrong).explained < 0.7 * middle(right).explained);
+        assert!(right.membrane.unwrap().iter().all(|band| (0.0..=1.0).contains(&band.missing)));
+        touch.imprints[1].as_mut_slice().fill(0.0);
+        touch.masks[1].as_mut_slice().fill(false);
+        let blank = at(&touch, &touch.tool);
+        assert!(middle(blank).explained < 0.0 && middle(blank).missing > middle(right).missing, "{blank:?}");
+    }
+    let nothing = Evidence::at(&Scene::new(&[][..]), &Touch::new(0, 3).tool, PlanarPose::default());
+    assert_eq!(nothing, Evidence { on_tool: 0.0, membrane: None });
 }
