@@ -1,6 +1,6 @@
 //! [`apply`]: the only writer of the state. Pure: no files, no threads, no clock.
 
-use super::command::Command;
+use super::command::{Command, rooms};
 use super::effect::Effect;
 use super::state::State;
 use super::{
@@ -8,32 +8,24 @@ use super::{
     view, workbench,
 };
 
+macro_rules! dispatch {
+    ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {
+        fn step(state: &mut State, command: Command, effects: &mut Vec<Effect>) {
+            match command { $( Command::$room(command) => $module::step(state, command, effects), )* }
+        }
+    };
+}
+rooms!(dispatch);
+
 /// Carries a command out. What has to happen outside the state comes back.
 ///
 /// Every command is legal in every state: one that makes no sense now changes nothing, or leaves a notice in the log.
 pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
-    let mut effects = Vec::new();
-    match command {
-        Command::Library(command) => library::step(state, command, &mut effects),
-        Command::Follow(command) => follow::step(state, command, &mut effects),
-        Command::View(command) => view::step(state, command, &mut effects),
-        Command::Predict(command) => predict::step(state, command, &mut effects),
-        Command::Seeds(command) => seeds::step(state, command),
-        Command::Labels(command) => labels::step(state, command, &mut effects),
-        Command::Inspect(command) => inspect::step(state, command),
-        Command::Workbench(command) => workbench::step(state, command, &mut effects),
-        Command::Evaluate(command) => evaluate::step(state, command, &mut effects),
-        Command::Export(command) => export::step(state, command, &mut effects),
-        Command::Dial(command) => dial::step(state, command, &mut effects),
-        Command::Adapt(command) => adapt::step(state, command, &mut effects),
-        Command::Train(command) => train::step(state, command, &mut effects),
-        Command::Settings(command) => {
-            let before = state.settings.workspace;
-            settings::step(state, command, &mut effects);
-            view::follow_workspace(state, before, &mut effects);
-        }
-        Command::Tasks(command) => tasks::step(state, command, &mut effects),
-        Command::Answer(answer) => answers::step(state, answer, &mut effects),
+    let (mut effects, before) = (Vec::new(), state.settings.workspace);
+    let preferred = matches!(command, Command::Settings(_));
+    step(state, command, &mut effects);
+    if preferred {
+        view::follow_workspace(state, before, &mut effects);
     }
     effects
 }

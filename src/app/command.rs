@@ -20,8 +20,49 @@ pub use super::train::TrainCommand;
 pub use super::view::ViewCommand;
 pub use super::workbench::WorkbenchCommand;
 
+/// The table of the rooms, given to the macro `$with`.
+macro_rules! rooms {
+    ($with:ident) => {
+        $with! {
+            /// To the data set, its list, and which pair is looked at.
+            Library(LibraryCommand) in library,
+            /// To following a folder.
+            Follow(FollowCommand) in follow,
+            /// To what is on screen.
+            View(ViewCommand) in view,
+            /// To predictions.
+            Predict(PredictCommand) in predict,
+            /// To several seeds of one touch.
+            Seeds(SeedsCommand) in seeds,
+            /// To masks, review states and accepted poses.
+            Labels(LabelsCommand) in labels,
+            /// To the time machine and the basin map.
+            Inspect(InspectCommand) in inspect,
+            /// To layers, poses by hand and measurements.
+            Workbench(WorkbenchCommand) in workbench,
+            /// To the results table.
+            Evaluate(EvaluateCommand) in evaluate,
+            /// To the dial.
+            Dial(DialCommand) in dial,
+            /// To figures and other things that are taken away.
+            Export(ExportCommand) in export,
+            /// The fit to one's own pairs.
+            Adapt(AdaptCommand) in adapt,
+            /// The training of the mask model.
+            Train(TrainCommand) in train,
+            /// To the preferences.
+            Settings(SettingsCommand) in settings,
+            /// To running jobs and the log.
+            Tasks(TasksCommand) in tasks,
+            /// An answer of the runtime.
+            Answer(Answer) in answers,
+        }
+    };
+}
+pub(in crate::app) use rooms;
+
 macro_rules! commands {
-    ($( #[doc = $doc:literal] $room:ident($command:ident), )*) => {
+    ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {
         /// Everything that can happen to the state. Views and actions send the rooms' commands; jobs answer.
         #[derive(Clone, Debug)]
         pub enum Command { $( #[doc = $doc] $room($command), )* }
@@ -34,37 +75,4 @@ macro_rules! commands {
     };
 }
 
-commands! {
-    /// To the data set, its list, and which pair is looked at.
-    Library(LibraryCommand),
-    /// To following a folder.
-    Follow(FollowCommand),
-    /// To what is on screen.
-    View(ViewCommand),
-    /// To predictions.
-    Predict(PredictCommand),
-    /// To several seeds of one touch.
-    Seeds(SeedsCommand),
-    /// To masks, review states and accepted poses.
-    Labels(LabelsCommand),
-    /// To the time machine and the basin map.
-    Inspect(InspectCommand),
-    /// To layers, poses by hand and measurements.
-    Workbench(WorkbenchCommand),
-    /// To the results table.
-    Evaluate(EvaluateCommand),
-    /// To the dial.
-    Dial(DialCommand),
-    /// To figures and other things that are taken away.
-    Export(ExportCommand),
-    /// The fit to one's own pairs.
-    Adapt(AdaptCommand),
-    /// The training of the mask model.
-    Train(TrainCommand),
-    /// To the preferences.
-    Settings(SettingsCommand),
-    /// To running jobs and the log.
-    Tasks(TasksCommand),
-    /// An answer of the runtime.
-    Answer(Answer),
-}
+rooms!(commands);

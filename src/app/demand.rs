@@ -88,9 +88,7 @@ fn selection(wants: &mut Demands<'_>) {
     }
     results::want_proposal(wants);
     results::want_predictions_ahead(wants);
-    if state.needs(Demand::Ledger) {
-        results::want_ledger(wants, pair.finger(state.selection.finger));
-    }
+    results::want_others(wants);
 }
 
 /// Asks for what the workbench shows of an imprint whose cloud is needed anyway.

@@ -3,6 +3,7 @@
 pub(crate) use super::state::inspect::Inspected;
 pub use super::state::inspect::{BasinColor, Inspect, Pin};
 
+use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::results;
 use super::state::State;
@@ -49,7 +50,7 @@ pub enum InspectCommand {
     StopBasin,
 }
 
-pub(super) fn step(state: &mut State, command: InspectCommand) {
+pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effect>) {
     match command {
         InspectCommand::Source(source) => {
             if state.inspect.source != source {

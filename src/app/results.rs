@@ -6,12 +6,7 @@
 use std::sync::Arc;
 
 use super::jobs::Job;
-use super::keys::{
-    AmbiguityKey, BasinKey, CloudDifferenceKey, CloudKey, ColorKey, DeviationKey, DistancesKey, EnsembleKey,
-    ImportPlanKey, InfluenceKey, InspectionKey, Key, LabelStatsKey, LayersKey, LedgerKey, MaskKey, MaskPlanKey,
-    MetersKey, PairKey, PictureKey, PoseKey, PredictionKey, ProposalKey, ProvisionalPoseKey, RunKey, ScoresKey,
-    ThumbnailKey, ToolKey, TrainPlanKey, VersusKey,
-};
+use super::keys::Key;
 use super::services::SharedServices;
 use super::state::State;
 use super::state::results::{Cached, Computed, Request, table};
@@ -76,7 +71,6 @@ pub(crate) use label_stats::want_label_stats;
 pub use layers::layers;
 pub(crate) use layers::want_layers;
 pub use ledger::ledger;
-pub(crate) use ledger::want_ledger;
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
 pub(crate) use manual::{shown_imprint, sides_apart};
 pub use mask::{MaskInForce, allowed, drawn_mask, mask_in_force, mask_places};
@@ -115,9 +109,12 @@ pub use versus::{subject, subject_key, subject_pose, subjects_apart, subjects_co
 pub(crate) use versus::{subject_points, want_versus};
 
 /// A key that says how its result is computed.
-pub trait Computes: Key {
+pub(crate) trait Computes: Key {
     /// The job, with its inputs gathered; `None` if one is not there (any more).
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Self::Value>>;
+
+    /// Asks for it where a pane on screen needs it and nothing else asks.
+    fn wanted(_wants: &mut Demands<'_>) {}
 
     /// The consequences of a result besides its being kept in its cache.
     fn arrived(&self, _state: &mut State, _value: &Arc<Self::Value>) {}
@@ -130,6 +127,11 @@ pub trait Computes: Key {
 
 macro_rules! computing {
     ($( #[doc = $doc:literal] $variant:ident($key:ident) $(in $cache:ident, $budget:expr)?; )*) => {
+        /// Asks for the results that say themselves when they are wanted, in the order of the table.
+        pub(crate) fn want_others(wants: &mut Demands<'_>) {
+            $( <$crate::app::keys::$key as Computes>::wanted(wants); )*
+        }
+
         /// The job of a request; `None` if an input is not there (any more).
         pub(super) fn job(request: &Request, state: &State, services: &SharedServices) -> Option<Job<Computed>> {
             match request { $( Request::$variant(key) => {
@@ -146,7 +148,7 @@ macro_rules! computing {
         /// Keeps a result under its key, with what follows from it.
         pub(super) fn keep(computed: Computed, state: &mut State) {
             match computed { $( Computed::$variant(key, value) => {
-                $( state.results.$cache.insert(key.clone(), value.clone(), <$key>::bytes(&value)); )?
+                $( state.results.$cache.insert(key.clone(), value.clone(), <$crate::app::keys::$key>::bytes(&value)); )?
                 key.arrived(state, &value);
             } )* }
         }

@@ -2,6 +2,7 @@
 
 pub use super::state::seeds::{COUNT, Seeds};
 
+use super::effect::Effect;
 use super::results;
 use super::state::State;
 
@@ -16,7 +17,7 @@ pub enum SeedsCommand {
     EveryPair(bool),
 }
 
-pub(super) fn step(state: &mut State, command: SeedsCommand) {
+pub(super) fn step(state: &mut State, command: SeedsCommand, _: &mut Vec<Effect>) {
     match command {
         SeedsCommand::Count(count) => state.seeds.count = count.clamp(*COUNT.start(), *COUNT.end()),
         SeedsCommand::Run(true) => state.seeds.asked = results::seeds_of(state),

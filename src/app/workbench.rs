@@ -93,7 +93,7 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
                 put(state, |_| pose);
             }
         }
-        WorkbenchCommand::StartIcp => start_icp(state),
+        WorkbenchCommand::StartIcp => start_icp(state, effects),
         WorkbenchCommand::AcceptHand => accept(state, effects),
         WorkbenchCommand::RevertHand => bench.hand = None,
         WorkbenchCommand::Pick(picked) => bench.picked = picked,
@@ -155,7 +155,7 @@ pub(super) fn refresh_cost(state: &mut State) {
     state.workbench.hand = Some(hand);
 }
 
-fn start_icp(state: &mut State) {
+fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
     const WHAT: &str = "Start ICP from here";
     if state.workbench.tool != SceneTool::Pose {
         return;
@@ -177,9 +177,9 @@ fn start_icp(state: &mut State) {
         run_arrived(state, &key);
     }
     // The time machine shows the same run, at its end: there the tool in hand goes.
-    inspect::step(state, InspectCommand::Source(source));
-    inspect::step(state, InspectCommand::Start(Some(start)));
-    inspect::step(state, InspectCommand::End);
+    inspect::step(state, InspectCommand::Source(source), effects);
+    inspect::step(state, InspectCommand::Start(Some(start)), effects);
+    inspect::step(state, InspectCommand::End, effects);
 }
 
 /// A recorded registration is there: the tool in hand goes where the one it waits for ended.

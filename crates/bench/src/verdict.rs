@@ -160,16 +160,22 @@ struct Row {
     why: Option<String>,
 }
 
-/// Signs of a fault: a name, and the sign in a row, greater where it speaks against the pose.
-const SIGNS: &[(&str, fn(&Row) -> Option<f64>)] = &[
-    ("few inliers", |row| Some(-row.inlier_share?)),
-    ("contact off the tool", |row| Some(1.0 - row.evidence?.on_tool)),
-    ("1.5-8 mm: not explained", |row| Some(-row.evidence?.membrane?[0].explained)),
-    ("1-3 mm: not explained", |row| Some(-row.evidence?.membrane?[1].explained)),
-    ("1-3 mm: foreign", |row| Some(row.evidence?.membrane?[1].foreign)),
-    ("1-3 mm: missing", |row| Some(row.evidence?.membrane?[1].missing)),
-    ("1-3 mm: residual", |row| Some(row.evidence?.membrane?[1].noise_m)),
-    ("0.7-2 mm: not explained", |row| Some(-row.evidence?.membrane?[2].explained)),
+/// Sign of a fault.
+struct Sign {
+    name: &'static str,
+    /// Value in a row, greater where it speaks against the pose.
+    of: fn(&Row) -> Option<f64>,
+}
+
+const SIGNS: &[Sign] = &[
+    Sign { name: "few inliers", of: |row| Some(-row.inlier_share?) },
+    Sign { name: "contact off the tool", of: |row| Some(1.0 - row.evidence?.on_tool) },
+    Sign { name: "1.5-8 mm: not explained", of: |row| Some(-row.evidence?.membrane?[0].explained) },
+    Sign { name: "1-3 mm: not explained", of: |row| Some(-row.evidence?.membrane?[1].explained) },
+    Sign { name: "1-3 mm: foreign", of: |row| Some(row.evidence?.membrane?[1].foreign) },
+    Sign { name: "1-3 mm: missing", of: |row| Some(row.evidence?.membrane?[1].missing) },
+    Sign { name: "1-3 mm: residual", of: |row| Some(row.evidence?.membrane?[1].noise_m) },
+    Sign { name: "0.7-2 mm: not explained", of: |row| Some(-row.evidence?.membrane?[2].explained) },
 ];
 
 /// Share of false alarms at which signs are compared.
@@ -212,7 +218,7 @@ fn is_right(row: &Row) -> bool {
 }
 
 fn signs(rows: &[Row]) -> Vec<SignRow> {
-    let one = |&(sign, of): &(&'static str, fn(&Row) -> Option<f64>)| {
+    let one = |&Sign { name, of }: &Sign| {
         let good = of_fault(rows, Fault::None).filter(|row| is_right(row)).filter_map(of);
         let limit = quantile(good, 1.0 - FALSE_ALARMS);
         let beyond = |row: &&Row| of(row).zip(limit).is_none_or(|(value, limit)| value > limit);
@@ -220,7 +226,7 @@ fn signs(rows: &[Row]) -> Vec<SignRow> {
             let (all, told) = (of_fault(rows, fault).count(), of_fault(rows, fault).filter(beyond).count());
             (fault, 100.0 * told as f64 / all.max(1) as f64)
         };
-        SignRow { sign, limit, told: Fault::iter().filter(|fault| *fault != Fault::None).map(told).collect() }
+        SignRow { sign: name, limit, told: Fault::iter().filter(|fault| *fault != Fault::None).map(told).collect() }
     };
     SIGNS.iter().map(one).collect()
 }

@@ -1,7 +1,8 @@
 //! The depth chain of a prediction, stage by stage.
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{LedgerKey, TouchKey};
+use super::super::keys::LedgerKey;
+use super::super::pane::Demand;
 use super::super::results;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
@@ -19,6 +20,18 @@ impl Computes for LedgerKey {
             of_prediction(&prediction, shift, false, OnPad { sample: &sample, pad: recipe.touch.finger })
         }))
     }
+
+    fn wanted(wants: &mut Demands<'_>) {
+        let state = wants.state;
+        let Some(touch) = state.touch_key(state.selection.finger).filter(|_| state.needs(Demand::Ledger)) else {
+            return;
+        };
+        let Some(recipe) = results::shown(state, touch) else { return };
+        let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
+        if there && !state.library.predicts_color(&recipe.bundle) {
+            wants.ask(LedgerKey(recipe.clone(), state.settings.shift));
+        }
+    }
 }
 
 /// The depth chain of the prediction shown for one finger.
@@ -30,13 +43,4 @@ pub fn ledger(state: &State, finger: PadId) -> Lookup<'_, LedgerResult> {
         return Lookup::Absent(Absent::PredictsColor);
     }
     state.look(LedgerKey(recipe.clone(), state.settings.shift)).value()
-}
-
-pub(crate) fn want_ledger(wants: &mut Demands<'_>, touch: TouchKey) {
-    let state = wants.state;
-    let Some(recipe) = results::shown(state, touch) else { return };
-    let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
-    if there && !state.library.predicts_color(&recipe.bundle) {
-        wants.ask(LedgerKey(recipe.clone(), state.settings.shift));
-    }
 }

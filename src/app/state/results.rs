@@ -7,11 +7,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{
-    AmbiguityKey, BasinKey, CloudDifferenceKey, CloudKey, ColorKey, ComparedKey, DeviationKey, DistancesKey,
-    EnsembleKey, ImportPlanKey, ImprintSource, InfluenceKey, InspectionKey, Key, LabelStatsKey, LabelsKey, LayersKey,
-    LedgerKey, MaskKey, MaskPlanKey, MetersKey, PairKey, PictureKey, PoseKey, PredictionKey, PrefetchKey, Preview,
-    ProposalKey, ProvisionalPoseKey, RunKey, ScoresKey, SeedKey, StoredKey, ThumbnailKey, ToolKey, TouchKey,
-    TrainPlanKey, VersusKey,
+    BasinKey, CloudKey, ImprintSource, InfluenceKey, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview,
+    TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
@@ -121,16 +118,16 @@ macro_rules! results {
     ($( #[doc = $doc:literal] $variant:ident($key:ident) $(in $cache:ident, $budget:expr)?; )*) => {
         /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
         #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-        pub enum Request { $( #[doc = $doc] $variant($key), )* }
+        pub enum Request { $( #[doc = $doc] $variant($crate::app::keys::$key), )* }
 
         /// A computed result with its key.
         #[derive(Clone, Debug)]
-        pub enum Computed { $( #[doc = $doc] $variant($key, Arc<<$key as Key>::Value>), )* }
+        pub enum Computed { $( #[doc = $doc] $variant($crate::app::keys::$key, Arc<<$crate::app::keys::$key as Key>::Value>), )* }
 
         /// All caches, and what follows from their contents.
         #[derive(Debug)]
         pub struct Results {
-            $( $( #[doc = $doc] pub $cache: Cache<$key, <$key as Key>::Value>, )? )*
+            $( $( #[doc = $doc] pub $cache: Cache<$crate::app::keys::$key, <$crate::app::keys::$key as Key>::Value>, )? )*
             /// Results of which the log said what is odd about them.
             pub noted: BTreeSet<Request>,
             /// The previews of what is on its way to each touch.
@@ -177,13 +174,13 @@ macro_rules! results {
         }
 
         $(
-            impl From<$key> for Request {
-                fn from(key: $key) -> Self {
+            impl From<$crate::app::keys::$key> for Request {
+                fn from(key: $crate::app::keys::$key) -> Self {
                     Self::$variant(key)
                 }
             }
 
-            $( impl Cached for $key {
+            $( impl Cached for $crate::app::keys::$key {
                 fn cache(results: &Results) -> &Cache<Self, Self::Value> {
                     &results.$cache
                 }

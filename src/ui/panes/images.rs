@@ -414,9 +414,7 @@ fn depth_pane(
         influence::overlay(cx, ui, &output, source, finger);
         paint::mask(cx, ui, memory, &output, source, finger);
     }
-    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
-        output.dashed_rect(link.window, Color32::from_gray(235));
-    }
+    marks(cx, &output, finger);
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, depth, px);
         hover(cx, finger, px);
@@ -479,9 +477,7 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, Color32::WHITE);
-    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
-        output.dashed_rect(link.window, Color32::from_gray(235));
-    }
+    marks(cx, &output, finger);
     if let Some(px) = output.hovered {
         readout(cx, &output, pane, finger, &preview.picture.depth, px);
         hover(cx, finger, px);
@@ -490,6 +486,13 @@ fn preview_image(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId, preview: &Arc<Prev
     let text = format!("preview, step {} of {}", preview.picture.step, preview.picture.of);
     output.caption(Align2::RIGHT_TOP, &text, crate::ui::parts::theme::DARK.caution);
     histogram
+}
+
+/// Marks on an imprint that a person can switch.
+fn marks(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
+    if let Some(link) = Link::of(&cx.state.rig(), finger).filter(|_| cx.state.settings.footprint_visible) {
+        output.dashed_rect(link.window, Color32::from_gray(235));
+    }
 }
 
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {

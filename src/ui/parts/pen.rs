@@ -14,6 +14,7 @@ use crate::app::command::{LabelsCommand, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Stroke as Drawn;
 use crate::app::settings::MaskTool;
+use glam::DVec2;
 use touch2touch_core::label::{DrawTool, Paint};
 use touch2touch_core::rig::PadId;
 
@@ -144,8 +145,6 @@ fn way(cx: &Cx<'_>, easel: &Easel<'_>) {
         Paint::Ignore => IGNORED,
     };
     let mut line: Vec<Pos2> = match (drawing.tool, drawing.points.as_slice()) {
-        (DrawTool::Lasso | DrawTool::Polygon, points) => points.iter().map(at).collect(),
-        (DrawTool::Rectangle, [a, .., b]) => [*a, [b[0], a[1]], *b, [a[0], b[1]]].iter().map(at).collect(),
         (DrawTool::Wand { .. }, [a, ..]) => {
             let mm = drawing.tolerance_m().map_or(f32::NAN, |m| m * 1e3);
             let text = format!("within {mm:.2} mm of this depth");
@@ -155,9 +154,13 @@ fn way(cx: &Cx<'_>, easel: &Easel<'_>) {
             }
             return;
         }
-        _ => return,
+        (tool, points) => {
+            let points: Vec<DVec2> = points.iter().map(|p| DVec2::new(p[0].into(), p[1].into())).collect();
+            tool.outline(&points).iter().map(|p| at(&p.as_vec2().to_array())).collect()
+        }
     };
-    line.extend(line.first().copied());
+    let Some(first) = line.first().copied() else { return };
+    line.push(first);
     easel.painter.line(line.clone(), Stroke::new(2.5, Color32::from_black_alpha(120)));
     easel.painter.line(line, Stroke::new(1.25, color));
 }

@@ -38,7 +38,7 @@ pub(super) enum Of {
 }
 
 /// The columns of a group, in the paper's order.
-pub(super) static COLUMNS: [Column; 15] = [
+pub(super) static COLUMNS: &[Column] = &[
     Column {
         in_paper: true,
         ..db("PSNR dB", "psnr_db", "Against the measured imprint, decibels; peak 22.5 mm", |tool| {
@@ -190,7 +190,7 @@ impl TableMetrics {
 /// Every column by name, null without a figure; those of a whole group, which have no interval, as plain numbers.
 fn by_column<S: Serializer>(figures: &BTreeMap<&'static str, Estimate>, to: S) -> Result<S::Ok, S::Error> {
     let mut map = to.serialize_map(Some(COLUMNS.len()))?;
-    for column in &COLUMNS {
+    for column in COLUMNS {
         let figure = figures.get(column.key);
         match column.of {
             Of::Tool(_) => map.serialize_entry(column.key, &figure)?,

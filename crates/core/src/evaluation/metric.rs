@@ -72,7 +72,7 @@ const DB: Row = Row { unit: "dB", decimals: 1, ..PLAIN };
 const MM: Row = Row { unit: "mm", factor: 1e3, decimals: 2, larger_is_better: false, ..PLAIN };
 
 /// The table.
-static ROWS: [Row; 12] = [
+static ROWS: &[Row] = &[
     Row {
         metric: Metric::Angle,
         name: "Angle error",

@@ -167,7 +167,7 @@ pub fn csv(rows: &[Row]) -> String {
                 "\"{method}\",{},{group},{},{},{},{}",
                 row.published, f.tools, f.grasps, f.images, f.without_pose
             );
-            for column in &COLUMNS {
+            for column in COLUMNS {
                 let estimate = f.get(column);
                 let text = |v: Option<f64>| v.map_or_else(String::new, |v| v.to_string());
                 let interval = estimate.and_then(|e| e.interval);

@@ -32,6 +32,18 @@ pub enum DrawTool {
     },
 }
 
+impl DrawTool {
+    /// Corners of the area that points of the tool enclose, in the order of the points; none of a tool that encloses nothing.
+    /// What is filled, and what shows on the way, is this.
+    pub fn outline(self, points: &[DVec2]) -> Vec<DVec2> {
+        match (self, points) {
+            (Self::Lasso | Self::Polygon, points) => points.to_vec(),
+            (Self::Rectangle, [a, .., b]) => vec![*a, DVec2::new(b.x, a.y), *b, DVec2::new(a.x, b.y)],
+            _ => Vec::new(),
+        }
+    }
+}
+
 /// Pixels of dragging that double or halve the tolerance of the wand.
 const DOUBLES_PX: f32 = 24.0;
 
@@ -184,7 +196,9 @@ impl Drawing {
                 return ways().map(stamp).fold(None, union);
             }
             (DrawTool::Rectangle, false) => region::rectangle(touched.size(), first, last),
-            (DrawTool::Lasso | DrawTool::Polygon, false) => region::enclosed(touched.size(), &points),
+            (tool @ (DrawTool::Lasso | DrawTool::Polygon), false) => {
+                region::enclosed(touched.size(), &tool.outline(&points))
+            }
             (DrawTool::Wand { .. }, in_space) => {
                 let seed = if in_space { DVec2::from(ground.seen?.nearest(first)?.map(f64::from)) } else { first };
                 region::about_as_deep(ground.imprint, seed, self.tolerance_m()?.into())
@@ -195,7 +209,8 @@ impl Drawing {
                     DrawTool::Brush { radius_px } => {
                         ways().flat_map(|way| seen.along(way, radius_px.into()).collect::<Vec<_>>()).collect()
                     }
-                    _ => seen.within(&points, tool == DrawTool::Rectangle),
+                    DrawTool::Rectangle => seen.within(&points, true),
+                    _ => seen.within(&tool.outline(&points), false),
                 };
                 reached.into_iter().for_each(|[x, y]| mark(touched, x.into(), y.into()));
                 return changed;
