@@ -1,4 +1,4 @@
-//! What panes are built from: the context that each is given, widgets, the look, pens and 3D views.
+//! Parts that panes are built from: the context that each is given, widgets, the look, pens and 3D views.
 
 pub(crate) mod cx;
 pub(crate) mod dialogs;

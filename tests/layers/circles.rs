@@ -247,8 +247,9 @@ fn the_modules_of_a_layer_form_no_circle() {
     let mut found = Vec::new();
     for layer in LAYERS {
         let arrows = arrows(&sources(layer));
-        let seen: usize = arrows.values().map(BTreeMap::len).sum();
-        assert!(seen > 5, "{layer}: the scan sees too little: {arrows:?}");
+        // The window's modules lie in rooms: its largest folder counts.
+        let most = arrows.values().map(BTreeMap::len).max();
+        assert!(most > Some(5), "{layer}: the scan sees too little: {arrows:?}");
         for (folder, arrows) in &arrows {
             if let Some(circle) = circle(arrows) {
                 found.push(format!("a circle in {}:\n    {}", folder.join("::"), circle.join("\n    ")));

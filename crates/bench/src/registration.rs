@@ -260,12 +260,12 @@ pub(super) fn is_straight(mesh: &TriMesh) -> bool {
 }
 
 /// The contact points of both fingers, grasp frame, meters.
-fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, CloudError> {
+pub(super) fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, CloudError> {
     contact_points(&case.imprints, &case.cameras, masks)
 }
 
 /// Views of the cameras of both fingers.
-fn images(case: &Case) -> [PadImage<'_>; 2] {
+pub(super) fn images(case: &Case) -> [PadImage<'_>; 2] {
     std::array::from_fn(|f| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f] })
 }
 

@@ -1,5 +1,4 @@
-//! `touch2touch-bench verdict`: how well what a registration says of itself tells faults from good poses, without truth, on fresh
-//! grasps with faults drawn in.
+//! `touch2touch-bench verdict`: signs of a fault that need no truth, each as a detector, on fresh grasps with faults drawn in.
 
 use clap::Args;
 use glam::{DAffine3, DVec3};
@@ -9,10 +8,12 @@ use rayon::prelude::*;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use super::Machine;
 use super::figures::quantile;
-use super::{Machine, contact_points};
+use super::registration::{images, points};
+use super::rows::position_error_mm;
 use touch2touch::headless::{JsonArgs, Output, VerbResult};
-use touch2touch_core::align::{Ask, Contacts, Evidence, PadImage, Scene};
+use touch2touch_core::align::{Ask, Contacts, Evidence, Scene};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel};
 use touch2touch_core::units::angle_error;
@@ -73,27 +74,36 @@ enum Fault {
 /// A touch with a fault, as it is registered.
 struct Trial {
     case: Case,
-    mesh: TriMesh,
+    /// The model that is registered: one of the tools, or a model that is none.
+    model: Model,
+}
+
+enum Model {
+    Tool(usize),
+    Changed(TriMesh),
 }
 
 impl Trial {
     fn new(fault: Fault, case: &Case, other: &Case, meshes: &[TriMesh], rng: &mut ChaCha8Rng) -> Self {
         let mut case = case.clone();
-        let mut mesh = meshes[case.tool].clone();
+        let mut model = Model::Tool(case.tool);
         let finger = rng.random_range(0..2usize);
         match fault {
             Fault::None => {}
             Fault::WrongTool => {
-                let other = (case.tool + rng.random_range(1..meshes.len())) % meshes.len();
-                mesh = meshes[other].clone();
+                model = Model::Tool((case.tool + rng.random_range(1..meshes.len())) % meshes.len());
             }
             Fault::WrongUnit => {
                 let scale = if rng.random() { 10.0 } else { 0.1 };
+                let mut mesh = meshes[case.tool].clone();
                 mesh.vertices.iter_mut().for_each(|v| *v *= scale);
+                model = Model::Changed(mesh);
             }
             Fault::Mirrored => {
+                let mut mesh = meshes[case.tool].clone();
                 mesh.vertices.iter_mut().for_each(|v| v.y = -v.y);
                 mesh.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+                model = Model::Changed(mesh);
             }
             Fault::Blob => {
                 for mask in &mut case.masks {
@@ -109,14 +119,13 @@ impl Trial {
             Fault::Half => {
                 let angle: f64 = rng.random_range(0.0..std::f64::consts::TAU);
                 for mask in &mut case.masks {
-                    let marked: Vec<(usize, usize)> = (0..mask.height())
+                    let mut marked: Vec<(usize, usize)> = (0..mask.height())
                         .flat_map(|y| (0..mask.width()).map(move |x| (x, y)))
                         .filter(|at| mask[*at])
                         .collect();
                     let along = |&(x, y): &(usize, usize)| x as f64 * angle.cos() + y as f64 * angle.sin();
-                    let mut order = marked.clone();
-                    order.sort_by(|a, b| along(a).total_cmp(&along(b)));
-                    for at in &order[order.len() / 2..] {
+                    marked.sort_by(|a, b| along(a).total_cmp(&along(b)));
+                    for at in &marked[marked.len() / 2..] {
                         mask[*at] = false;
                     }
                 }
@@ -139,7 +148,7 @@ impl Trial {
                 case.masks[finger] = other.masks[finger].clone();
             }
         }
-        Self { case, mesh }
+        Self { case, model }
     }
 }
 
@@ -167,6 +176,7 @@ struct Sign {
     of: fn(&Row) -> Option<f64>,
 }
 
+/// The signs; the bands are those of [`Evidence`].
 const SIGNS: &[Sign] = &[
     Sign { name: "few inliers", of: |row| Some(-row.inlier_share?) },
     Sign { name: "contact off the tool", of: |row| Some(1.0 - row.evidence?.on_tool) },
@@ -270,7 +280,7 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
                 let mut rng = ChaCha8Rng::seed_from_u64(args.seed.wrapping_mul(7919).wrapping_add(i as u64));
                 rng.set_stream(fault as u64);
                 let trial = Trial::new(fault, &case, &other, &meshes, &mut rng);
-                row(i, fault, &trial, &models, &meshes, args.engine)
+                row(i, fault, &trial, &models, args.engine)
             })
             .collect()
     };
@@ -296,20 +306,18 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
     Ok(true)
 }
 
-fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], meshes: &[TriMesh], engine: Registration) -> Row {
+fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Registration) -> Row {
     let case = &trial.case;
-    let known = meshes.iter().position(|mesh| mesh.vertices == trial.mesh.vertices);
-    let own;
-    let tool = match known {
-        Some(known) => Ok(&models[known]),
-        None => {
-            own = ToolModel::new(trial.mesh.clone());
-            own.as_ref().map_err(ToString::to_string)
+    let changed;
+    let tool = match &trial.model {
+        Model::Tool(number) => Ok(&models[*number]),
+        Model::Changed(mesh) => {
+            changed = ToolModel::new(mesh.clone());
+            changed.as_ref().map_err(ToString::to_string)
         }
     };
-    let images: [PadImage<'_>; 2] =
-        std::array::from_fn(|f| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f] });
-    let points = contact_points(&case.imprints, &case.cameras, &case.masks).unwrap_or_default();
+    let images = images(case);
+    let points = points(case, &case.masks).unwrap_or_default();
     let scene = Scene::new(Contacts { points: &points, images: &images });
     let method = RegistrationChoice::from(engine).method();
     let found = tool.and_then(|tool| Ok((tool, method.run(&scene, tool, Ask::default()).map_err(|e| e.to_string())?)));
@@ -327,7 +335,7 @@ fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], meshes: &[Tr
     let Ok((tool, report)) = found else { return row };
     let (pose, truth) = (report.grasp_from_object, case.grasp_from_object);
     row.error_deg = Some(angle_error(pose.theta_rad, truth.theta_rad).to_degrees());
-    row.position_mm = Some(1e3 * (pose.y_m - truth.y_m).hypot(pose.z_m - truth.z_m));
+    row.position_mm = Some(position_error_mm(pose, truth));
     row.inlier_share = Some(report.inlier_share);
     row.evidence = Some(Evidence::at(&scene, tool, pose));
     row

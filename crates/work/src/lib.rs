@@ -7,14 +7,13 @@
 //! The rooms, each needing only those above it; their modules are named without them.
 //!
 //! * [`io`]: data sets, meshes, masks and every other file. [`infer`]: model bundles and the engines that run them.
-//! * [`job`], [`error`]: how work is watched, stopped, and how it fails.
-//! * `labeling` ([`labels`]): what people said about pairs.
+//! * [`job`], [`error`]: how work is watched, stopped, and how it fails. [`pairs`]: the choice of pairs for a pass over a data set.
+//! * `labeling` ([`labels`]): what people said about pairs. [`follow`]: a folder that is still being recorded.
 //! * `way` ([`recipe`], [`feel`]): the steps from a touch to its pose.
 //! * `study` ([`evaluate`], [`compare`], [`figure`]): results looked into.
 //! * `assist` ([`propose`], [`label_edit`]): help for those who draw masks.
 //! * `exchange` ([`case`], [`mod@export`]): results and labels as files.
 //! * `learn` ([`adapt`], [`train`]): networks fitted to the data at hand.
-//! * [`follow`]: a folder that is still being recorded. [`pairs`]: the choice of pairs for a pass over a data set.
 
 mod assist;
 pub mod error;

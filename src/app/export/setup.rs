@@ -174,10 +174,8 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
     let pose = results::pose_key(state, source).ok().flatten().and_then(|key| state.results.poses.get(&key)).cloned();
     let recipe =
         state.rig().pads().find_map(|pad| results::chosen(state, pad)).filter(|_| source == ImprintSource::Predicted);
-    let prediction = recipe.map(|recipe| {
-        let shift = state.settings.shift.label().to_lowercase();
-        format!("{} · {shift}", state.library.made_with(recipe))
-    });
+    let prediction =
+        recipe.map(|made| note(state.library.model_name(&made.bundle), &made.config, state.settings.shift));
     Some(PairExport {
         name: state.pair_name().to_owned(),
         source,

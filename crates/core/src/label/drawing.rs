@@ -33,8 +33,7 @@ pub enum DrawTool {
 }
 
 impl DrawTool {
-    /// Corners of the area that points of the tool enclose, in the order of the points; none of a tool that encloses nothing.
-    /// What is filled, and what shows on the way, is this.
+    /// Corners of the area that points of the tool enclose, as it shows on the way; none of a tool that encloses nothing.
     pub fn outline(self, points: &[DVec2]) -> Vec<DVec2> {
         match (self, points) {
             (Self::Lasso | Self::Polygon, points) => points.to_vec(),

@@ -125,6 +125,57 @@ impl BandField {
     }
 }
 
+/// The relief of membranes beside that of the template at a pose: sums of squared heights, capped by a kernel.
+#[derive(Default)]
+pub(super) struct Relief {
+    /// Of the membranes.
+    pub(super) image: f64,
+    /// Of the template.
+    pub(super) template: f64,
+    /// Of what is left between the two; its parts are `foreign`, where the membranes have more, and `missing`, where the
+    /// template has.
+    left: f64,
+    pub(super) foreign: f64,
+    pub(super) missing: f64,
+    /// Sizes of the residuals.
+    pub(super) residuals_m: Vec<f32>,
+}
+
+impl Relief {
+    /// The relief of patches at a state.
+    pub(super) fn of(patches: &[(&BandField, Patch)], state: State, kernel_m: f64) -> Self {
+        let square = kernel_m.powi(2) as f32;
+        let capped = |r: f32| f64::from(r * r / (square + r * r));
+        let mut sums = Self::default();
+        for (template, patch) in patches {
+            template.residuals(patch, state, |r, template| {
+                let (image, left) = (template - r, capped(r));
+                sums.residuals_m.push(r.abs());
+                sums.image += capped(image);
+                sums.template += capped(template);
+                sums.left += left;
+                *if image.abs() > template.abs() { &mut sums.foreign } else { &mut sums.missing } += left;
+            });
+        }
+        sums
+    }
+
+    /// Share of the membranes' relief that the template explains, at most 1; 0 where there is none.
+    pub(super) fn explained(&self) -> f64 {
+        if self.image > 0.0 { 1.0 - self.left / self.image } else { 0.0 }
+    }
+}
+
+/// 1.48 times the median of sizes of residuals, meters: their deviation, if most are noise. 0 of none.
+pub(super) fn noise_m(mut residuals_m: Vec<f32>) -> f64 {
+    let middle = residuals_m.len() / 2;
+    if residuals_m.is_empty() {
+        0.0
+    } else {
+        1.48 * f64::from(*residuals_m.select_nth_unstable_by(middle, f32::total_cmp).1)
+    }
+}
+
 /// The mask's part of the cost.
 #[derive(Clone, Copy)]
 pub(super) struct MaskPart<'a> {

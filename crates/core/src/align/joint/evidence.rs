@@ -3,10 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use super::JointConfig;
-use super::cost::Patch;
+use super::cost::{Relief, noise_m};
 use super::problem::Problem;
 use super::smooth::BANDS;
-use super::template::BandField;
 use crate::align::Scene;
 use crate::align::batch::State;
 use crate::frames::PlanarPose;
@@ -65,35 +64,6 @@ impl Evidence {
     }
 }
 
-/// Sums over a finger's patch, of squares capped by the kernel.
-#[derive(Default)]
-struct Relief {
-    image: f64,
-    template: f64,
-    left: f64,
-    foreign: f64,
-    missing: f64,
-}
-
-impl Relief {
-    fn of(template: &BandField, patch: &Patch, state: State, kernel_m: f64, mut each: impl FnMut(f32)) -> Self {
-        let square = kernel_m.powi(2) as f32;
-        let capped = |r: f32| f64::from(r * r / (square + r * r));
-        let mut sums = Self::default();
-        template.residuals(patch, state, |r, template| {
-            each(r.abs());
-            let image = template - r;
-            let left = capped(r);
-            sums.image += capped(image);
-            sums.template += capped(template);
-            sums.left += left;
-            // A residual belongs to the side whose relief is the greater.
-            *if image.abs() > template.abs() { &mut sums.foreign } else { &mut sums.missing } += left;
-        });
-        sums
-    }
-}
-
 fn share(part: f64, of: f64) -> f64 {
     if of > 0.0 { part / of } else { 0.0 }
 }
@@ -102,22 +72,15 @@ impl Problem<'_> {
     /// The evidence of the membranes at a pose.
     fn evidence(&self, grasp_from_object: PlanarPose, band: usize) -> BandEvidence {
         let state = State::from_pose(grasp_from_object, self.centroid());
-        let mut residuals = Vec::new();
         let patches = self.patches_of(band, PLACES);
-        let reliefs: Vec<Relief> = patches
-            .iter()
-            .map(|(template, patch)| Relief::of(template, patch, state, KERNELS_M[band], |r| residuals.push(r)))
-            .collect();
-        let sum = |of: fn(&Relief) -> f64| reliefs.iter().map(of).sum::<f64>();
-        let explained = |relief: &Relief| 1.0 - share(relief.left, relief.image);
-        let middle = residuals.len() / 2;
-        let median =
-            if residuals.is_empty() { 0.0 } else { *residuals.select_nth_unstable_by(middle, f32::total_cmp).1 };
+        let fingers: Vec<Relief> = patches.chunks(1).map(|patch| Relief::of(patch, state, KERNELS_M[band])).collect();
+        let sum = |of: fn(&Relief) -> f64| fingers.iter().map(of).sum::<f64>();
+        let seen = fingers.iter().filter(|finger| !finger.residuals_m.is_empty());
         BandEvidence {
-            explained: reliefs.iter().map(explained).fold(1.0, f64::min),
+            explained: seen.map(Relief::explained).fold(1.0, f64::min),
             foreign: share(sum(|r| r.foreign), sum(|r| r.image)),
             missing: share(sum(|r| r.missing), sum(|r| r.template)),
-            noise_m: 1.48 * f64::from(median),
+            noise_m: noise_m(fingers.into_iter().flat_map(|finger| finger.residuals_m).collect()),
         }
     }
 }

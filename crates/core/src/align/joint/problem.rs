@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use super::cost::{Joint, MaskPart, Noted, Patch};
+use super::cost::{Joint, MaskPart, Noted, Patch, Relief, noise_m};
 use super::image::Image;
 use super::smooth::BANDS;
 use super::template::{BandField, Template, template};
@@ -240,7 +240,8 @@ impl<'a> Problem<'a> {
             starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
         };
         let best = runs[order[0]];
-        let (noise_m, explained) = self.told(&descents.patches[LAST], best.state);
+        let relief = Relief::of(&descents.patches[LAST], best.state, config.kernels_m[LAST]);
+        let (explained, noise_m) = (relief.explained(), noise_m(relief.residuals_m));
         let mask_weight = self.mask_weight(noise_m, best.state);
         let winner = self.refine(&mut runs, &order, &mut descents, mask_weight);
         let fit = JointFit {
@@ -288,26 +289,6 @@ impl<'a> Problem<'a> {
             }
         }
         refined.into_iter().min_by(|&a, &b| runs[a].cost.total_cmp(&runs[b].cost)).unwrap_or(0)
-    }
-
-    /// 1.48 times the median residual at a state (meters), and which share of the relief the template explains there.
-    fn told(&self, patches: &Patches<'_>, state: State) -> (f64, f64) {
-        let square = self.config.kernels_m[LAST].powi(2) as f32;
-        let capped = |r: f32| f64::from(r * r / (square + r * r));
-        let (mut residuals, mut left, mut relief) = (Vec::new(), 0.0, 0.0);
-        for (template, patch) in patches {
-            template.residuals(patch, state, |r, template| {
-                residuals.push(r.abs());
-                left += capped(r);
-                relief += capped(template - r);
-            });
-        }
-        if residuals.is_empty() {
-            return (0.0, 0.0);
-        }
-        let middle = residuals.len() / 2;
-        let (_, median, _) = residuals.select_nth_unstable_by(middle, f32::total_cmp);
-        (1.48 * f64::from(*median), if relief > 0.0 { 1.0 - left / relief } else { 0.0 })
     }
 
     /// Weight of the mask in the answer.
