@@ -167,7 +167,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             fan.write(stem, name, by)?;
         }
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
-        let ask = Ask { starts, record: args.trace, ..Ask::default() };
+        let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
         let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
@@ -187,6 +187,9 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             y_m: place.map(|p| p.y_m),
             z_m: place.map(|p| p.z_m),
             ms: answer.map_or(0.0, |found| found.ms),
+            angle_sd_deg: answer.and_then(|found| Some(found.spread_rad()?.to_degrees())),
+            verdict: answer.and_then(|found| found.verdict.clone()),
+            evidence: answer.and_then(|found| found.report.evidence),
             stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
             report: found.ok().map(|found| found.report).filter(|_| args.trace),

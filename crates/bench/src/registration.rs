@@ -67,7 +67,7 @@ pub(super) struct RegistrationArgs {
 /// Which contact masks. As text `spoilt`, `clean`, `unet` or `threshold=MM`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[serde(into = "String")]
-enum Masks {
+pub(super) enum Masks {
     /// As a learned mask has them.
     Spoilt,
     /// As they are.
@@ -110,16 +110,16 @@ impl From<Masks> for String {
 }
 
 /// The masks of every case.
-fn masks(set: &CaseSet, args: &RegistrationArgs) -> anyhow::Result<Vec<[Mask; 2]>> {
-    let (rig, models) = (Rig::lab(), args.model.models());
-    let model = match args.masks {
-        Masks::Unet => args.model.mask_model(false, &rig)?,
+pub(super) fn masks(set: &CaseSet, kind: Masks, args: &ModelArgs) -> anyhow::Result<Vec<[Mask; 2]>> {
+    let (rig, models) = (Rig::lab(), args.models());
+    let model = match kind {
+        Masks::Unet => args.mask_model(false, &rig)?,
         _ => None,
     };
     let of = |case: &Case| -> anyhow::Result<[Mask; 2]> {
-        let mut masks = if args.masks == Masks::Spoilt { case.masks.clone() } else { case.masks_clean.clone() };
+        let mut masks = if kind == Masks::Spoilt { case.masks.clone() } else { case.masks_clean.clone() };
         for (mask, imprint) in masks.iter_mut().zip(&case.imprints) {
-            if let Masks::Threshold(mm) = args.masks {
+            if let Masks::Threshold(mm) = kind {
                 *mask = imprint.map(|pushed| pushed.is_finite() && *pushed >= mm / 1e3);
             }
             if let Some(model) = &model {
@@ -222,7 +222,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     let machine = Machine::now();
     // One thread, whatever an engine would like to use: the figures are the work, not the machine.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let masks = masks(&set, args)?;
+    let masks = masks(&set, args.masks, &args.model)?;
     let (folder, kind) = (&args.cases, args.masks);
     let mut report = pool.install(|| measure((folder, kind), &set, &masks, &engines, machine, &output))?;
     if !args.no_peers {

@@ -1,4 +1,7 @@
-//! `touch2touch-bench verdict`: signs of a fault that need no truth, each as a detector, on fresh grasps with faults drawn in.
+//! `touch2touch-bench verdict`: the verdict without the truth, and each of its signs alone, as detectors of faults that are drawn
+//! into known grasps.
+
+use std::path::PathBuf;
 
 use clap::Args;
 use glam::{DAffine3, DVec3};
@@ -10,14 +13,16 @@ use strum::IntoEnumIterator as _;
 
 use super::Machine;
 use super::figures::quantile;
-use super::registration::{images, points};
+use super::registration::{Masks, images, masks, points};
 use super::rows::position_error_mm;
-use touch2touch::headless::{JsonArgs, Output, VerbResult};
-use touch2touch_core::align::{Ask, Contacts, Evidence, Scene};
+use touch2touch::headless::{JsonArgs, ModelArgs, Output, VerbResult};
+use touch2touch_core::align::{Ask, Contacts, Evidence};
+use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel};
+use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register_with};
+use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::units::angle_error;
-use touch2touch_work::io::cases::{self, Case};
+use touch2touch_work::io::cases::{self, Case, CaseSet};
 
 /// Arguments of `bench verdict`.
 #[derive(Debug, Args)]
@@ -28,6 +33,14 @@ pub(super) struct VerdictArgs {
     /// Seed of grasps, noise, masks and faults.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Folder of known grasps (`touch2touch-bench cases` writes one) in place of fresh ones.
+    #[arg(long, conflicts_with = "count")]
+    cases: Option<PathBuf>,
+    /// Contact masks of the folder's grasps: `spoilt` (as a learned mask has them), `clean`, `unet` (by the mask model), `threshold=MM`.
+    #[arg(long, default_value_t = Masks::Spoilt, requires = "cases")]
+    masks: Masks,
+    #[command(flatten)]
+    model: ModelArgs,
     /// The registration.
     #[arg(long, default_value_t = Registration::default())]
     engine: Registration,
@@ -162,9 +175,12 @@ struct Row {
     /// Error of the angle, degrees; none without a pose.
     error_deg: Option<f64>,
     position_mm: Option<f64>,
+    /// Pose minus truth: radians, meters, meters.
+    off: Option<[f64; 3]>,
     /// Share of the used points within the narrowest kernel; none without a pose, as what follows.
     inlier_share: Option<f64>,
     evidence: Option<Evidence>,
+    verdict: Option<Verdict>,
     /// Reason why there is no pose.
     why: Option<String>,
 }
@@ -180,12 +196,10 @@ struct Sign {
 const SIGNS: &[Sign] = &[
     Sign { name: "few inliers", of: |row| Some(-row.inlier_share?) },
     Sign { name: "contact off the tool", of: |row| Some(1.0 - row.evidence?.on_tool) },
-    Sign { name: "1.5-8 mm: not explained", of: |row| Some(-row.evidence?.membrane?[0].explained) },
-    Sign { name: "1-3 mm: not explained", of: |row| Some(-row.evidence?.membrane?[1].explained) },
-    Sign { name: "1-3 mm: foreign", of: |row| Some(row.evidence?.membrane?[1].foreign) },
-    Sign { name: "1-3 mm: missing", of: |row| Some(row.evidence?.membrane?[1].missing) },
-    Sign { name: "1-3 mm: residual", of: |row| Some(row.evidence?.membrane?[1].noise_m) },
-    Sign { name: "0.7-2 mm: not explained", of: |row| Some(-row.evidence?.membrane?[2].explained) },
+    Sign { name: "unlike", of: |row| Some(1.0 - row.evidence?.membrane?.likeness) },
+    Sign { name: "membranes elsewhere", of: |row| Some(row.evidence?.membrane?.own.gain) },
+    Sign { name: "fingers apart", of: |row| Some(row.evidence?.membrane?.fingers?.gain) },
+    Sign { name: "better swapped", of: |row| row.evidence?.membrane?.swapped },
 ];
 
 /// Share of false alarms at which signs are compared.
@@ -201,13 +215,39 @@ struct SignRow {
     told: Vec<(Fault, f64)>,
 }
 
-/// A fault, and what registration makes of it.
+/// A fault, and what registration and verdict make of it.
 #[derive(Debug, Serialize)]
 struct FaultRow {
     fault: Fault,
     trials: usize,
     no_pose: usize,
     within_5: usize,
+    /// Trials whose pose is doubted (check or wrong), or that have none, percent. Without a fault: of the right poses, which
+    /// are the false alarms.
+    told: f64,
+    /// Trials whose pose is called wrong, or that have none, percent; likewise.
+    wrong: f64,
+}
+
+impl FaultRow {
+    fn new(rows: &[Row], fault: Fault) -> Self {
+        let all: Vec<&Row> = of_fault(rows, fault).collect();
+        let count = |of: &dyn Fn(&Row) -> bool| all.iter().filter(|row| of(row)).count();
+        let judged = |row: &&&Row| fault != Fault::None || is_right(row);
+        let percent = |grade: Grade| {
+            let told = |row: &&&Row| row.verdict.as_ref().is_none_or(|verdict| verdict.grade >= grade);
+            let (told, of) = (all.iter().filter(judged).filter(told).count(), all.iter().filter(judged).count());
+            100.0 * told as f64 / of.max(1) as f64
+        };
+        Self {
+            fault,
+            trials: all.len(),
+            no_pose: count(&|row| row.error_deg.is_none()),
+            within_5: count(&is_right),
+            told: percent(Grade::Check),
+            wrong: percent(Grade::Wrong),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -243,19 +283,29 @@ fn signs(rows: &[Row]) -> Vec<SignRow> {
 
 fn text(report: &Report) -> String {
     let mut text = format!(
-        "{}\n{}\n\n{:22} {:>6} {:>8} {:>7}\n",
+        "{}\n{}\n\n{:22} {:>6} {:>8} {:>7} {:>10} {:>9}\n",
         report.machine.text(),
         report.engine,
         "fault",
         "trials",
         "no pose",
-        "<=5°"
+        "<=5°",
+        "doubted %",
+        "wrong %"
     );
     for row in &report.faults {
-        text += &format!("{:22} {:>6} {:>8} {:>7}\n", row.fault.to_string(), row.trials, row.no_pose, row.within_5);
+        text += &format!(
+            "{:22} {:>6} {:>8} {:>7} {:>10.1} {:>9.1}\n",
+            row.fault.to_string(),
+            row.trials,
+            row.no_pose,
+            row.within_5,
+            row.told,
+            row.wrong
+        );
     }
     text += &format!(
-        "\npercent beyond the limit that {} % of the good poses pass, by each sign alone\n",
+        "\nof the first row only the right poses count: they are the false alarms\n\npercent beyond the limit that {} % of the good poses pass, by each sign alone\n",
         100.0 * FALSE_ALARMS
     );
     for row in &report.signs {
@@ -265,39 +315,68 @@ fn text(report: &Report) -> String {
     text
 }
 
+/// Source of the grasps; the `tool` of each is a position among the meshes.
+enum Source {
+    Fresh { count: usize, seed: u64, tools: Vec<ToolSpec> },
+    Known(Vec<Case>),
+}
+
+impl Source {
+    /// The source with the meshes of its tools.
+    fn new(args: &VerdictArgs) -> anyhow::Result<(Self, Vec<TriMesh>)> {
+        let Some(folder) = &args.cases else {
+            let (count, seed) = (args.count as usize, args.seed);
+            return Ok((Self::Fresh { count, seed, tools: cases::simulated_tools() }, cases::simulated_meshes()));
+        };
+        let mut set = CaseSet::open(folder)?;
+        let masks = masks(&set, args.masks, &args.model)?;
+        let numbers: Vec<usize> = set.tools.keys().copied().collect();
+        anyhow::ensure!(numbers.len() > 1 && set.cases.len() > 1, "two cases and two tools are the least that will do");
+        for ((_, case), masks) in set.cases.iter_mut().zip(masks) {
+            case.masks = masks;
+            case.tool = numbers.iter().position(|number| *number == case.tool).unwrap_or(0);
+        }
+        Ok((Self::Known(set.cases.into_iter().map(|(_, case)| case).collect()), set.tools.into_values().collect()))
+    }
+
+    fn count(&self) -> usize {
+        match self {
+            Self::Fresh { count, .. } => *count,
+            Self::Known(cases) => cases.len(),
+        }
+    }
+
+    fn case(&self, i: usize) -> Case {
+        match self {
+            Self::Fresh { count, seed, tools } => cases::simulated(i, *count, *seed, tools),
+            Self::Known(cases) => cases[i].clone(),
+        }
+    }
+}
+
 pub(super) fn run(args: &VerdictArgs) -> VerbResult {
-    let tools = cases::simulated_tools();
-    let meshes = cases::simulated_meshes();
-    let count = args.count as usize;
+    let (source, meshes) = Source::new(args)?;
+    let count = source.count();
     let output = Output::new(args.json.common(), "judging", count);
     let models: Vec<ToolModel> = meshes.iter().map(|m| ToolModel::new(m.clone())).collect::<Result<_, _>>()?;
-    let make = |i: usize| cases::simulated(i, count, args.seed, &tools);
+    let (seed, engine) = (args.seed, args.engine);
     let one = |i: usize| -> Vec<Row> {
-        let (case, other) = (make(i), make((i + 1) % count));
-        output.step(&tools[case.tool].name);
+        let (case, other) = (source.case(i), source.case((i + 1) % count));
+        output.step(&i.to_string());
         Fault::iter()
             .map(|fault| {
-                let mut rng = ChaCha8Rng::seed_from_u64(args.seed.wrapping_mul(7919).wrapping_add(i as u64));
+                let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(7919).wrapping_add(i as u64));
                 rng.set_stream(fault as u64);
                 let trial = Trial::new(fault, &case, &other, &meshes, &mut rng);
-                row(i, fault, &trial, &models, args.engine)
+                row(i, fault, &trial, &models, engine)
             })
             .collect()
     };
     let rows: Vec<Row> = (0..count).into_par_iter().flat_map_iter(one).collect();
-    let fault = |fault| {
-        let no_pose = |row: &&Row| row.error_deg.is_none();
-        FaultRow {
-            fault,
-            trials: of_fault(&rows, fault).count(),
-            no_pose: of_fault(&rows, fault).filter(no_pose).count(),
-            within_5: of_fault(&rows, fault).filter(|row| is_right(row)).count(),
-        }
-    };
     let report = Report {
         machine: Machine::now(),
         engine: args.engine.to_string(),
-        faults: Fault::iter().map(fault).collect(),
+        faults: Fault::iter().map(|fault| FaultRow::new(&rows, fault)).collect(),
         signs: signs(&rows),
         rows,
     };
@@ -318,9 +397,10 @@ fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Regi
     };
     let images = images(case);
     let points = points(case, &case.masks).unwrap_or_default();
-    let scene = Scene::new(Contacts { points: &points, images: &images });
+    let contacts = Contacts { points: &points, images: &images };
     let method = RegistrationChoice::from(engine).method();
-    let found = tool.and_then(|tool| Ok((tool, method.run(&scene, tool, Ask::default()).map_err(|e| e.to_string())?)));
+    let ask = Ask { evidence: true, ..Ask::default() };
+    let found = tool.and_then(|tool| register_with(&*method, contacts, tool, ask).map_err(|err| err.to_string()));
     let mut row = Row {
         case: i,
         fault,
@@ -328,15 +408,19 @@ fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Regi
         tool: case.tool,
         error_deg: None,
         position_mm: None,
+        off: None,
         inlier_share: None,
         evidence: None,
+        verdict: None,
         why: found.as_ref().err().cloned(),
     };
-    let Ok((tool, report)) = found else { return row };
+    let Ok(report) = found else { return row };
     let (pose, truth) = (report.grasp_from_object, case.grasp_from_object);
     row.error_deg = Some(angle_error(pose.theta_rad, truth.theta_rad).to_degrees());
     row.position_mm = Some(position_error_mm(pose, truth));
     row.inlier_share = Some(report.inlier_share);
-    row.evidence = Some(Evidence::at(&scene, tool, pose));
+    row.evidence = report.evidence;
+    row.verdict = Verdict::of(&report);
+    row.off = Some([pose.theta_rad - truth.theta_rad, pose.y_m - truth.y_m, pose.z_m - truth.z_m]);
     row
 }

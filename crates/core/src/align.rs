@@ -42,7 +42,7 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
-pub use joint::{BandEvidence, Basis, Evidence, JointConfig, JointFit, MaskWeight};
+pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence, Uncertainty};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
@@ -254,10 +254,10 @@ pub enum Rung {
     Certified,
 }
 
-/// Verdict on the answer of a rung: whether it was good enough to stop there.
+/// Outcome of a rung: why the search stopped with its answer or went on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "snake_case")]
-pub enum Verdict {
+pub enum Outcome {
     /// It passes all tests.
     #[strum(to_string = "accepted")]
     Accepted,
@@ -297,7 +297,7 @@ pub struct RungAttempt {
     /// Nearest-surface questions it asked.
     pub lookups: usize,
     /// Why the search went on, or did not.
-    pub verdict: Verdict,
+    pub outcome: Outcome,
 }
 
 /// Outcome of branch and bound.
@@ -386,6 +386,8 @@ pub struct AlignReport {
     pub observability: Option<Observability>,
     /// Use of the membrane, from the registration that uses it.
     pub joint: Option<JointFit>,
+    /// Evidence for and against the answer, where it was asked for.
+    pub evidence: Option<Evidence>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,
     /// Per-iteration states of all runs; empty unless recorded.
@@ -411,7 +413,7 @@ impl AlignReport {
 
     /// True where the answer is the same with and without a proof: the ladder ended before it would ask for one.
     pub fn needs_no_proof(&self) -> bool {
-        self.ladder.last().is_some_and(|end| end.verdict == Verdict::Accepted || end.rung < Rung::Grid)
+        self.ladder.last().is_some_and(|end| end.outcome == Outcome::Accepted || end.rung < Rung::Grid)
     }
 
     /// True where the points leave a direction of the pose open (a straight rod slides, a disc turns).

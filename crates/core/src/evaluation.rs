@@ -21,6 +21,7 @@ use super::dataset::{PairEntry, Split};
 use super::label::Doubt;
 use super::metrics::{AngleSummary, Unstretched};
 use super::sample::Scale;
+use super::verdict::Grade;
 
 use columns::{COLUMNS, Of};
 pub use columns::{Column, NOTES, TableMetrics, columns, conventions};
@@ -142,6 +143,9 @@ pub struct GraspScore {
     pub images: Vec<ImageScore>,
     /// Error of the in-hand angle, radians, without sign; NaN (null) without a pose, `None` where no truth is known.
     pub angle_error_rad: Option<f64>,
+    /// How much the pose can be relied on, without the truth; `None` without a pose.
+    #[serde(default)]
+    pub verdict: Option<Grade>,
     /// Time to generate one image, seconds.
     pub seconds: Option<f64>,
     /// Reasons to look at its masks, of the measured imprints.
@@ -314,6 +318,7 @@ mod tests {
             scale: Scale::Measured,
             images: vec![image],
             angle_error_rad: Some(angle_deg.to_radians()),
+            verdict: Some(Grade::of_angle_error(angle_deg.to_radians())),
             seconds: Some(0.1),
             doubt: Doubt::default(),
             seed_spread_m: None,

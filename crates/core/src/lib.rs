@@ -47,3 +47,4 @@ pub mod tool;
 pub mod turn;
 pub mod units;
 pub mod upright;
+pub mod verdict;

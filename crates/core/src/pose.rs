@@ -3,7 +3,7 @@
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
-use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Register, Scene, icp};
+use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Evidence, Register, Scene, icp};
 use super::frames::PlanarPose;
 
 mod choice;
@@ -155,6 +155,9 @@ pub fn register_with<'a>(
 ) -> Result<AlignReport, AlignError> {
     let scene = Scene::new(contacts);
     let mut report = registration.run(&scene, tool, ask)?;
+    if ask.evidence {
+        report.evidence = Some(Evidence::about(&scene, tool, &report));
+    }
     if ask.record {
         report.directions = Directions::at(scene.yz(), &icp::silhouette(tool), report.grasp_from_object);
     }

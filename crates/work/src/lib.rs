@@ -34,6 +34,6 @@ pub use labeling::{agreement, filter, label_stats, labels, repeats};
 pub use learn::{adapt, new_bundle, train, training_data, tuning};
 pub use study::{
     canvas, compare, deviation, doubts, ensemble, evaluate, fan, figure, fonts, influence, layers, ledger, statistics,
-    subject, sweep, verdict,
+    subject, sweep,
 };
 pub use way::{bundles, cloud, feel, imprint, mask, models, on_pad, pose, predict, prediction, recipe, tool};

@@ -15,4 +15,3 @@ pub mod ledger;
 pub mod statistics;
 pub mod subject;
 pub mod sweep;
-pub mod verdict;

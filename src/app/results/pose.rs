@@ -72,7 +72,7 @@ pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
 
 impl Computes for PoseKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        registering(state, self, Ask::default())
+        registering(state, self, Ask { evidence: true, ..Ask::default() })
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<PoseResult>) {
@@ -84,7 +84,7 @@ impl Computes for PoseKey {
 
 impl Computes for ProvisionalPoseKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
-        registering(state, &self.0, Ask { provisional: true, ..Ask::default() })
+        registering(state, &self.0, Ask { provisional: true, evidence: true, ..Ask::default() })
     }
 
     fn arrived(&self, state: &mut State, found: &Arc<PoseResult>) {

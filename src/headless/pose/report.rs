@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use super::super::seeds::PoseFan;
 use super::influence::Influences;
-use touch2touch_core::align::AlignReport;
+use touch2touch_core::align::{AlignReport, Evidence};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
@@ -14,6 +14,7 @@ use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
+use touch2touch_core::verdict::{Grade, Verdict};
 
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PoseRow {
@@ -27,6 +28,13 @@ pub(super) struct PoseRow {
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) mask_notes: Vec<String>,
     pub(super) angle_deg: Option<f64>,
+    /// Standard deviation of the angle.
+    pub(super) angle_sd_deg: Option<f64>,
+    /// How much the pose can be relied on, without the truth; none without a pose.
+    pub(super) verdict: Option<Verdict>,
+    /// Evidence that the verdict is from, with the covariance of the pose.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) evidence: Option<Evidence>,
     pub(super) truth_deg: Option<f64>,
     pub(super) error_deg: Option<f64>,
     pub(super) y_m: Option<f64>,
@@ -135,19 +143,27 @@ pub(super) fn summary(cases: &[PoseRow], first_imprint: &str, first: Registratio
 
 pub(super) fn text(report: &Report) -> String {
     let number = |v: Option<f64>| v.map_or("      -".to_owned(), |v| format!("{v:7.2}"));
-    let mut text = format!("{:<44} {:>9} {:>9} {:>9}  mask, stop\n", "pair", "angle °", "truth °", "error °");
+    let mut text = format!(
+        "{:<44} {:>9} {:>7} {:>9} {:>9}  {:<7} mask, stop\n",
+        "pair", "angle °", "± °", "truth °", "error °", "verdict"
+    );
     for c in &report.cases {
         text += &format!(
-            "{:<44} {:>9} {:>9} {:>9}  {}/{}/{}: {}\n",
+            "{:<44} {:>9} {:>7} {:>9} {:>9}  {:<7} {}/{}/{}: {}\n",
             c.name,
             number(c.angle_deg),
+            number(c.angle_sd_deg),
             number(c.truth_deg),
             number(c.error_deg),
+            c.verdict.as_ref().map_or_else(|| "-".to_owned(), |verdict| verdict.grade.to_string()),
             c.registration,
             c.imprint,
             c.mask,
             c.stop
         );
+        if let Some(verdict) = c.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
+            text += &format!("    {}: {}\n", verdict.grade, verdict.why);
+        }
     }
     for case in &report.cases {
         let (name, imprint) = (&case.name, case.imprint);

@@ -12,6 +12,7 @@ use touch2touch_core::grid::DepthMap;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, Text};
 use touch2touch_core::sample::Sample;
+use touch2touch_core::verdict::Verdict;
 use touch2touch_work::compare;
 use touch2touch_work::mask::Contact;
 use touch2touch_work::prediction::Prediction;
@@ -41,6 +42,11 @@ pub(super) struct PoseMetrics {
     pub(super) y_m: f64,
     pub(super) z_m: f64,
     pub(super) grasp_from_object: PlanarPose,
+    /// Standard deviation of the angle, and the covariance of `grasp_from_object` (angle in radians, y and z in meters).
+    pub(super) angle_sd_deg: Option<f64>,
+    pub(super) covariance: Option<[[f64; 3]; 3]>,
+    /// How much the pose can be relied on.
+    pub(super) verdict: Option<Verdict>,
     pub(super) rms_m: f64,
     pub(super) points: usize,
     pub(super) stop: String,

@@ -21,7 +21,6 @@ use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_work::compare::Comparison;
 use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::verdict::Verdict;
 
 /// Figures that only this pane shows.
 #[derive(Default)]
@@ -84,12 +83,8 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.label(source.name());
             match results::pose(cx.state, source) {
                 Lookup::Ready(pose) | Lookup::Stale(pose) => {
-                    let verdict = Verdict::of(pose, results::truth(cx.state));
-                    let text = RichText::new(scene::angle_text(pose)).color(grade_color(cx.p, verdict.grade));
-                    let label = ui.label(text);
-                    if !verdict.findings.is_empty() {
-                        label.on_hover_text(verdict.text());
-                    }
+                    let color = pose.verdict.as_ref().map_or(cx.p.strong, |verdict| grade_color(cx.p, verdict.grade));
+                    ui.label(RichText::new(scene::angle_text(pose)).color(color));
                 }
                 Lookup::Waiting => {
                     ui.label(caption("…", cx.p));
@@ -118,6 +113,14 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                 place.on_hover_text("Place of the object's origin in the grasp frame");
                 ui.label(caption(scene::pose_time(pose), cx.p)).on_hover_text("What this registration took");
             });
+            if let Some(verdict) = &pose.verdict {
+                let text = format!("{}: {}", verdict.grade, verdict.why);
+                let all: Vec<&str> = verdict.against.iter().map(|sign| sign.what.as_str()).collect();
+                let label = ui.label(RichText::new(text).size(SMALL).color(grade_color(cx.p, verdict.grade)));
+                if all.len() > 1 {
+                    label.on_hover_text(all.join("\n"));
+                }
+            }
             ui.label(caption(scene::pose_details(pose), cx.p));
             let action = match source {
                 ImprintSource::Measured => Action::AcceptMeasuredPose,

@@ -13,7 +13,7 @@ use crate::ui::parts::theme::{SMALL, caption, grade_color};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
-use touch2touch_work::verdict::Verdict;
+use touch2touch_core::verdict::Grade;
 
 /// Height of a row: two lines of small type.
 const ROW: f32 = 32.0;
@@ -63,7 +63,7 @@ fn cells(cx: &Cx<'_>, of: PoseOf) -> [([String; 2], Color32); 3] {
     let against = |source: ImprintSource| match (pose(source), results::truth(cx.state)) {
         (Lookup::Ready(pose), Some(truth)) => {
             let difference = PoseDifference::between(pose.grasp_from_object, truth);
-            (text(difference), grade_color(p, Verdict::of(pose, Some(truth)).grade))
+            (text(difference), grade_color(p, Grade::of_difference(difference)))
         }
         (Lookup::Failed(_), _) => (["failed".to_owned(), String::new()], p.wrong),
         (Lookup::Waiting, _) => (["…".to_owned(), String::new()], p.weak),

@@ -11,7 +11,7 @@ use eframe::egui::{
     TextStyle, Theme, vec2,
 };
 
-use touch2touch_work::verdict::Grade;
+use touch2touch_core::verdict::Grade;
 
 /// The grid that every distance is a multiple of, points.
 pub(crate) const UNIT: f32 = 4.0;
@@ -244,9 +244,8 @@ pub(crate) fn pane_frame(palette: &Palette) -> egui::Frame {
 /// The color of a grade.
 pub(crate) fn grade_color(p: &Palette, grade: Grade) -> Color32 {
     match grade {
-        Grade::Open => p.strong,
         Grade::Good => p.good,
-        Grade::Caution => p.caution,
+        Grade::Check => p.caution,
         Grade::Wrong => p.wrong,
     }
 }

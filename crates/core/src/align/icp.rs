@@ -240,6 +240,7 @@ impl Register for IcpConfig {
             within_prior: Prior::default().allows(pose),
             observability: Some(observability(&chosen_yz, &tool.field, pose)),
             joint: None,
+            evidence: None,
             directions: None,
             fits: if ask.record { self.fits(tool, &clean, best.state) } else { Vec::new() },
             trace: trace.steps,

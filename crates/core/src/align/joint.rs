@@ -16,13 +16,15 @@ mod smooth;
 mod template;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
 
 use serde::{Deserialize, Serialize};
 
 use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
-pub use evidence::{BandEvidence, Evidence};
+pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
+pub use uncertainty::Uncertainty;
 use problem::{Problem, check};
 
 /// Choices of the registration by membrane and mask. The default is what the product uses.

@@ -208,6 +208,7 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
         within_prior: Prior::default().allows(run.end),
         observability: None,
         joint: None,
+        evidence: None,
         directions: None,
         trace: paper.trace,
         fits,

@@ -18,7 +18,7 @@ use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
     AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, Observability, PointFit, Prior, Run, Rung,
-    RungAttempt, Verdict, clean,
+    RungAttempt, Outcome, clean,
 };
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
@@ -61,10 +61,10 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
             Err(AlignError::NoOverlap { .. }) if !last && rung < Rung::Grid => continue,
             Err(error) => return Err(error),
         };
-        let mut verdict = answer.verdict(rung, config);
-        let hopeless = verdict == Verdict::Observability;
-        if verdict != Verdict::Accepted && (last || hopeless) {
-            verdict = Verdict::Last;
+        let mut outcome = answer.outcome(rung, config);
+        let hopeless = outcome == Outcome::Observability;
+        if outcome != Outcome::Accepted && (last || hopeless) {
+            outcome = Outcome::Last;
         }
         ladder.push(RungAttempt {
             rung,
@@ -73,10 +73,10 @@ pub fn align(points_yz: &[DVec2], field: &DistanceField, config: &AlignConfig) -
             inlier_share: answer.inlier_share,
             weakest: answer.seen.eigenvalues[0],
             lookups: answer.lookups,
-            verdict,
+            outcome,
         });
         lookups += answer.lookups;
-        if matches!(verdict, Verdict::Accepted | Verdict::Last) {
+        if matches!(outcome, Outcome::Accepted | Outcome::Last) {
             answer.lookups = lookups;
             return Ok(problem.report(points_yz, answer, ladder));
         }
@@ -127,7 +127,7 @@ impl Answer {
         &self.runs[self.winner]
     }
 
-    fn verdict(&self, rung: Rung, config: &AlignConfig) -> Verdict {
+    fn outcome(&self, rung: Rung, config: &AlignConfig) -> Outcome {
         let accept = config.accept;
         let (cost, inliers) = if rung > Rung::Single {
             (accept.cost_searched, accept.inliers_searched)
@@ -136,17 +136,17 @@ impl Answer {
         };
         let kernel = final_kernel(config);
         if !self.best().stop.converged() {
-            Verdict::NotConverged
+            Outcome::NotConverged
         } else if !config.prior.allows(self.pose) {
-            Verdict::OutsidePrior
+            Outcome::OutsidePrior
         } else if self.best().cost > cost * kernel * kernel {
-            Verdict::Cost
+            Outcome::Cost
         } else if self.inlier_share < inliers {
-            Verdict::Inliers
+            Outcome::Inliers
         } else if self.seen.eigenvalues[0] < accept.weakest {
-            Verdict::Observability
+            Outcome::Observability
         } else {
-            Verdict::Accepted
+            Outcome::Accepted
         }
     }
 }
@@ -410,6 +410,7 @@ impl<'a> Problem<'a> {
             within_prior: config.prior.allows(answer.pose),
             observability: Some(answer.seen),
             joint: None,
+            evidence: None,
             directions: None,
             trace: answer.trace,
             fits: if config.record {

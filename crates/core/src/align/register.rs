@@ -87,6 +87,8 @@ pub struct Ask<'a> {
     pub starts: Option<&'a [PlanarPose]>,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
+    /// Gather the evidence for and against the answer.
+    pub evidence: bool,
     /// Leave the proof out, so that there is an answer at once; one that passes all tests is the same without.
     pub provisional: bool,
 }

@@ -8,6 +8,7 @@ use serde::ser::{SerializeMap as _, Serializer};
 use super::{Estimate, GraspScore, Group, Row, angles, images, mean, psnr};
 use crate::metrics::frechet_distance;
 use crate::sample::Scale;
+use crate::verdict::Grade;
 
 /// A column of the table.
 pub struct Column {
@@ -124,6 +125,9 @@ pub(super) static COLUMNS: &[Column] = &[
             Some(angles(tool)?.success_10)
         })
     },
+    percent("good %", "verdict_good", "Share of grasps whose pose the verdict calls good, without the truth, percent", |tool| {
+        mean(tool.iter().filter_map(|g| g.verdict).map(|grade| if grade == Grade::Good { 100.0 } else { 0.0 }))
+    }),
     percent("tool %", "tool_accuracy", "Share of imprints whose tool the classifier names, percent", |tool| {
         mean(images(tool).filter_map(|i| i.tool_right).map(|right| if right { 100.0 } else { 0.0 }))
     }),

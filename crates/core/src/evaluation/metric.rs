@@ -1,11 +1,14 @@
 //! [`Metric`]: the table of metrics of a grasp, which lists and pictures of many grasps are made of.
 
 use std::cmp::Ordering;
+use std::str::FromStr as _;
 
 use serde::{Deserialize, Serialize};
+use strum::IntoEnumIterator as _;
 
 use super::{GraspScore, mean, psnr};
 use crate::sample::Scale;
+use crate::verdict::Grade;
 
 /// A metric of a grasp: a row of [`ROWS`]. Lists, filters and pictures follow; the most telling first.
 #[derive(
@@ -16,6 +19,8 @@ pub enum Metric {
     /// Error of the in-hand angle, radians.
     #[default]
     Angle,
+    /// Verdict on the pose without the truth: the number of its [`Grade`].
+    Verdict,
     /// Of the imprints against the measured ones, pooled over the fingers, dB.
     Psnr,
     /// Mean over the fingers, range 0.0225 m (pictures without scale: both stretched to 0..1).
@@ -84,6 +89,17 @@ static ROWS: &[Row] = &[
         decimals: 1,
         larger_is_better: false,
         of: |grasp| grasp.angle_error_rad,
+    },
+    Row {
+        metric: Metric::Verdict,
+        name: "Verdict",
+        short: "verdict",
+        key: "verdict",
+        tip: "How much the pose can be relied on, without the truth: good, check or wrong",
+        decimals: 0,
+        larger_is_better: false,
+        of: |grasp| grasp.verdict.map(|grade| f64::from(grade as u8)),
+        ..PLAIN
     },
     Row {
         metric: Metric::Psnr,
@@ -244,6 +260,11 @@ impl Metric {
 
     /// A value with its unit.
     pub fn text(self, value: f64) -> String {
+        if self == Self::Verdict
+            && let Some(grade) = Grade::iter().find(|grade| f64::from(*grade as u8) == value)
+        {
+            return grade.to_string();
+        }
         if value.is_nan() {
             return if self == Self::Angle { "no pose".into() } else { "–".into() };
         }
@@ -278,8 +299,8 @@ impl GraspScore {
     }
 }
 
-/// A condition on a metric, as it is typed: `angle>5`, `psnr<=20`, `measured:angle>2`. Numbers are in the units of the
-/// screen.
+/// A condition on a metric, as it is typed: `angle>5`, `psnr<=20`, `measured:angle>2`, `verdict=wrong`. Numbers are in the
+/// units of the screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Condition {
     /// A part of the source's name, in lower case; empty for the one chosen.
@@ -295,17 +316,23 @@ pub struct Condition {
 impl Condition {
     /// The condition that a word states; `None` for a word that states none.
     pub fn parse(word: &str) -> Option<Self> {
-        use strum::IntoEnumIterator as _;
-        let sign = word.find(['<', '>'])?;
+        let sign = word.find(['<', '>', '='])?;
         let (left, rest) = word.split_at(sign);
-        let side = if rest.starts_with('<') { Ordering::Less } else { Ordering::Greater };
+        let side = match rest.as_bytes()[0] {
+            b'<' => Ordering::Less,
+            b'>' => Ordering::Greater,
+            _ => Ordering::Equal,
+        };
         let (or_equal, number) = match rest[1..].strip_prefix('=') {
             Some(number) => (Ordering::Equal, number),
             None => (side, &rest[1..]),
         };
         let (source, key) = left.rsplit_once(':').unwrap_or(("", left));
         let metric = Metric::iter().find(|metric| metric.key() == key)?;
-        let bound: f64 = number.trim_end_matches(['°', '%']).parse().ok().filter(|b: &f64| !b.is_nan())?;
+        let bound = match (metric, Grade::from_str(number)) {
+            (Metric::Verdict, Ok(grade)) => f64::from(grade as u8),
+            _ => number.trim_end_matches(['°', '%']).parse().ok().filter(|b: &f64| !b.is_nan())?,
+        };
         Some(Self { source: source.to_owned(), metric, bound, passes: [side, or_equal] })
     }
 
@@ -319,8 +346,6 @@ impl Condition {
 
 #[cfg(test)]
 mod tests {
-    use strum::IntoEnumIterator as _;
-
     use super::*;
 
     #[test]
@@ -329,9 +354,14 @@ mod tests {
         assert!(passes("angle>5", 0.1) && !passes("angle>5", 0.05) && passes("angle>5", f64::NAN));
         assert!(passes("psnr<20", 19.9) && !passes("psnr<20", 20.0) && passes("psnr<=20", 20.0));
         assert!(passes("rms>0.5", 0.000_6) && passes("named<100%", 0.5) && !passes("angle<5", f64::NAN));
+        let [good, check, wrong] = Grade::iter().map(|grade| f64::from(grade as u8)).collect::<Vec<_>>()[..] else {
+            panic!("three grades")
+        };
+        assert!(passes("verdict=wrong", wrong) && !passes("verdict=wrong", check) && !passes("verdict=wrong", good));
+        assert!(passes("verdict>good", check) && passes("verdict<=check", good) && !passes("verdict<wrong", wrong));
         let of = Condition::parse("measured:angle>=2").unwrap();
         assert_eq!((of.source.as_str(), of.metric), ("measured", Metric::Angle));
-        for word in ["angle", "tool:rod", "angle>", "angle>x", "size>3", ">5", "angle>nan", "", "a:b:angle"] {
+        for word in ["angle", "verdict=bad", "tool:rod", "angle>", "angle>x", "size>3", ">5", "angle>nan", "", "a:b:angle"] {
             assert_eq!(Condition::parse(word), None, "{word}");
         }
         for metric in Metric::iter() {

@@ -258,6 +258,7 @@ mod tests {
             scale: Scale::Measured,
             images: Vec::new(),
             angle_error_rad: angle_deg.map(f64::to_radians),
+            verdict: None,
             seconds: None,
             doubt: Doubt { unsure, disagreement },
             seed_spread_m: None,

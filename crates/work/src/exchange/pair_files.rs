@@ -18,6 +18,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::{angle_error, mm};
+use touch2touch_core::verdict::Verdict;
 
 const WHAT: &str = "Export the pair";
 
@@ -94,6 +95,13 @@ struct PoseFile<'a> {
     #[serde(flatten)]
     numbers: Numbers,
     truth: Option<Truth>,
+    /// Standard deviation of the angle, and the covariance of `grasp_from_object`: angle (radians), y and z (meters).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angle_sd_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covariance: Option<[[f64; 3]; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<&'a Verdict>,
     rms_mm: f64,
     contact_points: usize,
     converged: bool,
@@ -225,6 +233,9 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         object_from_grasp: matrix(found.inverse()),
         numbers: numbers(found),
         truth,
+        angle_sd_deg: pose.spread_rad().map(f64::to_degrees),
+        covariance: pose.report.evidence.map(|evidence| evidence.uncertainty.covariance),
+        verdict: pose.verdict.as_ref(),
         rms_mm: mm(pose.rms_m),
         contact_points: pose.num_points,
         converged: pose.converged,

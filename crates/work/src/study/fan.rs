@@ -14,6 +14,7 @@ use crate::models::Models;
 use crate::on_pad::OnPad;
 use crate::prediction::Prediction;
 use crate::recipe::{Recipe, Stage};
+use touch2touch_core::align::Ask;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::ensemble::{AngleFan, seeds};
 use touch2touch_core::grid::DepthMap;
@@ -84,7 +85,7 @@ pub fn fan(touch: Touch<'_>, recipe: &Recipe, count: usize, models: &Models, cx:
     }
     let mut otherwise = BTreeMap::new();
     let mut angle = |felt: Felt| -> Result<Option<f64>, TaskError> {
-        let felt = felt.reach(touch, Stage::Pose, models, cx)?;
+        let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, cx)?;
         let contact = felt.contact();
         for (pad, found) in contact.masks.entries().filter(|(_, found)| found.basis != MaskBasis::Source) {
             let made_of = format!("{} finger: {}", sample.rig.pad_key(pad), found.basis.key(contact.source().key()));

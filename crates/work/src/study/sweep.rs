@@ -28,6 +28,7 @@ use crate::predict::Predicted;
 use crate::prediction::Prediction;
 use crate::recipe::{Recipe, Stage};
 use crate::tool::load_tool;
+use touch2touch_core::align::Ask;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::pose::ToolModel;
@@ -373,7 +374,7 @@ impl<'a> SweepRun<'a> {
                 let turn = turn.of(side.source);
                 let known = before.as_ref().map(|before| before.again(&turn));
                 let felt = known.filter(|known| known.has(Stage::Mask)).unwrap_or_else(|| imprints.again(&turn));
-                let felt = felt.reach(touch, Stage::Pose, self.models, &self.cx.quiet());
+                let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), self.models, &self.cx.quiet());
                 felt.map_err(|err| err.why)
             };
             let felt = caught(outcome).unwrap_or_else(|message| Err(bug(message)));

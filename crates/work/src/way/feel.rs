@@ -112,15 +112,16 @@ impl Felt {
         felt
     }
 
-    /// Results of the touch up to a later stage.
+    /// Results of the touch up to a later stage; a pose with its verdict.
     ///
     /// # Errors
     /// As [`feel`].
     pub fn reach(self, touch: Touch<'_>, stage: Stage, models: &Models, cx: &JobCx) -> Result<Self, TaskError> {
-        self.reach_asking(touch, stage, Ask::default(), models, cx)
+        self.reach_asking(touch, stage, Ask { evidence: true, ..Ask::default() }, models, cx)
     }
 
-    /// Results up to a later stage, with a request to the registration, such as to record its steps.
+    /// Results up to a later stage, with a request to the registration: to record its steps, or to leave the verdict out
+    /// where only the pose counts.
     ///
     /// # Errors
     /// As [`feel`].

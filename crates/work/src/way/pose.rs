@@ -7,11 +7,12 @@ use glam::DVec3;
 use crate::error::TaskError;
 use crate::job::JobCx;
 use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
-use touch2touch_core::align::{AlignReport, Ask, Contacts, PointFit, Register, TraceStep};
+use touch2touch_core::align::{AlignReport, Ask, Contacts, Evidence, PointFit, Register, Scene, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::basin_map;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel, register_with};
 use touch2touch_core::units;
+use touch2touch_core::verdict::Verdict;
 
 /// A registered pose.
 #[derive(Clone, Debug, PartialEq)]
@@ -34,6 +35,8 @@ pub struct PoseResult {
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
+    /// How much it can be relied on; `None` where its evidence was not asked for.
+    pub verdict: Option<Verdict>,
     /// Everything the registration says about itself; with trace and fits only of a recorded run.
     pub report: AlignReport,
 }
@@ -42,6 +45,17 @@ impl PoseResult {
     /// Pose the other way round; its angle is the number that the lab reports.
     pub fn object_from_grasp(&self) -> PlanarPose {
         self.grasp_from_object.inverse()
+    }
+
+    /// Standard deviation of the angle, radians, where the evidence was asked for.
+    pub fn spread_rad(&self) -> Option<f64> {
+        Some(self.report.evidence?.uncertainty.angle_rad())
+    }
+
+    /// `-2.1° ± 0.3°`.
+    pub fn angle_text(&self) -> String {
+        let angle = units::text_deg(self.angle_rad);
+        self.spread_rad().map_or(angle.clone(), |spread| format!("{angle} ± {}", units::text_deg(spread)))
     }
 
     /// Bytes held.
@@ -65,8 +79,12 @@ pub fn pose<'a>(
 ) -> Result<PoseResult, TaskError> {
     let contacts = contacts.into();
     let start = Instant::now();
-    let report = register_with(registration, contacts, tool, ask).map_err(|err| TaskError::from_error("Pose", &err))?;
+    let alone = Ask { evidence: false, ..ask };
+    let found = register_with(registration, contacts, tool, alone);
+    let mut report = found.map_err(|err| TaskError::from_error("Pose", &err))?;
+    // The time of the registration, not that of its evidence.
     let ms = start.elapsed().as_secs_f64() * 1e3;
+    report.evidence = ask.evidence.then(|| Evidence::about(&Scene::new(contacts), tool, &report));
     let angle_rad = report.lab_angle_rad();
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
     Ok(PoseResult {
@@ -79,6 +97,7 @@ pub fn pose<'a>(
         stop: report.stop.to_string(),
         converged: report.converged,
         ms,
+        verdict: Verdict::of(&report),
         report,
     })
 }

@@ -19,8 +19,8 @@ use crate::ui::parts::theme::{Palette, grade_color};
 use touch2touch_core::align::Rung;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
+use touch2touch_core::verdict::Grade;
 use touch2touch_work::pose::PoseResult;
-use touch2touch_work::verdict::Grade;
 
 /// Scale bar, names of the axes, legend, buttons.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
@@ -96,9 +96,9 @@ pub(super) fn lower_first(absent: Absent) -> String {
     chars.next().map_or(String::new(), |c| c.to_lowercase().chain(chars).collect())
 }
 
-/// `11.9° (true 12.3°, error 0.4°)`.
+/// `11.9° ± 0.3° (true 12.3°, error 0.4°)`.
 pub(crate) fn angle_text(pose: &PoseResult) -> String {
-    let angle = units::text_deg(pose.angle_rad);
+    let angle = pose.angle_text();
     match (pose.truth_rad, pose.error_rad) {
         (Some(truth), Some(error)) => {
             format!("{angle} (true {}, error {})", units::text_deg(truth), units::text_deg(error))
@@ -123,7 +123,13 @@ pub(crate) fn pose_details(pose: &PoseResult) -> String {
     let rung = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
     let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
-    format!("{} points · residual {} · {}{rung}{open}{beyond}", pose.num_points, units::text_mm(pose.rms_m), pose.stop)
+    let who = report.joint.map_or(String::new(), |fit| format!(" · by {}", fit.basis));
+    format!(
+        "{} points · residual {} · {}{rung}{who}{open}{beyond}",
+        pose.num_points,
+        units::text_mm(pose.rms_m),
+        pose.stop
+    )
 }
 
 fn axes_and_scale(p: &Palette, painter: &egui::Painter, camera: &Camera, output: &SceneOutput, rect: Rect) {

@@ -14,8 +14,8 @@ use crate::ui::panes::images;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, grade_color};
 use touch2touch_core::align::MIN_POINTS;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
-use touch2touch_work::verdict::Verdict;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
@@ -93,17 +93,25 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
     }
     let (text, color, mut details) = match results::pose(state, source) {
         Lookup::Ready(pose) | Lookup::Stale(pose) => {
-            let verdict = Verdict::of(pose, results::truth(state));
-            let mut text = match verdict.findings.is_empty() {
-                false => format!("{} · {}", units::text_deg(pose.angle_rad), verdict.text()),
-                true => format!("{} · residual {}", units::text_deg(pose.angle_rad), units::text_mm(pose.rms_m)),
+            let angle = pose.angle_text();
+            let (mut text, color) = match &pose.verdict {
+                Some(verdict) => {
+                    (format!("{angle} · {}: {}", verdict.grade, verdict.why), grade_color(cx.p, verdict.grade))
+                }
+                None => (angle, cx.p.strong),
             };
             if results::provisional_pose(state, source).is_some() {
                 text += " · being proved…";
             }
-            let mut details = vec![format!("{}, {}", pose_details(pose), pose_time(pose))];
-            details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
-            (text, grade_color(cx.p, verdict.grade), details)
+            let others = pose.verdict.iter().flat_map(|verdict| verdict.against.iter().skip(1));
+            let mut details: Vec<String> = others.map(|sign| format!("{}: {}", sign.grade, sign.what)).collect();
+            details.push(format!("{}, {}", pose_details(pose), pose_time(pose)));
+            if let Some(truth) = results::truth(state) {
+                let off = PoseDifference::between(pose.grasp_from_object, truth);
+                text += &format!(" · {}", difference("truly", "off", off));
+                details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
+            }
+            (text, color, details)
         }
         Lookup::Waiting => ("Pose: computing…".to_owned(), cx.p.weak, Vec::new()),
         Lookup::Failed(err) => (format!("No pose: {}", err.why), cx.p.wrong, vec![err.to_string()]),

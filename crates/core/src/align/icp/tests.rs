@@ -36,7 +36,7 @@ fn run(
     registration.run(&Scene::new(points), tool, ask)
 }
 
-const RECORD: Ask<'static> = Ask { starts: None, record: true, provisional: false };
+const RECORD: Ask<'static> = Ask { starts: None, record: true, evidence: false, provisional: false };
 
 #[test]
 fn every_member_finds_the_pose_and_tells_how() {

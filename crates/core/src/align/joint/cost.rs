@@ -125,18 +125,14 @@ impl BandField {
     }
 }
 
-/// The relief of membranes beside that of the template at a pose: sums of squared heights, capped by a kernel.
+/// The relief of membranes beside that of the template at a pose. Heights are capped by a kernel, so that a few pixels that
+/// are far off decide nothing.
 #[derive(Default)]
 pub(super) struct Relief {
-    /// Of the membranes.
-    pub(super) image: f64,
-    /// Of the template.
-    pub(super) template: f64,
-    /// Of what is left between the two; its parts are `foreign`, where the membranes have more, and `missing`, where the
-    /// template has.
+    /// That of what the template leaves of them.
     left: f64,
-    pub(super) foreign: f64,
-    pub(super) missing: f64,
+    /// Sums of the products of both heights: the membranes' with themselves, with the template's, and those with themselves.
+    products: [f64; 3],
     /// Sizes of the residuals.
     pub(super) residuals_m: Vec<f32>,
 }
@@ -145,16 +141,16 @@ impl Relief {
     /// The relief of patches at a state.
     pub(super) fn of(patches: &[(&BandField, Patch)], state: State, kernel_m: f64) -> Self {
         let square = kernel_m.powi(2) as f32;
-        let capped = |r: f32| f64::from(r * r / (square + r * r));
+        let capped = |height: f32| height / (square + height * height).sqrt();
+        let product = |a: f32, b: f32| f64::from(capped(a)) * f64::from(capped(b));
         let mut sums = Self::default();
         for (template, patch) in patches {
             template.residuals(patch, state, |r, template| {
-                let (image, left) = (template - r, capped(r));
+                let image = template - r;
                 sums.residuals_m.push(r.abs());
-                sums.image += capped(image);
-                sums.template += capped(template);
-                sums.left += left;
-                *if image.abs() > template.abs() { &mut sums.foreign } else { &mut sums.missing } += left;
+                sums.left += product(r, r);
+                let products = [product(image, image), product(image, template), product(template, template)];
+                sums.products.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
             });
         }
         sums
@@ -162,7 +158,18 @@ impl Relief {
 
     /// Share of the membranes' relief that the template explains, at most 1; 0 where there is none.
     pub(super) fn explained(&self) -> f64 {
-        if self.image > 0.0 { 1.0 - self.left / self.image } else { 0.0 }
+        if self.products[0] > 0.0 { 1.0 - self.left / self.products[0] } else { 0.0 }
+    }
+
+    /// Correlation of the membranes' relief with the template's, -1 to 1; 0 where one of them has none.
+    pub(super) fn likeness(&self) -> f64 {
+        let [own, both, template] = self.products;
+        if own > 0.0 && template > 0.0 { both / (own * template).sqrt() } else { 0.0 }
+    }
+
+    /// Mean of what is left, as a share of the kernel's square.
+    pub(super) fn misfit(&self) -> f64 {
+        self.left / self.residuals_m.len().max(1) as f64
     }
 }
 

@@ -1,14 +1,15 @@
-//! Evidence for and against a pose that needs no truth: what the tool explains of contact and membrane, and what it does not.
+//! Evidence for and against a pose that needs no truth: what the tool explains of contact and membrane, what fits better
+//! otherwise, and how well the pose is determined.
 
 use serde::{Deserialize, Serialize};
 
 use super::JointConfig;
-use super::cost::{Relief, noise_m};
-use super::problem::Problem;
-use super::smooth::BANDS;
-use crate::align::Scene;
+use super::cost::{Joint, Relief};
+use super::problem::{Patches, Problem};
+use super::uncertainty::Uncertainty;
 use crate::align::batch::State;
-use crate::frames::PlanarPose;
+use crate::align::search::{Cost, Progress, minimize};
+use crate::align::{AlignReport, Basis, Contacts, PadImage, Scene};
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
 
@@ -17,41 +18,77 @@ const ON_TOOL_M: f64 = 1e-3;
 /// Most contact points that are looked at.
 const POINTS: usize = 1024;
 
-/// Places of the membranes that are compared in each band.
-const PLACES: usize = 800;
-/// Widths of the kernels, meters, band by band: what noise and the template's own error leave there.
-const KERNELS_M: [f64; BANDS.len()] = [1e-3, 0.5e-3, 0.25e-3];
+/// Band in which reliefs are compared: wide enough for what the mask of pixels and the membrane's law do to the relief, and
+/// narrow enough to be the tool's. Its kernel, meters, and its places.
+const LOOK: Look = Look { band: 1, kernel_m: 1e-3, places: 800 };
+/// Steps of a descent from the pose to where membranes would have it, coarse to fine.
+const DESCENT: [Look; 3] = [
+    Look { band: 0, kernel_m: 4e-3, places: 200 },
+    Look { band: 1, kernel_m: 1e-3, places: 300 },
+    Look { band: 2, kernel_m: 0.5e-3, places: 600 },
+];
+const STEPS: usize = 20;
+/// Step that moves no point by more than about this ends a descent, meters.
+const STEP_M: f64 = 2e-5;
 
 /// Evidence for and against a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Evidence {
     /// Share of all contact points with a place that lie on the tool, 0 to 1. 0 without any.
     pub on_tool: f64,
-    /// The membranes' part, from wide bands of lengths to narrow ones, where their images are known and show where the
-    /// membranes would meet.
-    pub membrane: Option<[BandEvidence; BANDS.len()]>,
+    /// The membranes' part, where their images are known and show where the membranes would meet.
+    pub membrane: Option<MembraneEvidence>,
+    /// Spread of the errors that the pose may have.
+    pub uncertainty: Uncertainty,
 }
 
-/// Relief of the membranes that the tool explains in one band of lengths. Squared heights are capped by a kernel, so that a few
-/// pixels that are far off decide nothing.
+/// Evidence of the membranes about a pose.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BandEvidence {
-    /// Share of the relief that the tool explains, at most 1; that of the finger with the smaller share.
-    pub explained: f64,
-    /// Share of the relief that the membranes have and the tool would not make, 0 to 1.
-    pub foreign: f64,
-    /// Share of the relief that the tool would make and the membranes lack, 0 to 1.
-    pub missing: f64,
-    /// 1.48 times the median residual, meters.
-    pub noise_m: f64,
+pub struct MembraneEvidence {
+    /// Likeness of their relief to the relief that the tool would make: correlation in the lengths of 1 to 3 mm, -1 to 1.
+    /// That of the finger with the smaller one.
+    pub likeness: f64,
+    /// Pose near by that they would have without the mask.
+    pub own: Elsewhere,
+    /// Poses that the fingers would have each alone, where there are two.
+    pub fingers: Option<Elsewhere>,
+    /// Misfit that goes away if the images of the two fingers are exchanged, as a share, in the best pose for that. Below 0
+    /// where they fit better as they are. `None` unless there are two fingers of one size.
+    pub swapped: Option<f64>,
+}
+
+/// Poses that fit better, and how far apart they are.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Elsewhere {
+    /// Difference of the angles, radians.
+    pub angle_rad: f64,
+    /// Distance of the tool's point in the middle of the contact, meters.
+    pub position_m: f64,
+    /// Misfit that goes away, as a share, 0 to 1; of the finger that gains more.
+    pub gain: f64,
+}
+
+impl Elsewhere {
+    fn between(a: State, b: State, gain: f64) -> Self {
+        let turned = crate::units::angle_error(a.phi, b.phi).abs();
+        Self { angle_rad: turned, position_m: a.place.distance(b.place), gain: gain.clamp(0.0, 1.0) }
+    }
+}
+
+/// Way to compare membranes with templates.
+struct Look {
+    band: usize,
+    kernel_m: f64,
+    places: usize,
 }
 
 impl Evidence {
-    /// The evidence at `grasp_from_object`. Some tenths of a millisecond, and the first time for a tool what its templates
-    /// take.
-    pub fn at(scene: &Scene<'_>, tool: &ToolModel, grasp_from_object: PlanarPose) -> Self {
+    /// The evidence about the answer of a registration. About a millisecond, and the first time for a tool what its
+    /// templates take.
+    pub fn about(scene: &Scene<'_>, tool: &ToolModel, report: &AlignReport) -> Self {
+        let pose = report.grasp_from_object;
         let finite: Vec<_> = scene.yz().iter().filter(|p| p.is_finite()).collect();
-        let object_from_grasp = grasp_from_object.inverse();
+        let object_from_grasp = pose.inverse();
         let chosen = spread(finite.len(), POINTS);
         let on = chosen
             .iter()
@@ -59,28 +96,66 @@ impl Evidence {
         let on_tool = on.count() as f64 / chosen.len().max(1) as f64;
         let config = JointConfig::default();
         let problem = Problem::new(scene, tool, &config).ok().flatten();
-        let bands = |problem: Problem<'_>| std::array::from_fn(|band| problem.evidence(grasp_from_object, band));
-        Self { on_tool, membrane: problem.map(bands) }
+        let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
+        let by_membrane = matches!(report.joint.map(|fit| fit.basis), Some(Basis::Both | Basis::Membrane));
+        let uncertainty = match (&problem, found) {
+            (Some(problem), _) if by_membrane => problem.uncertainty(pose),
+            (Some(problem), Some((_, own))) => Uncertainty::of_mask(scene.yz(), &tool.field, pose)
+                .with_other(pose, own.to_pose(problem.centroid())),
+            _ => Uncertainty::of_mask(scene.yz(), &tool.field, pose),
+        };
+        let membrane = found.map(|(evidence, _)| evidence);
+        Self { on_tool, membrane, uncertainty }
     }
-}
-
-fn share(part: f64, of: f64) -> f64 {
-    if of > 0.0 { part / of } else { 0.0 }
 }
 
 impl Problem<'_> {
-    /// The evidence of the membranes at a pose.
-    fn evidence(&self, grasp_from_object: PlanarPose, band: usize) -> BandEvidence {
-        let state = State::from_pose(grasp_from_object, self.centroid());
-        let patches = self.patches_of(band, PLACES);
-        let fingers: Vec<Relief> = patches.chunks(1).map(|patch| Relief::of(patch, state, KERNELS_M[band])).collect();
-        let sum = |of: fn(&Relief) -> f64| fingers.iter().map(of).sum::<f64>();
-        let seen = fingers.iter().filter(|finger| !finger.residuals_m.is_empty());
-        BandEvidence {
-            explained: seen.map(Relief::explained).fold(1.0, f64::min),
-            foreign: share(sum(|r| r.foreign), sum(|r| r.image)),
-            missing: share(sum(|r| r.missing), sum(|r| r.template)),
-            noise_m: noise_m(fingers.into_iter().flat_map(|finger| finger.residuals_m).collect()),
-        }
+    /// The evidence of the membranes about a pose, and the pose near by that they would have without the mask.
+    fn evidence(&self, scene: &Scene<'_>, at: State) -> (MembraneEvidence, State) {
+        let look = self.patches_of(LOOK.band, LOOK.places);
+        let likeness = look
+            .chunks(1)
+            .filter(|finger| finger[0].1.len() > 0)
+            .map(|finger| Relief::of(finger, at, LOOK.kernel_m).likeness())
+            .fold(1.0, f64::min);
+        let descent = DESCENT.map(|look| (self.patches_of(look.band, look.places), look.kernel_m));
+        let all = 0..descent[0].0.len();
+        let (own, gain) = descend(&descent, all.clone(), at);
+        let alone: Vec<(State, f64)> = all.map(|finger| descend(&descent, finger..finger + 1, own)).collect();
+        let fingers = match alone[..] {
+            [(right, gain_right), (left, gain_left)] => {
+                Some(Elsewhere::between(right, left, gain_right.max(gain_left)))
+            }
+            _ => None,
+        };
+        let misfit = Relief::of(&look, at, LOOK.kernel_m).misfit();
+        let swapped = self.swapped_misfit(scene).filter(|_| misfit > 0.0).map(|swapped| 1.0 - swapped / misfit);
+        (MembraneEvidence { likeness, own: Elsewhere::between(at, own, gain), fingers, swapped }, own)
     }
+
+    /// Misfit in the best pose for the images of two fingers exchanged.
+    fn swapped_misfit(&self, scene: &Scene<'_>) -> Option<f64> {
+        let [a, b] = scene.images() else { return None };
+        if a.imprint.size() != b.imprint.size() {
+            return None;
+        }
+        let images =
+            [PadImage { imprint: b.imprint, camera: a.camera }, PadImage { imprint: a.imprint, camera: b.camera }];
+        let scene = Scene::new(Contacts { points: &[], images: &images });
+        let swapped = Problem::new(&scene, self.tool(), self.config()).ok()??;
+        let end = swapped.solve().end();
+        Some(Relief::of(&swapped.patches_of(LOOK.band, LOOK.places), end, LOOK.kernel_m).misfit())
+    }
+}
+
+/// End of a descent of some fingers alone, without the mask, and the share of their misfit that went away.
+fn descend(descent: &[(Patches<'_>, f64)], fingers: std::ops::Range<usize>, from: State) -> (State, f64) {
+    let mut at = Progress::new(from);
+    let (mut before, mut after) = (0.0, 0.0);
+    for (patches, kernel_m) in descent {
+        let mut joint = Joint { fingers: &patches[fingers.clone()], kernel_m: *kernel_m, mask: None, lookups: 0 };
+        before = joint.sums(from).cost;
+        after = minimize(&mut joint, &mut at, STEPS, STEP_M).cost;
+    }
+    (at.state, if before > 0.0 { 1.0 - after / before } else { 0.0 })
 }

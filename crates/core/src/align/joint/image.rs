@@ -31,6 +31,9 @@ const MIN_PIXELS: usize = 64;
 /// Least weight under the narrowest Gaussian, of 1 where there is a pixel for each node.
 const MIN_WEIGHT: f32 = 0.05;
 
+/// Greatest weight of a node, in pixels.
+const NODE_WEIGHT: f32 = 1.0;
+
 /// The image of one finger.
 pub(super) struct Image {
     /// The sign of x on the finger's side of the middle plane.
@@ -267,6 +270,13 @@ impl Splat {
                     let nearest = at + usize::from(fy >= 0.5) + columns * usize::from(fz >= 0.5);
                     splat.inside[nearest] = true;
                 }
+            }
+        }
+        // A slope that faces the camera has more pixels than one that is turned away, and counts no more for that.
+        for (weight, weighted) in splat.weight.values.iter_mut().zip(&mut splat.weighted.values) {
+            if *weight > NODE_WEIGHT {
+                *weighted *= NODE_WEIGHT / *weight;
+                *weight = NODE_WEIGHT;
             }
         }
         splat

@@ -62,7 +62,7 @@ struct Finger {
 }
 
 /// The patches of the fingers in one band.
-type Patches<'p> = Vec<(&'p BandField, Patch)>;
+pub(super) type Patches<'p> = Vec<(&'p BandField, Patch)>;
 
 /// A question prepared for every band.
 pub(super) struct Problem<'a> {
@@ -86,6 +86,13 @@ pub(super) struct Answer {
     lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
+}
+
+impl Answer {
+    /// State of the answer.
+    pub(super) fn end(&self) -> State {
+        self.runs[self.winner].state
+    }
 }
 
 /// Descents with what they cost and left behind.
@@ -174,6 +181,14 @@ impl<'a> Problem<'a> {
     /// The point about which everything turns, `(y, z)`, meters.
     pub(super) fn centroid(&self) -> DVec2 {
         self.centroid
+    }
+
+    pub(super) fn tool(&self) -> &ToolModel {
+        self.tool
+    }
+
+    pub(super) fn config(&self) -> &JointConfig {
+        self.config
     }
 
     /// Leaves the mask out from now on; whether there was one.
@@ -337,6 +352,7 @@ impl<'a> Problem<'a> {
             within_prior: config.mask.prior.allows(pose),
             observability: seen,
             joint: Some(answer.fit),
+            evidence: None,
             directions: None,
             trace: answer.trace,
             fits,

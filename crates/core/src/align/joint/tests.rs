@@ -7,6 +7,8 @@ use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
 use crate::align::{Contacts, Evidence, PadImage};
+use crate::pose::register_with;
+use crate::verdict::{Grade, Verdict};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
@@ -169,27 +171,59 @@ fn the_slope_of_the_joint_cost_is_its_derivative() {
     assert_eq!(joint.lookups, 9 * 296);
 }
 
+/// The answer about a touch with another tool's model or its own, with evidence and verdict.
+fn judged(touch: &Touch, tool: &ToolModel) -> (AlignReport, Verdict) {
+    let (points, images) = (touch.points(), touch.images());
+    let contacts = Contacts { points: &points, images: &images };
+    let ask = Ask { evidence: true, ..Ask::default() };
+    let report = register_with(&JointConfig::default(), contacts, tool, ask).unwrap();
+    let verdict = Verdict::of(&report).unwrap();
+    (report, verdict)
+}
+
 #[test]
-fn the_evidence_tells_the_right_tool_from_another_and_a_blank_finger_without_truth() {
+fn the_verdict_tells_another_tool_a_blank_finger_and_swapped_ones_without_truth() {
     for (tool, other, seed) in [(0, 7, 3), (3, 0, 4), (7, 3, 5)] {
         let mut touch = Touch::new(tool, seed);
-        let at = |touch: &Touch, tool: &ToolModel| {
-            let contacts = Contacts { points: &touch.points(), images: &touch.images() };
-            let scene = Scene::new(contacts);
-            let pose = JointConfig::default().run(&scene, tool, Ask::default()).unwrap().grasp_from_object;
-            Evidence::at(&scene, tool, pose)
-        };
-        let middle = |evidence: Evidence| evidence.membrane.unwrap()[1];
-        let right = at(&touch, &touch.tool);
-        let wrong = at(&touch, &ToolModel::new(tools()[other].mesh()).unwrap());
-        assert!(right.on_tool > 0.8 && wrong.on_tool < right.on_tool - 0.05, "{right:?} {wrong:?}");
-        assert!(middle(right).explained > 0.3 && middle(wrong).explained < 0.7 * middle(right).explained);
-        assert!(right.membrane.unwrap().iter().all(|band| (0.0..=1.0).contains(&band.missing)));
+        let (right, good) = judged(&touch, &touch.tool);
+        assert_eq!(good.grade, Grade::Good, "{good:?} {:?}", right.evidence);
+        assert!(good.against.is_empty() && good.why.contains("like the tool's"), "{good:?}");
+        let (_, wrong) = judged(&touch, &ToolModel::new(tools()[other].mesh()).unwrap());
+        assert_eq!(wrong.grade, Grade::Wrong, "{wrong:?}");
+        touch.imprints.reverse();
+        touch.masks.reverse();
+        let (_, swapped) = judged(&touch, &touch.tool);
+        let said = |verdict: &Verdict, what: &str| verdict.against.iter().any(|sign| sign.what.contains(what));
+        assert!(swapped.grade == Grade::Wrong && said(&swapped, "swapped"), "{swapped:?}");
         touch.imprints[1].as_mut_slice().fill(0.0);
         touch.masks[1].as_mut_slice().fill(false);
-        let blank = at(&touch, &touch.tool);
-        assert!(middle(blank).explained < 0.0 && middle(blank).missing > middle(right).missing, "{blank:?}");
+        let (_, blank) = judged(&touch, &touch.tool);
+        assert_eq!(blank.grade, Grade::Wrong, "{blank:?}");
     }
-    let nothing = Evidence::at(&Scene::new(&[][..]), &Touch::new(0, 3).tool, PlanarPose::default());
-    assert_eq!(nothing, Evidence { on_tool: 0.0, membrane: None });
+}
+
+#[test]
+fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
+    let touch = Touch::new(0, 3);
+    let (report, _) = judged(&touch, &touch.tool);
+    let told = report.evidence.unwrap().uncertainty;
+    assert!((0.1..1.5).contains(&told.angle_rad().to_degrees()), "{told:?}");
+    let [long, short] = told.half_axes(report.grasp_from_object);
+    assert!(long.length() >= short.length() && long.length() < 1e-3 && long.dot(short).abs() < 1e-12, "{told:?}");
+    // A rod is free along itself, as far as the gripper is.
+    let rod = tools().iter().position(|tool| tool.name.ends_with("_rod")).unwrap();
+    let touch = Touch::new(rod, 2);
+    let (report, verdict) = judged(&touch, &touch.tool);
+    let told = report.evidence.unwrap().uncertainty;
+    let [long, short] = told.half_axes(report.grasp_from_object);
+    let along = DVec2::from_angle(report.grasp_from_object.theta_rad).perp();
+    assert!(long.length() > 2e-3 && short.length() < 1e-3, "{long} {short}");
+    assert!(long.normalize().dot(along).abs() > 0.98, "{long} {along}");
+    assert!(verdict.grade >= Grade::Check && told.angle_rad().to_degrees() < 3.0, "{verdict:?}");
+    // Of nothing, all that is known is what a gripper can hold.
+    let nothing = Scene::new(&[][..]);
+    let report = AlignReport { joint: None, grasp_from_object: PlanarPose::default(), ..report };
+    let evidence = Evidence::about(&nothing, &touch.tool, &report);
+    assert_eq!((evidence.on_tool, evidence.membrane), (0.0, None));
+    assert!((evidence.uncertainty.angle_rad().to_degrees() - 13.0).abs() < 0.1, "{evidence:?}");
 }

@@ -233,17 +233,17 @@ fn every_rung_is_reached_by_the_scene_that_needs_it() {
         assert_eq!(report.certificate.is_some(), report.rung == Certified);
         let (angle, _) = errors(report.grasp_from_object, pose(8.0, 0.001, -0.002));
         assert!(angle < 1.5, "{angle} deg on the rung {}", report.rung);
-        report.ladder.iter().map(|a| (a.rung, a.verdict)).collect::<Vec<_>>()
+        report.ladder.iter().map(|a| (a.rung, a.outcome)).collect::<Vec<_>>()
     };
     let config = AlignConfig::default();
-    assert_eq!(climb(&with_blob(0.0), &config), [(Single, Verdict::Accepted)]);
+    assert_eq!(climb(&with_blob(0.0), &config), [(Single, Outcome::Accepted)]);
     // A fifth is a bad mask: five starts agree, and the answer is believed.
-    assert_eq!(climb(&with_blob(0.225), &config), [(Single, Verdict::Cost), (Several, Verdict::Accepted)]);
+    assert_eq!(climb(&with_blob(0.225), &config), [(Single, Outcome::Cost), (Several, Outcome::Accepted)]);
     // A third is too much for every test: all is searched, and the answer carries its proof.
     let refused = climb(&with_blob(0.33), &config);
     assert_eq!(refused.iter().map(|a| a.0).collect::<Vec<_>>(), [Single, Several, Grid, Certified]);
-    assert!(refused[..3].iter().all(|a| matches!(a.1, Verdict::Cost | Verdict::OutsidePrior)), "{refused:?}");
-    assert_eq!(refused[3].1, Verdict::Last);
+    assert!(refused[..3].iter().all(|a| matches!(a.1, Outcome::Cost | Outcome::OutsidePrior)), "{refused:?}");
+    assert_eq!(refused[3].1, Outcome::Last);
 }
 
 #[test]
@@ -269,8 +269,8 @@ fn a_far_pose_is_found_by_more_starts() {
     for second in [Rung::Several, Rung::Grid] {
         let config = AlignConfig { rungs: vec![Rung::Single, second], prior, ..AlignConfig::default() };
         let report = align(&points, field(), &config).unwrap();
-        let climbed: Vec<_> = report.ladder.iter().map(|a| (a.rung, a.verdict)).collect();
-        assert_eq!(climbed, [(Rung::Single, Verdict::OutsidePrior), (second, Verdict::Accepted)]);
+        let climbed: Vec<_> = report.ladder.iter().map(|a| (a.rung, a.outcome)).collect();
+        assert_eq!(climbed, [(Rung::Single, Outcome::OutsidePrior), (second, Outcome::Accepted)]);
         let (angle, shift) = errors(report.grasp_from_object, truth);
         assert!(angle < 0.5 && shift < 3e-4, "{angle} deg, {shift} m");
     }
@@ -281,7 +281,7 @@ fn a_single_rung_is_taken_as_it_is() {
     for rung in [Rung::Single, Rung::Several, Rung::Grid, Rung::Certified] {
         let config = AlignConfig { rungs: vec![rung], ..AlignConfig::default() };
         let report = align(&with_blob(0.33), field(), &config).unwrap();
-        assert_eq!((report.rung, report.ladder.len(), report.ladder[0].verdict), (rung, 1, Verdict::Last));
+        assert_eq!((report.rung, report.ladder.len(), report.ladder[0].outcome), (rung, 1, Outcome::Last));
         assert!(rung.to_string().len() > 3 && report.ladder[0].cost_m2 > 0.2e-6);
         assert_eq!((report.trace.capacity(), report.fits.capacity()), (0, 0));
         let recorded = align(&with_blob(0.33), field(), &AlignConfig { record: true, ..config }).unwrap();
@@ -296,5 +296,5 @@ fn a_rod_does_not_climb() {
     let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, pose(9.0, 0.001, 0.0), 3e-4, 1);
     let report = align(&points, &rod, &AlignConfig::default()).unwrap();
     assert!(report.is_degenerate());
-    assert_eq!((report.rung, report.ladder[0].verdict), (Rung::Single, Verdict::Last));
+    assert_eq!((report.rung, report.ladder[0].outcome), (Rung::Single, Outcome::Last));
 }

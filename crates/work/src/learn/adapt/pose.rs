@@ -10,6 +10,7 @@ use crate::labels::PairLabels;
 use crate::models::Models;
 use crate::recipe::Stage;
 use crate::tool::Tools;
+use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
@@ -50,7 +51,8 @@ pub(super) fn angles(
         // What people drew on a prediction is of that picture, and each of these is another one.
         let nothing = PairLabels::default();
         let touch = Touch { dataset, pair: first.id, sample: &sample, tool: Ok(tool), labels: &nothing };
-        let felt = Felt::of_imprints(&setup.recipe, imprints).reach(touch, Stage::Pose, models, &cx.quiet());
+        let felt = Felt::of_imprints(&setup.recipe, imprints);
+        let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, &cx.quiet());
         let error = felt.ok().and_then(|felt| felt.pose().ok()?.error_rad);
         errors.push(error.unwrap_or(f64::NAN));
     }

@@ -29,7 +29,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.

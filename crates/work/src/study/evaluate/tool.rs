@@ -31,6 +31,7 @@ use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ss
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
+use touch2touch_core::verdict::Grade;
 
 /// A prediction that waits for its image figures.
 struct Image {
@@ -179,17 +180,17 @@ impl<'a> Tool<'a> {
                 kept.push(Masked { case, made, felt, otherwise, doubt });
             }
             // Poses on all cores; the models run one by one.
-            let angles: Vec<Result<Option<f64>, String>> = kept
+            let angles: Vec<Result<Judged, String>> = kept
                 .par_iter()
                 .map(|Masked { case, made, felt, .. }| {
                     // A color picture has no depth, so there is nothing that could fail.
-                    let Some(felt) = felt.clone().filter(|_| made.colors.is_empty()) else { return Ok(None) };
+                    let Some(felt) = felt.clone().filter(|_| made.colors.is_empty()) else { return Ok((None, None)) };
                     guarded(|| self.angle(felt, self.touch(case, &labels), by_models, cx))
                 })
                 .collect();
             for (Masked { case, made, otherwise, doubt, .. }, angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
-                let (angle_error_rad, mut images) = match scored {
+                let ((angle_error_rad, verdict), mut images) = match scored {
                     Ok(scored) => scored,
                     Err(why) => {
                         skip(case, why);
@@ -208,6 +209,7 @@ impl<'a> Tool<'a> {
                     scale: if made.colors.is_empty() { case.sample.scale } else { Scale::Measured },
                     images: Vec::new(),
                     angle_error_rad,
+                    verdict,
                     seconds: made.seconds,
                     doubt,
                     seed_spread_m: None,
@@ -233,13 +235,22 @@ impl<'a> Tool<'a> {
         }
     }
 
-    /// The error of the angle from both fingers: NaN without a pose, `None` where there can be none.
-    fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Option<f64>, String> {
+    /// The error of the angle from both fingers and the verdict on the pose.
+    fn angle(
+        &self,
+        felt: Felt,
+        touch: Touch<'_>,
+        models: &models::Models,
+        cx: &JobCx,
+    ) -> Result<Judged, String> {
         if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
-            return Ok(None);
+            return Ok((None, None));
         }
         let felt = felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why)?;
-        Ok(Some(felt.pose().ok().and_then(|found| found.error_rad).unwrap_or(f64::NAN)))
+        let found = felt.pose().ok();
+        let verdict = found.and_then(|found| Some(found.verdict.as_ref()?.grade));
+        let error = touch.sample.grasp_from_object.map(|_| found.and_then(|found| found.error_rad).unwrap_or(f64::NAN));
+        Ok((error, verdict))
     }
 
     /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
@@ -291,6 +302,9 @@ impl<'a> Tool<'a> {
         all
     }
 }
+
+/// Error of the angle, radians (NaN without a pose, `None` where there can be none), and the verdict on the pose.
+type Judged = (Option<f64>, Option<Grade>);
 
 /// The images of a grasp, made once more.
 pub(super) struct Again {
