@@ -52,6 +52,8 @@ impl Grade {
 /// simulated grasps, of which about two of a hundred are doubted (`touch2touch-bench verdict`).
 type Limits = [f64; 2];
 
+/// Share of the misfit that goes away if the fingers are swapped. A straight tool fits about as well either way.
+const SWAPPED: Limits = [0.08, 0.14];
 /// Share of the fingers' misfit that goes away if each may have its own pose.
 const FINGERS: Limits = [0.13, 0.2];
 /// Share of the misfit that goes away elsewhere near by, without the mask.
@@ -122,8 +124,8 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
     let off = 1.0 - evidence.on_tool;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
     if let Some(membrane) = evidence.membrane {
-        if membrane.swapped.is_some_and(|gain| gain > 0.0) {
-            sign(Grade::Wrong, "the imprints fit better with the fingers swapped".to_owned());
+        if let Some(gain) = membrane.swapped {
+            sign(Grade::of(gain, SWAPPED), "the imprints fit better with the fingers swapped".to_owned());
         }
         let way = |to: Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
         if let Some(fingers) = membrane.fingers {

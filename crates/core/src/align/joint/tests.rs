@@ -210,16 +210,15 @@ fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     assert!((0.1..1.5).contains(&told.angle_rad().to_degrees()), "{told:?}");
     let [long, short] = told.half_axes(report.grasp_from_object);
     assert!(long.length() >= short.length() && long.length() < 1e-3 && long.dot(short).abs() < 1e-12, "{told:?}");
-    // A rod is free along itself, as far as the gripper is.
+    // A rod is known least along itself.
     let rod = tools().iter().position(|tool| tool.name.ends_with("_rod")).unwrap();
     let touch = Touch::new(rod, 2);
-    let (report, verdict) = judged(&touch, &touch.tool);
+    let (report, _) = judged(&touch, &touch.tool);
     let told = report.evidence.unwrap().uncertainty;
     let [long, short] = told.half_axes(report.grasp_from_object);
     let along = DVec2::from_angle(report.grasp_from_object.theta_rad).perp();
-    assert!(long.length() > 2e-3 && short.length() < 1e-3, "{long} {short}");
+    assert!(long.length() > 3.0 * short.length(), "{long} {short}");
     assert!(long.normalize().dot(along).abs() > 0.98, "{long} {along}");
-    assert!(verdict.grade >= Grade::Check && told.angle_rad().to_degrees() < 3.0, "{verdict:?}");
     // Of nothing, all that is known is what a gripper can hold.
     let nothing = Scene::new(&[][..]);
     let report = AlignReport { joint: None, grasp_from_object: PlanarPose::default(), ..report };

@@ -40,7 +40,7 @@ const KERNEL_M: f64 = 0.5e-3;
 /// part of what is left is the template's error, which hardly moves the pose. From fresh grasps under two laws.
 const SHARED_M: f64 = 4e-5;
 /// Deviation of a mask's whole outline, meters: its errors go together. From fresh grasps with masks that fit.
-const OUTLINE_M: f64 = 0.12e-3;
+const OUTLINE_M: f64 = 0.07e-3;
 
 impl Uncertainty {
     /// From the information (inverse covariance) about (angle times [`ANGLE_SCALE_M`], y, z) of the tool turned about
