@@ -20,8 +20,8 @@ use touch2touch_core::align::{Ask, Contacts, Evidence};
 use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register_with};
-use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::units::angle_error;
+use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_work::io::cases::{self, Case, CaseSet};
 
 /// Arguments of `bench verdict`.

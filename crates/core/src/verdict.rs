@@ -13,7 +13,18 @@ const PLACE_M: [f64; 2] = [1e-3, 5e-3];
 
 /// Grade of a pose by how much it can be relied on; a later one is worse.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter, strum::Display,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::Display,
     strum::EnumString,
 )]
 #[serde(rename_all = "snake_case")]
@@ -59,17 +70,17 @@ const FINGERS: Limits = [0.13, 0.2];
 /// Share of the misfit that goes away elsewhere near by, without the mask.
 const ELSEWHERE: Limits = [0.1, 0.3];
 /// One minus likeness plus [`OFF_COUNTS`] times the share of contact off the tool.
-const MISFIT: Limits = [0.6, 0.72];
+const MISFIT: Limits = [0.66, 0.75];
 /// Contact off the tool beside a like relief: the mask may be at fault.
 const OFF_COUNTS: f64 = 0.85;
 /// Of the contact off the tool no more than this share makes a pose wrong by itself.
 const OFF_CAP: f64 = 0.3;
 /// Share of contact off the tool.
-const OFF: Limits = [0.45, f64::INFINITY];
+const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the angle, radians.
 const SPREAD_RAD: Limits = [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI];
 /// Standard deviation of the place where it is known least, meters.
-const SPREAD_M: Limits = [1.5e-3, f64::INFINITY];
+const SPREAD_M: Limits = [2e-3, f64::INFINITY];
 
 /// Verdict on a pose: all that speaks against it, without the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -129,9 +140,10 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
         }
         let way = |to: Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
         if let Some(fingers) = membrane.fingers {
-            let what =
-                format!("the fingers are {} apart: a camera is off, or an imprint is of another grasp", way(fingers));
-            sign(Grade::of(fingers.gain, FINGERS), what);
+            sign(
+                Grade::of(fingers.gain, FINGERS),
+                format!("the fingers do not agree: they are {} apart", way(fingers)),
+            );
         }
         let what = format!("the membranes fit better {} from here: look at the mask", way(membrane.own));
         sign(Grade::of(membrane.own.gain, ELSEWHERE), what);

@@ -16,8 +16,8 @@ use crate::app::workbench::{Layer, WorkbenchCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section};
 use crate::ui::parts::widget::line::Line;
-use touch2touch_core::align::Observability;
 use touch2touch_core::align::reason::Reason;
+use touch2touch_core::align::{Observability, Uncertainty};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::units;
 use touch2touch_work::layers::LayerResult;
@@ -81,7 +81,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             if let Some(pose) = results::pose(cx.state, source).shown()
                 && let Some(o) = &pose.report.observability
             {
-                observability(cx, ui, o, pose.rms_m);
+                observability(cx, ui, o, pose.report.evidence.map(|evidence| evidence.uncertainty));
             }
         });
     });
@@ -221,7 +221,7 @@ fn directions(cx: &Cx<'_>, ui: &mut Ui, layers: &LayerResult) {
     }
 }
 
-fn observability(cx: &mut Cx<'_>, ui: &mut Ui, o: &Observability, noise_m: f64) {
+fn observability(cx: &mut Cx<'_>, ui: &mut Ui, o: &Observability, told: Option<Uncertainty>) {
     ui.add_space(2.0);
     ui.horizontal(|ui| {
         ui.label(section("Observability", cx.p));
@@ -246,11 +246,13 @@ fn observability(cx: &mut Cx<'_>, ui: &mut Ui, o: &Observability, noise_m: f64) 
                 .on_hover_text("The contact points leave a motion of the tool open: its pose is not determined");
         }
     });
-    let [turn, y, z] = o.deviations(noise_m);
-    let text = format!("1σ  y {:.2} mm   z {:.2} mm   angle {:.2}°", units::mm(y), units::mm(z), turn.to_degrees());
-    ui.label(caption(text, cx.p)).on_hover_text(
-        "Standard deviations from the planar covariance, if residuals were independent noise; a wrong mask does more",
-    );
+    if let Some(told) = told {
+        let [turn, y, z] = [0, 1, 2].map(|i| told.covariance[i][i].sqrt());
+        let text = format!("1σ  y {:.2} mm   z {:.2} mm   angle {:.2}°", units::mm(y), units::mm(z), turn.to_degrees());
+        ui.label(caption(text, cx.p)).on_hover_text(
+            "Standard deviations of the pose: of the fit's curvature and noise, the cameras' mounting, and what a gripper holds",
+        );
+    }
     let [a, b, c] = o.eigenvalues;
     ui.label(caption(format!("Eigenvalues {a:.4}  {b:.3}  {c:.3}   {} points tell", o.telling), cx.p)).on_hover_text(
         "Of the scaled curvature of the fit per point near the outline; the smallest below 0.015 counts as degenerate",

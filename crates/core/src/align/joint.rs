@@ -24,8 +24,8 @@ use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
-pub use uncertainty::Uncertainty;
 use problem::{Problem, check};
+pub use uncertainty::Uncertainty;
 
 /// Choices of the registration by membrane and mask. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

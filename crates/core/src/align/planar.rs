@@ -17,8 +17,8 @@ use super::certify::certify;
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
-    AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, Observability, PointFit, Prior, Run, Rung,
-    RungAttempt, Outcome, clean,
+    AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, Observability, Outcome, PointFit, Prior, Run,
+    Rung, RungAttempt, clean,
 };
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;

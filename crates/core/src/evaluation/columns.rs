@@ -125,9 +125,12 @@ pub(super) static COLUMNS: &[Column] = &[
             Some(angles(tool)?.success_10)
         })
     },
-    percent("good %", "verdict_good", "Share of grasps whose pose the verdict calls good, without the truth, percent", |tool| {
-        mean(tool.iter().filter_map(|g| g.verdict).map(|grade| if grade == Grade::Good { 100.0 } else { 0.0 }))
-    }),
+    percent(
+        "good %",
+        "verdict_good",
+        "Share of grasps whose pose the verdict calls good, without the truth, percent",
+        |tool| mean(tool.iter().filter_map(|g| g.verdict).map(|grade| if grade == Grade::Good { 100.0 } else { 0.0 })),
+    ),
     percent("tool %", "tool_accuracy", "Share of imprints whose tool the classifier names, percent", |tool| {
         mean(images(tool).filter_map(|i| i.tool_right).map(|right| if right { 100.0 } else { 0.0 }))
     }),

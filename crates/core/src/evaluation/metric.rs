@@ -361,7 +361,9 @@ mod tests {
         assert!(passes("verdict>good", check) && passes("verdict<=check", good) && !passes("verdict<wrong", wrong));
         let of = Condition::parse("measured:angle>=2").unwrap();
         assert_eq!((of.source.as_str(), of.metric), ("measured", Metric::Angle));
-        for word in ["angle", "verdict=bad", "tool:rod", "angle>", "angle>x", "size>3", ">5", "angle>nan", "", "a:b:angle"] {
+        for word in
+            ["angle", "verdict=bad", "tool:rod", "angle>", "angle>x", "size>3", ">5", "angle>nan", "", "a:b:angle"]
+        {
             assert_eq!(Condition::parse(word), None, "{word}");
         }
         for metric in Metric::iter() {

@@ -23,11 +23,8 @@ use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::verdict::Grade;
 
-/// Change of the contact distances (root mean square) that the drawn ellipse stands for, meters.
-pub(crate) const ELLIPSE_TOLERANCE_M: f64 = 5e-4;
-/// Longest half axis drawn, meters.
-const ELLIPSE_LIMIT_M: f64 = 0.012;
 /// Time of one sway to and fro, seconds.
 const SWAY_S: f64 = 2.0;
 
@@ -162,47 +159,40 @@ pub(super) fn swayed(cx: &Cx<'_>, source: ImprintSource, pose: PlanarPose, secon
     }
 }
 
-/// The ellipse of shifts that change the fit equally, with the weakest direction as a line through it.
-pub(super) fn ellipse(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
-    let shown = cx.state.workbench.animate_weakest || cx.state.selection.panes.contains(&Pane::Layers);
-    let o = observability(cx, source).filter(|_| shown)?;
-    let ellipse = o.ellipse(ELLIPSE_TOLERANCE_M, ELLIPSE_LIMIT_M);
-    let color = if o.degenerate { cx.p.caution } else { cx.p.accent };
-    let bits = [o.center.x, o.center.y, o.eigenvalues[0], o.eigenvalues[2], o.weakest[0], o.weakest[1], o.weakest[2]];
-    let revision = bits.iter().fold(u64::from(color.r()), |hash, v| hash.rotate_left(9) ^ v.to_bits());
-    let at = |yz: DVec2| DVec3::new(0.0, yz.x, yz.y);
-    let mut segments = Vec::new();
-    let rgba = |c: Color32, alpha: u8| [c.r(), c.g(), c.b(), alpha];
-    let mut line = |a: DVec2, b: DVec2, alpha: u8| {
-        segments.push(Segment { ends: [at(o.center + a), at(o.center + b)], rgba: rgba(color, alpha) });
-    };
+/// The spread of the pose's errors as it is: the ellipse of two deviations of the place where the tool is held, and the fan of
+/// two deviations of the angle about it. Where the pose is doubted, and where one looks into a registration.
+pub(super) fn spread(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
+    /// Half length of the fan, meters; beyond this share of it an ellipse is cut off, and beyond these radians a fan.
+    const REACH_M: f64 = 0.03;
+    const WIDEST: f64 = 0.5;
     const SIDES: i32 = 48;
+    let found = results::pose(cx.state, source).shown()?;
+    let doubted = found.verdict.as_ref().is_some_and(|verdict| verdict.grade > Grade::Good);
+    let asked = cx.state.workbench.animate_weakest || cx.state.selection.panes.contains(&Pane::Layers);
+    let told = found.report.evidence.filter(|_| doubted || asked)?.uncertainty;
+    let pose = found.grasp_from_object;
+    let center = told.center;
+    let axes = told.half_axes(pose).map(|axis| (2.0 * axis).clamp_length_max(WIDEST * REACH_M));
+    let turn = (2.0 * told.angle_rad()).min(WIDEST);
+    let color = if doubted { cx.p.caution } else { cx.p.accent };
+    let bits = [center.x, center.y, axes[0].x, axes[0].y, axes[1].length(), turn, pose.theta_rad];
+    let revision = bits.iter().fold(u64::from(color.r()), |hash, v| hash.rotate_left(9) ^ v.to_bits());
+    let at = |yz: DVec2| DVec3::new(0.0, (center + yz).x, (center + yz).y);
+    let rgba = [color.r(), color.g(), color.b(), 255];
     let rim = |i: i32| {
         let (s, c) = (f64::from(i) / f64::from(SIDES) * std::f64::consts::TAU).sin_cos();
-        ellipse.half_axes[0] * c + ellipse.half_axes[1] * s
+        axes[0] * c + axes[1] * s
     };
-    for i in 0..SIDES {
-        line(rim(i), rim(i + 1), 255);
-    }
-    let [turn, y, z] = o.weakest;
-    if turn.abs() > y.hypot(z) {
-        // It turns: an arc around the center, as far as it may turn.
-        let reach = ellipse.turn_rad.min(1.2);
-        for i in -12..12 {
-            let on = |i: i32| DVec2::from_angle(reach * f64::from(i) / 12.0) * 0.015;
-            line(on(i), on(i + 1), 255);
-        }
-    } else {
-        let along = DVec2::new(y, z).normalize_or_zero() * 0.015;
-        line(-along, along, 255);
-        for end in [along, -along] {
-            for side in [0.5, -0.5] {
-                line(end, end - DVec2::from_angle(side).rotate(end) * 0.18, 255);
-            }
-        }
+    let mut segments: Vec<Segment> = (0..SIDES).map(|i| Segment { ends: [at(rim(i)), at(rim(i + 1))], rgba }).collect();
+    // About the object's z axis, both ways.
+    for side in [REACH_M, -REACH_M] {
+        let on = |share: f64| DVec2::from_angle(pose.theta_rad + share * turn).perp() * side;
+        segments.extend([-1.0, 1.0].map(|share| Segment { ends: [at(DVec2::ZERO), at(on(share))], rgba }));
+        let arc = (-4..4).map(|i| [i, i + 1].map(|i| at(on(f64::from(i) / 4.0))));
+        segments.extend(arc.map(|ends| Segment { ends, rgba }));
     }
     Some(LinesItem {
-        name: "weak motion".into(),
+        name: "spread".into(),
         revision,
         segments: segments.into(),
         style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },

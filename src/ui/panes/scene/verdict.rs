@@ -16,6 +16,7 @@ use crate::ui::parts::theme::{SMALL, grade_color};
 use touch2touch_core::align::MIN_POINTS;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
+use touch2touch_core::verdict::Grade;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
@@ -96,19 +97,23 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             let angle = pose.angle_text();
             let (mut text, color) = match &pose.verdict {
                 Some(verdict) => {
-                    (format!("{angle} · {}: {}", verdict.grade, verdict.why), grade_color(cx.p, verdict.grade))
+                    let why = if verdict.grade > Grade::Good { format!(": {}", verdict.why) } else { String::new() };
+                    (format!("{angle} · {}{why}", verdict.grade), grade_color(cx.p, verdict.grade))
                 }
                 None => (angle, cx.p.strong),
             };
             if results::provisional_pose(state, source).is_some() {
                 text += " · being proved…";
             }
-            let others = pose.verdict.iter().flat_map(|verdict| verdict.against.iter().skip(1));
-            let mut details: Vec<String> = others.map(|sign| format!("{}: {}", sign.grade, sign.what)).collect();
+            let mut details: Vec<String> = Vec::new();
+            if let Some(verdict) = &pose.verdict {
+                details.push(format!("{}: {}", verdict.grade, verdict.why));
+                details.extend(verdict.against.iter().skip(1).map(|sign| format!("{}: {}", sign.grade, sign.what)));
+            }
             details.push(format!("{}, {}", pose_details(pose), pose_time(pose)));
             if let Some(truth) = results::truth(state) {
                 let off = PoseDifference::between(pose.grasp_from_object, truth);
-                text += &format!(" · {}", difference("truly", "off", off));
+                text += &format!(" · {}", difference("off by", "", off));
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
             }
             (text, color, details)

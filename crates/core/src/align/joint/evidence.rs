@@ -100,8 +100,9 @@ impl Evidence {
         let by_membrane = matches!(report.joint.map(|fit| fit.basis), Some(Basis::Both | Basis::Membrane));
         let uncertainty = match (&problem, found) {
             (Some(problem), _) if by_membrane => problem.uncertainty(pose),
-            (Some(problem), Some((_, own))) => Uncertainty::of_mask(scene.yz(), &tool.field, pose)
-                .with_other(pose, own.to_pose(problem.centroid())),
+            (Some(problem), Some((_, own))) => {
+                Uncertainty::of_mask(scene.yz(), &tool.field, pose).with_other(pose, own.to_pose(problem.centroid()))
+            }
             _ => Uncertainty::of_mask(scene.yz(), &tool.field, pose),
         };
         let membrane = found.map(|(evidence, _)| evidence);

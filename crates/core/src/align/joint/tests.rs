@@ -7,15 +7,15 @@ use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
 use crate::align::{Contacts, Evidence, PadImage};
-use crate::pose::register_with;
-use crate::verdict::{Grade, Verdict};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
+use crate::pose::register_with;
 use crate::rig::lab;
 use crate::sample::DepthCamera;
 use crate::sim::{SimConfig, random_grasp, simulate};
 use crate::units::angle_error;
+use crate::verdict::{Grade, Verdict};
 
 /// A touch of the simulator: imprints, cameras and true contact of both fingers, the tool and the pose.
 struct Touch {

@@ -236,13 +236,7 @@ impl<'a> Tool<'a> {
     }
 
     /// The error of the angle from both fingers and the verdict on the pose.
-    fn angle(
-        &self,
-        felt: Felt,
-        touch: Touch<'_>,
-        models: &models::Models,
-        cx: &JobCx,
-    ) -> Result<Judged, String> {
+    fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Judged, String> {
         if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return Ok((None, None));
         }
