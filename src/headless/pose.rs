@@ -20,6 +20,7 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel};
 use touch2touch_work::doubts;
+use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
@@ -30,7 +31,10 @@ use touch2touch_work::tool::load_tool;
 
 use args::{Imprints, registration};
 pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
-use report::{Accepted, PoseRow, Report, summary, text};
+use report::{Accepted, PoseRow, RankedTool, Report, summary, text};
+
+/// Word of `--tool` for trying all tools.
+const ANY: &str = "any";
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
@@ -56,6 +60,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut cases = Vec::new();
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
+    let open = TaskError::new("Pose", "the tool is not known yet");
     for (id, (stem, influence)) in ids.into_iter().zip(stems) {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
@@ -68,25 +73,33 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             }
         };
         notes.take(&output, &sample.notes);
-        let Some(tool_name) = entry.tool.clone() else {
+        let names = match args.which.as_deref() {
+            Some(ANY) => dataset.index.tools(),
+            Some(name) => vec![name.to_owned()],
+            None => entry.tool.iter().cloned().collect(),
+        };
+        if names.is_empty() {
             output.note(&format!("{}: no tool is named, so there is no CAD model to align", entry.name));
+        }
+        for name in &names {
+            tools.entry(name.clone()).or_insert_with(|| match load_tool(&dataset, name) {
+                Ok(loaded) => {
+                    notes.take(&output, &loaded.notes);
+                    Some(loaded.model)
+                }
+                Err(err) => {
+                    output.note(&err.to_string());
+                    None
+                }
+            });
+        }
+        let tried: Vec<(&str, &ToolModel)> =
+            names.iter().filter_map(|name| Some((name.as_str(), tools.get(name)?.as_ref()?))).collect();
+        let Some((_, first)) = tried.first() else {
             complete = false;
             continue;
         };
-        let tool = tools.entry(tool_name.clone()).or_insert_with(|| match load_tool(&dataset, &tool_name) {
-            Ok(loaded) => {
-                notes.take(&output, &loaded.notes);
-                Some(loaded.model)
-            }
-            Err(err) => {
-                output.note(&err.to_string());
-                None
-            }
-        });
-        let Some(tool) = tool else {
-            complete = false;
-            continue;
-        };
+        let tool = if args.which.as_deref() == Some(ANY) { Err(&open) } else { Ok(*first) };
         let labels = labels_of(&all_labels, &entry.name, &output);
         for &imprint in imprints {
             let recipe = recipe.of(imprint);
@@ -98,8 +111,8 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
                 name: &entry.name,
                 stem: stem.as_deref(),
                 influence: influence.as_deref(),
-                touch: Touch { dataset: &dataset, pair, sample: &sample, tool: Ok(tool), labels: &labels },
-                tool,
+                touch: Touch { dataset: &dataset, pair, sample: &sample, tool, labels: &labels },
+                tried: &tried,
                 recipe: &recipe,
                 accepted: labels.accepted(&recipe.imprint_of()),
             };
@@ -136,15 +149,17 @@ struct PairInput<'a> {
     stem: Option<&'a Path>,
     /// Path of the file for the influence of its pixels.
     influence: Option<&'a Path>,
+    /// Of which the tool is left open where all are to be tried.
     touch: Touch<'a>,
-    tool: &'a ToolModel,
+    /// Tools by name.
+    tried: &'a [(&'a str, &'a ToolModel)],
     recipe: &'a Recipe,
     accepted: Option<AcceptedPose>,
 }
 
 /// One case per engine for one pair and one kind of imprint.
 fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
-    let PairInput { name, stem, influence, touch, tool, recipe, accepted } = *asked;
+    let PairInput { name, stem, influence, touch, tried, recipe, accepted } = *asked;
     let (sample, imprint) = (touch.sample, recipe.imprint);
     let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = felt.contact();
@@ -157,6 +172,13 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
     });
     let several = predicted && args.ensemble.seeds > 1;
     let one = |&by: &RegistrationChoice| {
+        let ranked = match touch.tool {
+            Ok(_) => None,
+            Err(_) => Some(felt.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),
+        };
+        let likeliest = ranked.iter().flatten().next().map(|first| first.tool);
+        let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
+        let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
         let fan = several
             .then(|| {
                 let recipe = Recipe { registration: by, ..recipe.clone() };
@@ -171,14 +193,15 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
-        let influence = influence
-            .zip(answer)
-            .map(|(stem, found)| influence::write(stem, &contact.clouds(sample)?, sample, tool, (imprint, by), found));
+        let influence = influence.zip(answer).zip(touch.tool.ok()).map(|((stem, found), tool)| {
+            influence::write(stem, &contact.clouds(sample)?, sample, tool, (imprint, by), found)
+        });
         let influence = influence.transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),
             registration: by.to_string(),
             imprint: imprint.key(),
+            tools: ranked.map(|all| all.iter().map(RankedTool::new).collect()),
             mask: contact.made_of(),
             mask_notes: contact.notes(&sample.rig),
             angle_deg: answer.map(|found| found.angle_rad.to_degrees()),

@@ -22,6 +22,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register_with};
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
+use touch2touch_core::which_tool::which_tool;
 use touch2touch_work::io::cases::{self, Case, CaseSet};
 
 /// Arguments of `bench verdict`.
@@ -255,6 +256,8 @@ struct Report {
     machine: Machine,
     engine: String,
     faults: Vec<FaultRow>,
+    /// Grasps of which all tools of the source are tried and the right one comes first, percent.
+    named: f64,
     signs: Vec<SignRow>,
     rows: Vec<Row>,
 }
@@ -305,7 +308,8 @@ fn text(report: &Report) -> String {
         );
     }
     text += &format!(
-        "\nof the first row only the right poses count: they are the false alarms\n\npercent beyond the limit that {} % of the good poses pass, by each sign alone\n",
+        "\n{:.1} % of the grasps name their tool when all are tried\nof the first row only the right poses count: they are the false alarms\n\npercent beyond the limit that {} % of the good poses pass, by each sign alone\n",
+        report.named,
         100.0 * FALSE_ALARMS
     );
     for row in &report.signs {
@@ -373,16 +377,29 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
             .collect()
     };
     let rows: Vec<Row> = (0..count).into_par_iter().flat_map_iter(one).collect();
+    let named = (0..count).into_par_iter().map(|i| is_named(&source.case(i), &models, engine)).filter(|named| *named);
     let report = Report {
         machine: Machine::now(),
         engine: args.engine.to_string(),
         faults: Fault::iter().map(|fault| FaultRow::new(&rows, fault)).collect(),
+        named: 100.0 * named.count() as f64 / count.max(1) as f64,
         signs: signs(&rows),
         rows,
     };
     args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
+}
+
+/// True where the tool of a grasp comes first when all are tried.
+fn is_named(case: &Case, models: &[ToolModel], engine: Registration) -> bool {
+    let names: Vec<String> = (0..models.len()).map(|number| number.to_string()).collect();
+    let images = images(case);
+    let points = points(case, &case.masks).unwrap_or_default();
+    let contacts = Contacts { points: &points, images: &images };
+    let method = RegistrationChoice::from(engine).method();
+    let ranked = which_tool(contacts, names.iter().map(String::as_str).zip(models), &*method);
+    ranked.first().is_some_and(|first| first.tool == names[case.tool])
 }
 
 fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Registration) -> Row {

@@ -48,3 +48,4 @@ pub mod turn;
 pub mod units;
 pub mod upright;
 pub mod verdict;
+pub mod which_tool;

@@ -28,6 +28,10 @@ pub(in crate::headless) struct PoseArgs {
     pub(super) imprint: Imprints,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
+    /// Align another tool's CAD model than the pair's own: a tool of the data set, or `any`, which tries them all, answers
+    /// with the likeliest and lists the others.
+    #[arg(long = "tool", value_name = "NAME")]
+    pub(super) which: Option<String>,
     #[command(flatten)]
     pub(super) tool: ToolArgs,
     /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other. A key may be

@@ -15,6 +15,7 @@ use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
+use touch2touch_core::which_tool::Candidate;
 
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PoseRow {
@@ -22,6 +23,9 @@ pub(super) struct PoseRow {
     #[serde(rename = "engine")]
     pub(super) registration: String,
     pub(super) imprint: &'static str,
+    /// With `--tool any`: all tools that can be aligned, the likeliest first; the pose is that one's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) tools: Option<Vec<RankedTool>>,
     /// Bases of the masks: the source's key, `hand` where one was drawn, `depth` where the mask model found nothing,
     /// `flat` where the imprint is flat; of both fingers (right, left) where they differ.
     pub(super) mask: String,
@@ -59,6 +63,27 @@ pub(super) struct PoseRow {
     /// With `--seeds`, for predicted imprints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) fan: Option<PoseFan>,
+}
+
+/// A tool that was tried.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct RankedTool {
+    pub(super) tool: String,
+    /// Chance that it is this one if it is one of them, 0 to 1.
+    pub(super) chance: f64,
+    pub(super) angle_deg: f64,
+    pub(super) verdict: Option<Verdict>,
+}
+
+impl RankedTool {
+    pub(super) fn new(candidate: &Candidate<'_>) -> Self {
+        Self {
+            tool: candidate.tool.to_owned(),
+            chance: candidate.chance,
+            angle_deg: candidate.report.lab_angle_rad().to_degrees(),
+            verdict: Verdict::of(&candidate.report),
+        }
+    }
 }
 
 /// An accepted pose in the sense of the other numbers of a [`PoseRow`].
@@ -161,6 +186,9 @@ pub(super) fn text(report: &Report) -> String {
             c.mask,
             c.stop
         );
+        for ranked in c.tools.iter().flatten().take(3) {
+            text += &format!("    {:>3.0} % {}\n", 100.0 * ranked.chance, ranked.tool);
+        }
         if let Some(verdict) = c.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
             text += &format!("    {}: {}\n", verdict.grade, verdict.why);
         }

@@ -24,6 +24,7 @@ use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
+use touch2touch_core::which_tool::{Candidate, which_tool};
 
 /// A pair with what is known of it.
 #[derive(Clone, Copy, Debug)]
@@ -192,10 +193,27 @@ impl Felt {
     ) -> Result<PoseResult, TaskError> {
         let points = self.points().map_err(Clone::clone)?;
         let tool = touch.tool.map_err(Clone::clone)?;
-        let imprints = &self.contact().imprints;
-        let images = images(touch.sample, &imprints.as_ref());
+        let images = images(touch.sample, &self.contact().imprints.as_ref());
         let contacts = Contacts { points, images: &images };
         pose(contacts, tool, registration, ask, touch.sample.grasp_from_object)
+    }
+
+    /// Candidates for the tool of the touch, the likeliest first.
+    ///
+    /// # Errors
+    /// If there are no contact points.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn which_tool<'t>(
+        &self,
+        touch: Touch<'_>,
+        tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
+        registration: &dyn Register,
+    ) -> Result<Vec<Candidate<'t>>, TaskError> {
+        let points = self.points().map_err(Clone::clone)?;
+        let images = images(touch.sample, &self.contact().imprints.as_ref());
+        Ok(which_tool(Contacts { points, images: &images }, tools, registration))
     }
 
     /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on

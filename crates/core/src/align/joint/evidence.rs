@@ -48,6 +48,9 @@ pub struct MembraneEvidence {
     /// Likeness of their relief to the relief that the tool would make: correlation in the lengths of 1 to 3 mm, -1 to 1.
     /// That of the finger with the smaller one.
     pub likeness: f64,
+    /// What the tool leaves of the relief in these lengths: mean of the capped squares, as a share of the cap, 0 to 1. To be
+    /// compared between poses and tools of one touch.
+    pub misfit: f64,
     /// Pose near by that they would have without the mask.
     pub own: Elsewhere,
     /// Poses that the fingers would have each alone, where there are two.
@@ -131,7 +134,7 @@ impl Problem<'_> {
         };
         let misfit = Relief::of(&look, at, LOOK.kernel_m).misfit();
         let swapped = self.swapped_misfit(scene).filter(|_| misfit > 0.0).map(|swapped| 1.0 - swapped / misfit);
-        (MembraneEvidence { likeness, own: Elsewhere::between(at, own, gain), fingers, swapped }, own)
+        (MembraneEvidence { likeness, misfit, own: Elsewhere::between(at, own, gain), fingers, swapped }, own)
     }
 
     /// Misfit in the best pose for the images of two fingers exchanged.

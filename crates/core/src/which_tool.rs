@@ -1,0 +1,91 @@
+//! [`which_tool`]: the tool of a touch among several, by what each of them explains of contact and membranes.
+
+use crate::align::{AlignReport, Ask, Contacts, Register};
+use crate::pose::register_with;
+use crate::tool::ToolModel;
+
+/// Penalty of a pose in which no gripper holds a tool: more than any likeness makes up for.
+const NOT_HELD: f64 = 5.0;
+/// Difference of two costs at which the cheaper tool is taken for `e` times as likely. From fresh grasps under two laws, on
+/// which the right tool was ahead of the next one by 0.1 to 2.
+const TELLING: f64 = 0.1;
+
+/// Candidate for the tool of a touch.
+#[derive(Clone, Debug)]
+pub struct Candidate<'t> {
+    /// Name of the tool.
+    pub tool: &'t str,
+    /// Answer of the registration of its model, with the evidence.
+    pub report: AlignReport,
+    /// Logarithm of the misfit that it leaves of the membranes' relief, plus the share of contact that lies off it. Lower is
+    /// better.
+    pub cost: f64,
+    /// Chance that it is this one if it is one of them, 0 to 1.
+    pub chance: f64,
+}
+
+/// Every tool that can be registered to a touch, the likeliest first. Models that no pose is found for are left out.
+pub fn which_tool<'t>(
+    contacts: Contacts<'_>,
+    tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
+    registration: &dyn Register,
+) -> Vec<Candidate<'t>> {
+    let ask = Ask { evidence: true, ..Ask::default() };
+    let candidate = |(tool, model)| {
+        let report = register_with(registration, contacts, model, ask).ok()?;
+        let evidence = report.evidence?;
+        let misfit = evidence.membrane.map_or(1.0, |membrane| membrane.misfit.max(1e-9));
+        let held = if report.within_prior { 0.0 } else { NOT_HELD };
+        Some(Candidate { tool, cost: misfit.ln() + 1.0 - evidence.on_tool + held, report, chance: 0.0 })
+    };
+    let mut all: Vec<Candidate<'t>> = tools.into_iter().filter_map(candidate).collect();
+    all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    let best = all.first().map_or(0.0, |first| first.cost);
+    let weight = |candidate: &Candidate<'_>| (-(candidate.cost - best) / TELLING).exp();
+    let sum: f64 = all.iter().map(weight).sum();
+    all.iter_mut().for_each(|candidate| candidate.chance = weight(candidate) / sum);
+    all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::align::JointConfig;
+    use crate::catalog::tools;
+    use crate::cloud::lift;
+    use crate::rig::lab;
+    use crate::sim::{SimConfig, random_grasp, simulate};
+
+    #[test]
+    fn the_tool_that_was_touched_comes_first_and_chances_add_up() {
+        let names = [0usize, 3, 7];
+        let models: Vec<(String, ToolModel)> =
+            names.iter().map(|&i| (tools()[i].name.clone(), ToolModel::new(tools()[i].mesh()).unwrap())).collect();
+        for (own, seed) in names.into_iter().zip(3..) {
+            let sample = simulate(&tools()[own], random_grasp(seed), seed, &SimConfig::default());
+            let touch = |pad| sample.pad(pad).and_then(|touch| touch.depth()).unwrap();
+            let mut points = Vec::new();
+            for pad in lab::PADS {
+                let contact = &touch(pad).truth.as_ref().unwrap().contact;
+                points.extend(
+                    lift(&touch(pad).imprint, touch(pad).camera.as_ref().unwrap(), Some(contact)).unwrap().points,
+                );
+            }
+            let images = lab::PADS.map(|pad| crate::align::PadImage {
+                imprint: &touch(pad).imprint,
+                camera: touch(pad).camera.as_ref().unwrap(),
+            });
+            let contacts = Contacts { points: &points, images: &images };
+            let all = which_tool(contacts, models.iter().map(|(name, m)| (name.as_str(), m)), &JointConfig::default());
+            assert_eq!(
+                all[0].tool,
+                tools()[own].name,
+                "{:?}",
+                all.iter().map(|c| (c.tool, c.cost)).collect::<Vec<_>>()
+            );
+            assert!(all[0].chance > 0.6 && (all.iter().map(|c| c.chance).sum::<f64>() - 1.0).abs() < 1e-9);
+        }
+        let nothing = which_tool(Contacts::default(), [], &JointConfig::default());
+        assert!(nothing.is_empty());
+    }
+}
