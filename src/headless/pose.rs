@@ -14,7 +14,7 @@ use super::output::says;
 use super::recipe::misgiving;
 use super::report::output_stems;
 use super::{Output, VerbResult, seeds};
-use touch2touch_core::align::Ask;
+use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
@@ -215,7 +215,8 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             evidence: answer.and_then(|found| found.report.evidence),
             stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),
             accepted: accepted.map(|a| Accepted::new(a, truth.map(|truth| truth.inverse().theta_rad))),
-            report: found.ok().map(|found| found.report).filter(|_| args.trace),
+            // The evidence stands beside it.
+            report: found.ok().filter(|_| args.trace).map(|found| AlignReport { evidence: None, ..found.report }),
             ambiguity: left_open.clone(),
             no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(ToString::to_string)),
             influence: influence.and_then(Result::ok),

@@ -387,6 +387,7 @@ pub struct AlignReport {
     /// Use of the membrane, from the registration that uses it.
     pub joint: Option<JointFit>,
     /// Evidence for and against the answer, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<Evidence>,
     /// Distances both ways at the answer; only if recorded.
     pub directions: Option<Directions>,

@@ -67,6 +67,9 @@ type Limits = [f64; 2];
 const SWAPPED: Limits = [0.08, 0.14];
 /// Share of the fingers' misfit that goes away if each may have its own pose.
 const FINGERS: Limits = [0.13, 0.2];
+/// Difference of the angle and of the place that the fingers then have, radians and meters: below, it is no fault.
+const APART_RAD: Limits = [3.0 / 180.0 * std::f64::consts::PI, 5.0 / 180.0 * std::f64::consts::PI];
+const APART_M: Limits = [2e-3, 4e-3];
 /// Share of the misfit that goes away elsewhere near by, without the mask.
 const ELSEWHERE: Limits = [0.1, 0.3];
 /// One minus likeness plus [`OFF_COUNTS`] times the share of contact off the tool.
@@ -140,10 +143,9 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
         }
         let way = |to: Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
         if let Some(fingers) = membrane.fingers {
-            sign(
-                Grade::of(fingers.gain, FINGERS),
-                format!("the fingers do not agree: they are {} apart", way(fingers)),
-            );
+            let apart = Grade::of(fingers.angle_rad, APART_RAD).max(Grade::of(fingers.position_m, APART_M));
+            let what = format!("the fingers do not agree: they are {} apart", way(fingers));
+            sign(Grade::of(fingers.gain, FINGERS).min(apart), what);
         }
         let what = format!("the membranes fit better {} from here: look at the mask", way(membrane.own));
         sign(Grade::of(membrane.own.gain, ELSEWHERE), what);
