@@ -117,6 +117,7 @@ fn how(action: Action) -> How {
         A::AcceptPredictedPose => Verb(&["label", "demo", "--pair", "a", "--accept", "predicted"]),
         A::Accept => Verb(&["label", "demo", "--pair", "a", "--accept", "measured", "--pose", "-3,0,1.5"]),
         A::RunPose => Verb(&["pose", "demo"]),
+        A::TryTools => Verb(&["pose", "demo", "--tool", "any"]),
         A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
         A::OwnStarts => Verb(&["basin", "demo", "--pair", "a"]),
         A::NextPoseEngine => Options(&["pose", "demo", "--engine", "gicp"]),

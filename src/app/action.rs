@@ -229,6 +229,8 @@ macro_rules! actions {
 
         RunPose, Pose, "Compute again", "Tries again what could not be computed", [ctrl(K::R)],
             state => of_pair(state, TasksCommand::Retry);
+        TryTools, Pose, "Try all tools", "Registers every CAD model of the data set to this pair and ranks them: which tool is it?", [],
+            state => of_pair(state, WorkbenchCommand::TryTools(true));
         AcceptMeasuredPose, Pose, "Accept the measured pose", "Stores the pose of the measured imprint with the pair", [],
             state => accept(state, ImprintSource::Measured);
         AcceptPredictedPose, Pose, "Accept the predicted pose", "Stores the pose of the predicted imprint with the pair", [],
@@ -442,6 +444,7 @@ impl Action {
             Self::Lens => "magnify magnifier zoom loupe",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",
+            Self::TryTools => "which tool wrong cad model identify rank recognize",
             Self::NextPoseEngine => "icp gicp register method algorithm",
             Self::PoseTool => "hand gizmo drag manual move",
             Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",

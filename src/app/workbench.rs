@@ -24,6 +24,8 @@ pub enum WorkbenchCommand {
     SetLayer(Layer),
     /// True where the tool is moved along its weakest direction.
     SetAnimateWeakest(bool),
+    /// True where all tools are tried on the selected pair.
+    TryTools(bool),
     /// True where each 3D pane shows the clouds of both imprints.
     SetBothClouds(bool),
     /// The plane that cuts the 3D views open; none does without one.
@@ -53,10 +55,12 @@ pub enum WorkbenchCommand {
 }
 
 pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut Vec<Effect>) {
+    let pair = state.pair_key();
     let bench = &mut state.workbench;
     match command {
         WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
         WorkbenchCommand::SetAnimateWeakest(on) => bench.animate_weakest = on,
+        WorkbenchCommand::TryTools(on) => bench.tools_tried = pair.filter(|_| on),
         WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
         WorkbenchCommand::SetSection(section) => {
             let within = |s: Section| Section { at_m: s.at_m.clamp(-SECTION_REACH_M, SECTION_REACH_M), ..s };

@@ -176,7 +176,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             Ok(_) => None,
             Err(_) => Some(felt.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),
         };
-        let likeliest = ranked.iter().flatten().next().map(|first| first.tool);
+        let likeliest = ranked.iter().flatten().next().map(|first| first.tool.as_str());
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
         let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
         let fan = several

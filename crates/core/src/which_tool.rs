@@ -12,9 +12,9 @@ const TELLING: f64 = 0.1;
 
 /// Candidate for the tool of a touch.
 #[derive(Clone, Debug)]
-pub struct Candidate<'t> {
+pub struct Candidate {
     /// Name of the tool.
-    pub tool: &'t str,
+    pub tool: String,
     /// Answer of the registration of its model, with the evidence.
     pub report: AlignReport,
     /// Logarithm of the misfit that it leaves of the membranes' relief, plus the share of contact that lies off it. Lower is
@@ -29,19 +29,24 @@ pub fn which_tool<'t>(
     contacts: Contacts<'_>,
     tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
     registration: &dyn Register,
-) -> Vec<Candidate<'t>> {
+) -> Vec<Candidate> {
     let ask = Ask { evidence: true, ..Ask::default() };
-    let candidate = |(tool, model)| {
+    let candidate = |(tool, model): (&str, &ToolModel)| {
         let report = register_with(registration, contacts, model, ask).ok()?;
         let evidence = report.evidence?;
         let misfit = evidence.membrane.map_or(1.0, |membrane| membrane.misfit.max(1e-9));
         let held = if report.within_prior { 0.0 } else { NOT_HELD };
-        Some(Candidate { tool, cost: misfit.ln() + 1.0 - evidence.on_tool + held, report, chance: 0.0 })
+        Some(Candidate {
+            tool: tool.to_owned(),
+            cost: misfit.ln() + 1.0 - evidence.on_tool + held,
+            report,
+            chance: 0.0,
+        })
     };
-    let mut all: Vec<Candidate<'t>> = tools.into_iter().filter_map(candidate).collect();
+    let mut all: Vec<Candidate> = tools.into_iter().filter_map(candidate).collect();
     all.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     let best = all.first().map_or(0.0, |first| first.cost);
-    let weight = |candidate: &Candidate<'_>| (-(candidate.cost - best) / TELLING).exp();
+    let weight = |candidate: &Candidate| (-(candidate.cost - best) / TELLING).exp();
     let sum: f64 = all.iter().map(weight).sum();
     all.iter_mut().for_each(|candidate| candidate.chance = weight(candidate) / sum);
     all
@@ -81,7 +86,7 @@ mod tests {
                 all[0].tool,
                 tools()[own].name,
                 "{:?}",
-                all.iter().map(|c| (c.tool, c.cost)).collect::<Vec<_>>()
+                all.iter().map(|c| (&c.tool, c.cost)).collect::<Vec<_>>()
             );
             assert!(all[0].chance > 0.6 && (all.iter().map(|c| c.chance).sum::<f64>() - 1.0).abs() < 1e-9);
         }

@@ -6,6 +6,7 @@ use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, R
 use touch2touch_core::align::basin::{Basin, Plane};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
+use touch2touch_core::which_tool::Candidate;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::deviation::Deviation;
 use touch2touch_work::influence::Influence;
@@ -150,6 +151,18 @@ impl Key for InfluenceKey {
 
     fn bytes(found: &Influence) -> usize {
         found.bytes()
+    }
+}
+
+/// The tools of the data set, ranked for the touch that a pose is of.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct RankingKey(pub PoseKey);
+
+impl Key for RankingKey {
+    type Value = Vec<Candidate>;
+
+    fn bytes(found: &Vec<Candidate>) -> usize {
+        found.len() * size_of::<Candidate>()
     }
 }
 

@@ -16,6 +16,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
+use touch2touch_core::which_tool::{Candidate, which_tool};
 use touch2touch_work::cloud::{Clouds, images};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::{self, PoseResult};
@@ -38,11 +39,20 @@ impl Registered {
     /// # Errors
     /// As [`pose::pose`].
     pub(crate) fn pose(&self, registration: RegistrationChoice, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
+        self.with_contacts(|contacts| pose::pose(contacts, &self.tool.model, &*registration.method(), ask, self.truth))
+    }
+
+    /// Tools as candidates for what was touched, the likeliest first.
+    pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: RegistrationChoice) -> Vec<Candidate> {
+        let tools = tools.iter().map(|tool| (tool.name.as_str(), &tool.model));
+        self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
+    }
+
+    fn with_contacts<T>(&self, of: impl FnOnce(Contacts<'_>) -> T) -> T {
         let points = self.clouds.contact_points();
         let imprints = self.imprints.as_ref().map(|imprint| imprint?.get().ok());
         let images = images(&self.sample, &imprints);
-        let contacts = Contacts { points: &points, images: &images };
-        pose::pose(contacts, &self.tool.model, &*registration.method(), ask, self.truth)
+        of(Contacts { points: &points, images: &images })
     }
 }
 

@@ -77,6 +77,8 @@ macro_rules! table {
         Layers(LayersKey) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
         Deviation(DeviationKey) in deviations, 64 * MIB;
+        /// All tools of the data set, ranked for the touch of a pose.
+        Ranking(RankingKey) in rankings, MIB;
         /// The influence of each pixel on a registered angle.
         Influence(InfluenceKey) in influences, 16 * MIB;
         /// The steps of a recorded registration, made ready to be looked through.

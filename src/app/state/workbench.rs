@@ -163,6 +163,8 @@ pub struct Workbench {
     pub layer: Layer,
     /// True where the tool is moved along its weakest direction.
     pub animate_weakest: bool,
+    /// Pair for which all tools are tried.
+    pub tools_tried: Option<PairKey>,
     /// True where each 3D pane shows the clouds of both imprints.
     pub both_clouds: bool,
     /// The plane that cuts the 3D views open.
@@ -186,6 +188,7 @@ impl Default for Workbench {
         Self {
             layer: Layer::None,
             animate_weakest: false,
+            tools_tried: None,
             both_clouds: false,
             section: None,
             tool: SceneTool::Look,

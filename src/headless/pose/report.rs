@@ -76,9 +76,9 @@ pub(super) struct RankedTool {
 }
 
 impl RankedTool {
-    pub(super) fn new(candidate: &Candidate<'_>) -> Self {
+    pub(super) fn new(candidate: &Candidate) -> Self {
         Self {
-            tool: candidate.tool.to_owned(),
+            tool: candidate.tool.clone(),
             chance: candidate.chance,
             angle_deg: candidate.report.lab_angle_rad().to_degrees(),
             verdict: Verdict::of(&candidate.report),

@@ -2,7 +2,7 @@
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::{Align, Color32, Layout, RichText, ScrollArea, Sense, Ui};
+use eframe::egui::{Align, Button, Color32, Layout, RichText, ScrollArea, Sense, Ui};
 
 use super::images;
 use super::scene;
@@ -19,8 +19,10 @@ use touch2touch_core::manual::{ManualPose, PoseDifference};
 use touch2touch_core::postprocess::{Severity, Stage, Stats};
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
+use touch2touch_core::verdict::Grade;
 use touch2touch_work::compare::Comparison;
 use touch2touch_work::labels::ImprintOf;
+use touch2touch_work::pose::PoseResult;
 
 /// Figures that only this pane shows.
 #[derive(Default)]
@@ -54,6 +56,38 @@ fn pair(cx: &Cx<'_>, ui: &mut Ui) {
                 .on_hover_text("The source lost its scale: every length of this pair is an assumption");
         }
     });
+}
+
+/// The likeliest tools where that was asked, else the offer to try them where the pose is doubted.
+fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
+    match results::ranking(cx.state, source) {
+        Some(Lookup::Ready(all)) => {
+            let own = results::tool_name(cx.state).unwrap_or_default();
+            for candidate in all.iter().take(3) {
+                let text = format!("{:3.0} %  {}", 100.0 * candidate.chance, candidate.tool);
+                let color = if candidate.tool == own { cx.p.text } else { cx.p.weak };
+                ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(format!(
+                    "Chance that it is this tool if it is one of the {} of the data set, by what its model explains of contact and \
+                     membrane; at {}",
+                    all.len(),
+                    units::text_deg(candidate.report.lab_angle_rad())
+                ));
+            }
+        }
+        Some(Lookup::Failed(err)) => {
+            ui.label(RichText::new(&err.why).size(SMALL).color(cx.p.wrong));
+        }
+        Some(_) => {
+            ui.label(caption("Trying all tools…", cx.p));
+        }
+        None if pose.verdict.as_ref().is_some_and(|verdict| verdict.grade > Grade::Good) => {
+            let button = ui.add(Button::new(RichText::new(Action::TryTools.name()).size(SMALL)).small());
+            if button.on_hover_text(cx.keys().help(Action::TryTools)).clicked() {
+                cx.act(Action::TryTools);
+            }
+        }
+        None => {}
+    }
 }
 
 fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -121,6 +155,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
                     label.on_hover_text(all.join("\n"));
                 }
             }
+            tools(cx, ui, source, pose);
             ui.label(caption(scene::pose_details(pose), cx.p));
             let action = match source {
                 ImprintSource::Measured => Action::AcceptMeasuredPose,

@@ -498,6 +498,7 @@ draws! {
     workbench: WorkbenchCommand {
         1 SetLayer(any_of::<Layer>()),
         1 SetAnimateWeakest(any::<bool>()),
+        1 TryTools(any::<bool>()),
         1 SetBothClouds(any::<bool>()),
         1 SetSection(proptest::option::of(section())),
         3 SetTool(any_of::<SceneTool>()),

@@ -210,7 +210,7 @@ impl Felt {
         touch: Touch<'_>,
         tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
         registration: &dyn Register,
-    ) -> Result<Vec<Candidate<'t>>, TaskError> {
+    ) -> Result<Vec<Candidate>, TaskError> {
         let points = self.points().map_err(Clone::clone)?;
         let images = images(touch.sample, &self.contact().imprints.as_ref());
         Ok(which_tool(Contacts { points, images: &images }, tools, registration))

@@ -1,4 +1,4 @@
-//! Layers in a 3D view: what colors the contact points, the ellipse of the weak motion, and the tool swaying along it.
+//! Layers in a 3D view: what colors the contact points, the spread of the pose, and the tool swaying along its weakest motion.
 
 use std::sync::Arc;
 
