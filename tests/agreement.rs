@@ -8,6 +8,7 @@ mod proposals;
 mod random;
 mod recipes;
 mod verbs;
+mod verdicts;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

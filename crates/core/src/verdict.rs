@@ -72,12 +72,11 @@ const APART_RAD: Limits = [3.0 / 180.0 * std::f64::consts::PI, 5.0 / 180.0 * std
 const APART_M: Limits = [2e-3, 4e-3];
 /// Share of the misfit that goes away elsewhere near by, without the mask.
 const ELSEWHERE: Limits = [0.1, 0.3];
-/// One minus likeness plus [`OFF_COUNTS`] times the share of contact off the tool.
-const MISFIT: Limits = [0.66, 0.75];
-/// Contact off the tool beside a like relief: the mask may be at fault.
-const OFF_COUNTS: f64 = 0.85;
-/// Of the contact off the tool no more than this share makes a pose wrong by itself.
-const OFF_CAP: f64 = 0.3;
+/// One minus likeness, plus this share of the contact off the tool, of which no more than so much counts: where the relief is
+/// like the tool's, the mask is at fault.
+const MISFIT: Limits = [0.6, 0.72];
+const OFF_COUNTS: f64 = 0.7;
+const OFF_CAP: f64 = 0.4;
 /// Share of contact off the tool.
 const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the angle, radians.
@@ -149,12 +148,7 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
         }
         let what = format!("the membranes fit better {} from here: look at the mask", way(membrane.own));
         sign(Grade::of(membrane.own.gain, ELSEWHERE), what);
-        let misfit = |off: f64| 1.0 - membrane.likeness + OFF_COUNTS * off;
-        let grade = if misfit(off.min(OFF_CAP)) > MISFIT[1] {
-            Grade::Wrong
-        } else {
-            Grade::of(misfit(off), [MISFIT[0], f64::INFINITY])
-        };
+        let grade = Grade::of(1.0 - membrane.likeness + OFF_COUNTS * off.min(OFF_CAP), MISFIT);
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact is not like this tool's (likeness {likeness:.2}, {off} of it off the tool)");
         sign(grade, what);
@@ -166,9 +160,6 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
     let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
     let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
     sign(Grade::of(place_m, SPREAD_M), what);
-    if report.refused().is_some() {
-        sign(Grade::Check, "a cheaper place was refused: the gripper cannot hold it so".to_owned());
-    }
     if let Some(fit) = report.joint.filter(|fit| !matches!(fit.basis, Basis::Both | Basis::Membrane)) {
         sign(Grade::Check, fit.basis.to_string());
     }
