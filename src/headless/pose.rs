@@ -210,7 +210,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             y_m: place.map(|p| p.y_m),
             z_m: place.map(|p| p.z_m),
             ms: answer.map_or(0.0, |found| found.ms),
-            angle_sd_deg: answer.and_then(|found| Some(found.spread_rad()?.to_degrees())),
+            angle_sd_deg: answer.and_then(|found| Some(found.angle_sd_rad()?.to_degrees())),
             verdict: answer.and_then(|found| found.verdict.clone()),
             evidence: answer.and_then(|found| found.report.evidence),
             stop: found.as_ref().map_or_else(|err| err.why.clone(), |found| found.stop.clone()),

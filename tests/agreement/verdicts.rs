@@ -33,7 +33,7 @@ pub(super) fn verdict_and_likeliest_tool_are_the_same_on_the_screen_and_by_verb(
             continue;
         };
         assert_eq!(serde_json::to_value(&found.verdict).unwrap(), said["verdict"], "{name}");
-        assert_eq!(number(found.spread_rad().unwrap().to_degrees()), said["angle_sd_deg"], "{name}");
+        assert_eq!(number(found.angle_sd_rad().unwrap().to_degrees()), said["angle_sd_deg"], "{name}");
         assert_eq!(serde_json::to_value(found.report.evidence).unwrap(), said["evidence"], "{name}");
         assert!(results::ranking(state, MEASURED).is_none(), "{name}: nobody asked");
         studio.send(Command::Workbench(WorkbenchCommand::TryTools(true)));
@@ -43,7 +43,11 @@ pub(super) fn verdict_and_likeliest_tool_are_the_same_on_the_screen_and_by_verb(
         let said = case(&report, &name)["tools"].as_array().unwrap().clone();
         assert_eq!(all.len(), said.len(), "{name}");
         for (shown, said) in all.iter().zip(&said) {
-            assert_eq!((said["tool"].as_str().unwrap(), &said["chance"]), (&*shown.tool, &number(shown.chance)), "{name}");
+            assert_eq!(
+                (said["tool"].as_str().unwrap(), &said["chance"]),
+                (&*shown.tool, &number(shown.chance)),
+                "{name}"
+            );
         }
         ranked += all.len();
     }

@@ -80,9 +80,9 @@ const OFF_CAP: f64 = 0.4;
 /// Share of contact off the tool.
 const OFF: Limits = [0.5, f64::INFINITY];
 /// Standard deviation of the angle, radians.
-const SPREAD_RAD: Limits = [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI];
+const ANGLE_SD_RAD: Limits = [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI];
 /// Standard deviation of the place where it is known least, meters.
-const SPREAD_M: Limits = [2e-3, f64::INFINITY];
+const PLACE_SD_M: Limits = [2e-3, f64::INFINITY];
 
 /// Verdict on a pose: all that speaks against it, without the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -156,10 +156,10 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
     sign(Grade::of(off, OFF), format!("{} of the contact mask lie off the tool", percent(off)));
     let angle_rad = evidence.uncertainty.angle_rad();
     let what = format!("the contact leaves the angle open (±{})", units::text_deg(angle_rad));
-    sign(Grade::of(angle_rad, SPREAD_RAD), what);
+    sign(Grade::of(angle_rad, ANGLE_SD_RAD), what);
     let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
     let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
-    sign(Grade::of(place_m, SPREAD_M), what);
+    sign(Grade::of(place_m, PLACE_SD_M), what);
     if let Some(fit) = report.joint.filter(|fit| !matches!(fit.basis, Basis::Both | Basis::Membrane)) {
         sign(Grade::Check, fit.basis.to_string());
     }

@@ -185,7 +185,7 @@ impl PoseMetrics {
             y_m: place.y_m,
             z_m: place.z_m,
             grasp_from_object: found.grasp_from_object,
-            angle_sd_deg: found.spread_rad().map(f64::to_degrees),
+            angle_sd_deg: found.angle_sd_rad().map(f64::to_degrees),
             covariance: found.report.evidence.map(|evidence| evidence.uncertainty.covariance),
             verdict: found.verdict.clone(),
             rms_m: found.rms_m,

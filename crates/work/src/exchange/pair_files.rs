@@ -233,7 +233,7 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         object_from_grasp: matrix(found.inverse()),
         numbers: numbers(found),
         truth,
-        angle_sd_deg: pose.spread_rad().map(f64::to_degrees),
+        angle_sd_deg: pose.angle_sd_rad().map(f64::to_degrees),
         covariance: pose.report.evidence.map(|evidence| evidence.uncertainty.covariance),
         verdict: pose.verdict.as_ref(),
         rms_mm: mm(pose.rms_m),

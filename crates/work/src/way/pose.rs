@@ -48,14 +48,14 @@ impl PoseResult {
     }
 
     /// Standard deviation of the angle, radians, where the evidence was asked for.
-    pub fn spread_rad(&self) -> Option<f64> {
+    pub fn angle_sd_rad(&self) -> Option<f64> {
         Some(self.report.evidence?.uncertainty.angle_rad())
     }
 
     /// `-2.1° ± 0.3°`.
     pub fn angle_text(&self) -> String {
         let angle = units::text_deg(self.angle_rad);
-        self.spread_rad().map_or(angle.clone(), |spread| format!("{angle} ± {}", units::text_deg(spread)))
+        self.angle_sd_rad().map_or(angle.clone(), |spread| format!("{angle} ± {}", units::text_deg(spread)))
     }
 
     /// Bytes held.

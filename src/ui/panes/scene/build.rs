@@ -149,7 +149,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seco
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
     meshes(cx, memory, source, seconds, &mut scene);
-    scene.lines.extend(layers::spread(cx, source));
+    scene.lines.extend(layers::uncertainty(cx, source));
     steps::add(cx, memory, source, &mut scene);
     if look.layer(SceneLayer::Guides).shown {
         guides(cx, &mut scene);

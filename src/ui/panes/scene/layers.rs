@@ -1,4 +1,4 @@
-//! Layers in a 3D view: what colors the contact points, the spread of the pose, and the tool swaying along its weakest motion.
+//! Layers in a 3D view: what colors the contact points, the uncertainty of the pose, and the tool swaying along its weakest motion.
 
 use std::sync::Arc;
 
@@ -159,9 +159,9 @@ pub(super) fn swayed(cx: &Cx<'_>, source: ImprintSource, pose: PlanarPose, secon
     }
 }
 
-/// The spread of the pose's errors as it is: the ellipse of two deviations of the place where the tool is held, and the fan of
+/// The uncertainty of the pose as it is: the ellipse of two deviations of the place where the tool is held, and the fan of
 /// two deviations of the angle about it. Where the pose is doubted, and where one looks into a registration.
-pub(super) fn spread(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
+pub(super) fn uncertainty(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
     /// Half length of the fan, meters; beyond this share of it an ellipse is cut off, and beyond these radians a fan.
     const REACH_M: f64 = 0.03;
     const WIDEST: f64 = 0.5;
@@ -192,7 +192,7 @@ pub(super) fn spread(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
         segments.extend(arc.map(|ends| Segment { ends, rgba }));
     }
     Some(LinesItem {
-        name: "spread".into(),
+        name: "uncertainty".into(),
         revision,
         segments: segments.into(),
         style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },

@@ -123,7 +123,8 @@ pub(crate) fn pose_details(pose: &PoseResult) -> String {
     let rung = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
     let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
-    let refused = if report.refused().is_some() { " · a cheaper place was refused: no gripper holds it so" } else { "" };
+    let refused =
+        if report.refused().is_some() { " · a cheaper place was refused: no gripper holds it so" } else { "" };
     let who = report.joint.map_or(String::new(), |fit| format!(" · by {}", fit.basis));
     format!(
         "{} points · residual {} · {}{rung}{who}{open}{beyond}{refused}",

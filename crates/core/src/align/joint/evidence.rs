@@ -18,8 +18,7 @@ const ON_TOOL_M: f64 = 1e-3;
 /// Most contact points that are looked at.
 const POINTS: usize = 1024;
 
-/// Band in which reliefs are compared: wide enough for what the mask of pixels and the membrane's law do to the relief, and
-/// narrow enough to be the tool's. Its kernel, meters, and its places.
+/// Comparison of reliefs: in lengths that are wide enough to outlast the membrane's law, and narrow enough to be the tool's.
 const LOOK: Look = Look { band: 1, kernel_m: 1e-3, places: 800 };
 /// Steps of a descent from the pose to where membranes would have it, coarse to fine.
 const DESCENT: [Look; 3] = [
@@ -78,7 +77,7 @@ impl Elsewhere {
     }
 }
 
-/// Way to compare membranes with templates.
+/// Comparison of membranes with templates: the band of lengths, the kernel (meters) and the number of places.
 struct Look {
     band: usize,
     kernel_m: f64,
