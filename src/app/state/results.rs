@@ -70,7 +70,7 @@ macro_rules! table {
         /// A pose.
         Pose(PoseKey) in poses, 32 * MIB;
         /// A pose without its proof: shown until that is there.
-        ProvisionalPose(ProvisionalPoseKey) in provisional_poses, 4 * MIB;
+        ProvisionalPose(ProvisionalPoseKey) in provisional_poses, 3 * MIB;
         /// A registration with everything recorded.
         Run(RunKey) in runs, 32 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
