@@ -33,7 +33,7 @@ pub(super) struct VerdictArgs {
     count: u32,
     /// Seed of grasps, noise, masks and faults.
     #[arg(long, default_value_t = 1)]
-    seed: u64,
+    simulation_seed: u64,
     /// Folder of known grasps (`touch2touch-bench cases` writes one) in place of fresh ones.
     #[arg(long, conflicts_with = "count")]
     cases: Option<PathBuf>,
@@ -329,7 +329,7 @@ impl Source {
     /// The source with the meshes of its tools.
     fn new(args: &VerdictArgs) -> anyhow::Result<(Self, Vec<TriMesh>)> {
         let Some(folder) = &args.cases else {
-            let (count, seed) = (args.count as usize, args.seed);
+            let (count, seed) = (args.count as usize, args.simulation_seed);
             return Ok((Self::Fresh { count, seed, tools: cases::simulated_tools() }, cases::simulated_meshes()));
         };
         let mut set = CaseSet::open(folder)?;
@@ -363,7 +363,7 @@ pub(super) fn run(args: &VerdictArgs) -> VerbResult {
     let count = source.count();
     let output = Output::new(args.json.common(), "judging", count);
     let models: Vec<ToolModel> = meshes.iter().map(|m| ToolModel::new(m.clone())).collect::<Result<_, _>>()?;
-    let (seed, engine) = (args.seed, args.engine);
+    let (seed, engine) = (args.simulation_seed, args.engine);
     let one = |i: usize| -> Vec<Row> {
         let (case, other) = (source.case(i), source.case((i + 1) % count));
         output.step(&i.to_string());
