@@ -193,7 +193,7 @@ struct Sign {
     of: fn(&Row) -> Option<f64>,
 }
 
-/// The signs; the bands are those of [`Evidence`].
+/// The signs, from [`Evidence`].
 const SIGNS: &[Sign] = &[
     Sign { name: "few inliers", of: |row| Some(-row.inlier_share?) },
     Sign { name: "contact off the tool", of: |row| Some(1.0 - row.evidence?.on_tool) },

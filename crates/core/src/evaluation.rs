@@ -143,7 +143,7 @@ pub struct GraspScore {
     pub images: Vec<ImageScore>,
     /// Error of the in-hand angle, radians, without sign; NaN (null) without a pose, `None` where no truth is known.
     pub angle_error_rad: Option<f64>,
-    /// How much the pose can be relied on, without the truth; `None` without a pose.
+    /// Reliance that the pose deserves, without the truth; `None` without a pose.
     #[serde(default)]
     pub verdict: Option<Grade>,
     /// Time to generate one image, seconds.

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::align::{AlignReport, Basis, Elsewhere, Evidence};
+use crate::align::{AlignReport, Elsewhere, Evidence};
 use crate::manual::PoseDifference;
 use crate::units;
 
@@ -160,7 +160,7 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
     let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
     let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
     sign(Grade::of(place_m, PLACE_SD_M), what);
-    if let Some(fit) = report.joint.filter(|fit| !matches!(fit.basis, Basis::Both | Basis::Membrane)) {
+    if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {
         sign(Grade::Check, fit.basis.to_string());
     }
     signs

@@ -51,8 +51,8 @@ impl Computes for RankingKey {
 
 /// The key of the ranking; `None` where nobody asked for one, or there is no pose.
 fn ranking_key(state: &State, source: ImprintSource) -> Option<RankingKey> {
-    let asked = state.workbench.tools_tried.is_some() && state.workbench.tools_tried == state.pair_key();
-    Some(RankingKey(results::pose_key(state, source).ok()??)).filter(|_| asked)
+    let asked = state.workbench.tools_tried.filter(|asked| state.pair_key() == Some(*asked));
+    asked.and_then(|_| Some(RankingKey(results::pose_key(state, source).ok()??)))
 }
 
 /// The tools of the data set, ranked for a side of the selected pair; `None` where nobody asked for it.

@@ -34,7 +34,7 @@ pub(super) struct PoseRow {
     pub(super) angle_deg: Option<f64>,
     /// Standard deviation of the angle.
     pub(super) angle_sd_deg: Option<f64>,
-    /// How much the pose can be relied on, without the truth; none without a pose.
+    /// Reliance that the pose deserves, without the truth; none without a pose.
     pub(super) verdict: Option<Verdict>,
     /// Evidence that the verdict is from, with the covariance of the pose.
     #[serde(skip_serializing_if = "Option::is_none")]

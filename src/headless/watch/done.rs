@@ -45,7 +45,7 @@ pub(super) struct PoseMetrics {
     /// Standard deviation of the angle, and the covariance of `grasp_from_object` (angle in radians, y and z in meters).
     pub(super) angle_sd_deg: Option<f64>,
     pub(super) covariance: Option<[[f64; 3]; 3]>,
-    /// How much the pose can be relied on.
+    /// Reliance that the pose deserves, without the truth.
     pub(super) verdict: Option<Verdict>,
     pub(super) rms_m: f64,
     pub(super) points: usize,

@@ -112,6 +112,13 @@ pub enum Basis {
     LittleContact,
 }
 
+impl Basis {
+    /// True where the membranes had a say.
+    pub fn has_membrane(self) -> bool {
+        matches!(self, Self::Both | Self::Membrane)
+    }
+}
+
 /// Use of the membrane.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointFit {

@@ -35,7 +35,7 @@ pub struct PoseResult {
     pub converged: bool,
     /// Time it took, milliseconds.
     pub ms: f64,
-    /// How much it can be relied on; `None` where its evidence was not asked for.
+    /// Reliance that it deserves, without the truth; `None` where its evidence was not asked for.
     pub verdict: Option<Verdict>,
     /// Everything the registration says about itself; with trace and fits only of a recorded run.
     pub report: AlignReport,

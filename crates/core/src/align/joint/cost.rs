@@ -129,7 +129,7 @@ impl BandField {
 /// are far off decide nothing.
 #[derive(Default)]
 pub(super) struct Relief {
-    /// That of what the template leaves of them.
+    /// Sum of the squares of what the template leaves of the membranes' heights.
     left: f64,
     /// Sums of the products of both heights: the membranes' with themselves, with the template's, and those with themselves.
     products: [f64; 3],

@@ -9,7 +9,7 @@ use super::problem::{Patches, Problem};
 use super::uncertainty::Uncertainty;
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
-use crate::align::{AlignReport, Basis, Contacts, PadImage, Scene};
+use crate::align::{AlignReport, Contacts, PadImage, Scene};
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
 
@@ -47,7 +47,7 @@ pub struct MembraneEvidence {
     /// Likeness of their relief to the relief that the tool would make: correlation in the lengths of 1 to 3 mm, -1 to 1.
     /// That of the finger with the smaller one.
     pub likeness: f64,
-    /// What the tool leaves of the relief in these lengths: mean of the capped squares, as a share of the cap, 0 to 1. To be
+    /// Misfit that the tool leaves of the relief in these lengths: mean of the capped squares, as a share of the cap, 0 to 1. To be
     /// compared between poses and tools of one touch.
     pub misfit: f64,
     /// Pose near by that they would have without the mask.
@@ -99,7 +99,7 @@ impl Evidence {
         let config = JointConfig::default();
         let problem = Problem::new(scene, tool, &config).ok().flatten();
         let found = problem.as_ref().map(|problem| problem.evidence(scene, State::from_pose(pose, problem.centroid())));
-        let by_membrane = matches!(report.joint.map(|fit| fit.basis), Some(Basis::Both | Basis::Membrane));
+        let by_membrane = report.joint.is_some_and(|fit| fit.basis.has_membrane());
         let uncertainty = match (&problem, found) {
             (Some(problem), _) if by_membrane => problem.uncertainty(pose),
             (Some(problem), Some((_, own))) => {
