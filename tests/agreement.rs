@@ -37,6 +37,7 @@ use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
 use touch2touch_work::export::{ExportChoice, Which};
@@ -530,6 +531,9 @@ fn a_dial_does_the_same_in_both() {
     for (dial, range, count) in
         [(Dial::Threshold, [4.0, 6.0], 3), (Dial::Gate, [0.6, 1.4], 3), (Dial::Shift, [0.0; 2], 1)]
     {
+        if dial == Dial::Gate {
+            studio.send(prefer(|s| s.registration = Registration::DistanceField.into()).into());
+        }
         studio.send(DialCommand::Choose(dial).into());
         studio.send(DialCommand::Range(range, count).into());
         let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();

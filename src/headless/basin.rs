@@ -19,6 +19,7 @@ use touch2touch_core::units::{angle_error, fixed, mm, wrap_angle};
 use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::pose::basin;
 use touch2touch_work::recipe::Stage;
 use touch2touch_work::tool::{LoadedTool, load_tool};
 
@@ -105,11 +106,12 @@ pub(super) fn run(args: &BasinArgs) -> VerbResult {
     let labels = labels_of(&Labels::of(&dataset), &entry.name, &output);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: Ok(&tool), labels: &labels };
     let felt = feel(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
-    let (contact, points) = (felt.contact(), felt.points().map_err(Clone::clone)?);
+    let contact = felt.contact();
     // What keeps every start from an answer keeps the registration itself from one, and is said once.
     let own = felt.pose().map_err(Clone::clone)?;
     let started = Instant::now();
-    let basin = touch2touch_work::pose::basin(points, &tool, args.registration, args.plane.into(), &output.job())?;
+    let (registration, plane) = (args.registration, args.plane.into());
+    let basin = felt.with_contacts(touch, |contacts| basin(contacts, &tool, registration, plane, &output.job()))??;
     let report = Report {
         pair: entry.name.clone(),
         registration: args.registration.to_string(),

@@ -193,9 +193,10 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
-        let influence = influence.zip(answer).zip(touch.tool.ok()).map(|((stem, found), tool)| {
-            influence::write(stem, &contact.clouds(sample)?, sample, tool, (imprint, by), found)
-        });
+        let influence = influence
+            .zip(answer)
+            .zip(touch.tool.ok())
+            .map(|((stem, found), tool)| influence::write(stem, &felt, touch, tool, by, found));
         let influence = influence.transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),

@@ -256,13 +256,22 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
     assert!(rows >= 6, "{rows}");
 }
 
-/// Part of the format: kept results are found by it.
+/// Part of the format: kept results are found by it, also when defaults change.
 #[test]
 fn ids_stay_what_they_are() {
-    let recipe: Recipe = Recipe::default();
-    let ids: Vec<String> = Stage::iter().map(|stage| recipe.id(stage).to_string()).collect();
-    assert_eq!(ids, vec!["r1-44136fa355b3678a"; 5], "everything is at its default, so nothing is named");
-    let hand = Recipe { hand: false, ..recipe };
-    assert_eq!(hand.id(Stage::Imprint).to_string(), ids[0]);
-    assert_ne!(hand.id(Stage::Mask).to_string(), ids[0]);
+    let ids = |recipe: &Recipe| Stage::iter().map(|stage| recipe.id(stage).to_string()).collect::<Vec<_>>();
+    let by_mask = Recipe { registration: Registration::DistanceField.into(), ..Recipe::default() };
+    assert_eq!(ids(&by_mask), vec!["r1-44136fa355b3678a"; 5], "nothing is named");
+    let joint = Recipe { registration: Registration::Joint.into(), ..Recipe::default() };
+    assert_eq!(ids(&joint)[..4], ids(&by_mask)[..4]);
+    assert_eq!(ids(&joint)[4], "r1-");
+    let hand = Recipe { hand: false, ..by_mask.clone() };
+    assert_eq!(hand.id(Stage::Imprint), by_mask.id(Stage::Imprint));
+    assert_ne!(hand.id(Stage::Mask), by_mask.id(Stage::Mask));
+    // Each number of a mask, where it is not the one that goes without saying.
+    for (source, named) in [(MaskSource::Threshold, "r1-"), (MaskSource::TopPercent, "r1-"), (MaskSource::Cad, "r1-")] {
+        let mask =
+            MaskChoice { source, threshold_m: 0.005, probability: None, top_percent: 15.0, cad_distance_m: 0.001 };
+        assert_eq!(Recipe { mask, ..by_mask.clone() }.id(Stage::Mask).to_string(), named, "{source:?}");
+    }
 }

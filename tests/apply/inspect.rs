@@ -163,7 +163,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let [Some(a), Some(b)] = bench.state.inspect.pins_of(bench.state.pair_key()) else {
         panic!("{:?}", bench.state.inspect.pins_of(bench.state.pair_key()))
     };
-    assert_eq!((a.registration, b.registration), (Registration::DistanceField.into(), Registration::LabIcp.into()));
+    assert_eq!((a.registration, b.registration), (Registration::default().into(), Registration::LabIcp.into()));
     assert_ne!(a.grasp_from_object, b.grasp_from_object);
     // A third takes the place of the older one.
     send(&mut bench, InspectCommand::Begin);

@@ -9,6 +9,7 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::tasks::Level;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::lab;
 use touch2touch_work::error::TaskError;
 
@@ -85,6 +86,8 @@ fn a_mask_without_contact_offers_the_threshold() {
     mask.choice.source = MaskSource::TopPercent;
     mask.choice.top_percent = 0.0;
     rig.send(prefer(move |s| s.mask = mask.clone()));
+    // Membranes need no mask.
+    rig.send(prefer(|s| s.registration = Registration::DistanceField.into()));
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert!(
         matches!(results::pose(state(&rig), MEASURED), Lookup::Failed(_)),

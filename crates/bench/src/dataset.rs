@@ -12,6 +12,7 @@ use serde::Serialize;
 use super::{Machine, contact_points};
 use touch2touch::headless::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
+use touch2touch_core::align::{Contacts, PadImage};
 use touch2touch_core::catalog;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -84,7 +85,7 @@ struct Report {
     simulated: usize,
     /// Building all tool models, seconds on all threads.
     tools_seconds: f64,
-    /// Contact points to pose.
+    /// Contact points to pose, without the imprints: by the mask alone.
     points_to_pose: Stage,
     /// Imprints, cameras and masks of both fingers to pose.
     depth_to_pose: Stage,
@@ -135,7 +136,9 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             .par_iter()
             .map(|p| {
                 let points = contact_points(&p.grasp.imprints, &p.cameras, &p.grasp.masks).unwrap_or_default();
-                let report = register(&points, &tools[p.grasp.tool], args.engine, false);
+                let image = |f: usize| PadImage { imprint: &p.grasp.imprints[f], camera: &p.cameras[f] };
+                let contacts = Contacts { points: &points, images: &[image(0), image(1)] };
+                let report = register(contacts, &tools[p.grasp.tool], args.engine, false);
                 report.map_or(f64::NAN, |r| angle_error(r.grasp_from_object.theta_rad, p.truth.theta_rad))
             })
             .collect();

@@ -19,6 +19,7 @@ use touch2touch::headless::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::canvas;
@@ -63,6 +64,9 @@ pub(super) struct GeneratorArgs {
     /// Only this engine: rten, or ort. Without it, all that are found; all but the first on a quarter of the grasps.
     #[arg(long, value_parser = engine)]
     engine: Option<EngineKind>,
+    /// The registration of the poses.
+    #[arg(long, default_value_t = Registration::default())]
+    registration: Registration,
     #[command(flatten)]
     json: JsonArgs,
 }
@@ -135,6 +139,7 @@ struct Report {
     bundle: String,
     bundle_hash: String,
     defaults: GenerateConfig,
+    registration: Registration,
     grasps: usize,
     tools: Tools,
     seed: u64,
@@ -164,7 +169,7 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
         Tools::Seen => seen,
         Tools::Unseen => !seen,
     })?;
-    let mut judge = Judge::new(MaskModel::open(&mask_bundle, EngineChoice::Auto)?);
+    let mut judge = Judge::new(MaskModel::open(&mask_bundle, EngineChoice::Auto)?, args.registration);
     let measured = judge.measured(&cases)?;
 
     let subset = |engine: usize| match engine {
@@ -186,6 +191,7 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
         bundle: bundle.name().to_owned(),
         bundle_hash: bundle.hash().to_owned(),
         defaults,
+        registration: args.registration,
         grasps: cases.len(),
         tools: args.tools,
         seed: args.seed,

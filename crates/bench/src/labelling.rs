@@ -14,13 +14,13 @@ use super::generator::cases::{Case, simulate};
 use touch2touch::headless::JsonArgs;
 use touch2touch::headless::ModelArgs;
 use touch2touch::headless::{Output, VerbResult};
-use touch2touch_core::align::Ask;
+use touch2touch_core::align::{Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{CadPose, DrawTool, Drawing, Ground, Paint, Provenance, agreement, difference};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::{PadId, PerPad, Rig, lab};
-use touch2touch_work::cloud::{clouds, contact_points};
+use touch2touch_work::cloud::{clouds, contact_points, images};
 use touch2touch_work::imprint::{imprints_of, measured};
 use touch2touch_work::influence::influence;
 use touch2touch_work::job::JobCx;
@@ -283,7 +283,8 @@ fn true_masks(case: &Case) -> anyhow::Result<PerPad<Mask>> {
 fn registered(case: &Case, imprints: &PerPad<DepthMap>, masks: &PerPad<Mask>) -> Option<PlanarPose> {
     let points = contact_points(&case.sample, &imprints.as_ref(), &masks.as_ref()).ok()?;
     let method = RegistrationChoice::default().method();
-    pose(&points, &case.tool, &*method, Ask::default(), None).ok().map(|answer| answer.grasp_from_object)
+    let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints.as_ref()) };
+    pose(contacts, &case.tool, &*method, Ask::default(), None).ok().map(|answer| answer.grasp_from_object)
 }
 
 type Proposed = (&'static str, PerPad<Mask>, f64);
@@ -428,6 +429,7 @@ fn follow(
     for case in cases {
         let mut masks = masks_of(case)?;
         let imprint = |pad| Some(&case.sample.pad(pad)?.depth()?.imprint);
+        let images = images(&case.sample, &case.sample.rig.pads().map(imprint).collect());
         for stroke in 0..STROKES_EACH {
             let pad = lab::PADS[stroke % lab::PADS.len()];
             let (Some(mask), Some(imprint_of_it)) = (masks.get_mut(pad), imprint(pad)) else { continue };
@@ -444,7 +446,9 @@ fn follow(
             let lifted = clouds(&case.sample, &parts)?;
             let since = |begin: Instant| begin.elapsed().as_secs_f64() * 1e3;
             let cloud_ms = since(begin);
-            let register = |ask| pose(&lifted.contact_points(), &case.tool, &*method, ask, Some(case.truth));
+            let points = lifted.contact_points();
+            let contacts = Contacts { points: &points, images: &images };
+            let register = |ask| pose(contacts, &case.tool, &*method, ask, Some(case.truth));
             let answer = register(Ask { provisional: true, ..Ask::default() });
             let all_ms = since(begin);
             let Ok(mut answer) = answer else { continue };
@@ -456,8 +460,8 @@ fn follow(
             registering.push(all_ms - cloud_ms);
             whole.push(all_ms);
             let begin = Instant::now();
-            let grasp_from_object = answer.grasp_from_object;
-            if influence(&lifted, &case.sample, &case.tool, RegistrationChoice::default(), grasp_from_object).is_ok() {
+            let by = RegistrationChoice::default();
+            if influence(&lifted, contacts, &case.sample, &case.tool, by, &answer.report).is_ok() {
                 hanging.push(since(begin));
             }
         }

@@ -42,7 +42,7 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
-pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence, Uncertainty};
+pub use joint::{Basis, Elsewhere, Evidence, Hold, JointConfig, JointFit, MaskWeight, MembraneEvidence, Uncertainty};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
@@ -91,6 +91,11 @@ impl AlignConfig {
     /// a hundred milliseconds.
     pub fn certified() -> Self {
         Self { rungs: vec![Rung::Certified], ..Self::default() }
+    }
+
+    /// Width of the kernel that decides, meters; NaN without any, which [`align`] refuses.
+    pub fn final_kernel_m(&self) -> f64 {
+        self.kernels_m.last().copied().unwrap_or(f64::NAN)
     }
 }
 

@@ -70,11 +70,10 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
     lifted.pixels.reserve_exact(taken);
     lifted.outside_mask = imprint.len() - taken;
     for y in 0..imprint.height() {
-        for x in 0..imprint.width() {
-            if mask.is_some_and(|m| !m[(x, y)]) {
-                continue;
-            }
-            if let Some(point) = lift_pixel(imprint, camera, x, y) {
+        let pixels = imprint.row(y).iter().zip(camera.depth_reference.row(y)).enumerate();
+        let mask = mask.map(|mask| mask.row(y));
+        for (x, (imprint, reference)) in pixels.filter(|(x, _)| mask.is_none_or(|mask| mask[*x])) {
+            if let Some(point) = lift_depth(*imprint, *reference, camera, x, y) {
                 lifted.points.push(point);
                 lifted.pixels.push([x as u16, y as u16]);
             } else {
@@ -87,8 +86,12 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
 
 /// The point of one pixel, meters, grasp frame; `None` outside the images and where the depth is unusable.
 pub(crate) fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
-    let reference = *camera.depth_reference.get(x, y)?;
-    let depth = reference - imprint.get(x, y)?;
+    lift_depth(*imprint.get(x, y)?, *camera.depth_reference.get(x, y)?, camera, x, y)
+}
+
+#[inline]
+fn lift_depth(imprint: f32, reference: f32, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
+    let depth = reference - imprint;
     if !(reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0) {
         return None;
     }

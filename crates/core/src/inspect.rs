@@ -4,11 +4,11 @@
 
 use glam::{DVec2, DVec3};
 
-use super::align::TraceStep;
 use super::align::basin::{Basin, BasinConfig, basin};
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
+use super::align::{Contacts, TraceStep};
 use super::mesh::sampling::spread;
-use super::pose::{Registration, RegistrationChoice, ToolModel, register_from};
+use super::pose::{Registration, RegistrationChoice, ToolModel, register, register_from};
 
 /// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
 const MAP_POINTS: usize = 512;
@@ -18,24 +18,24 @@ const MAP_POINTS_COSTLY: usize = 96;
 
 /// Basin map: where every start of a grid leads; `None` if `cancelled` said so meanwhile.
 ///
-/// Costly registrations get fewer points, evenly thinned; [`Basin::points`] and [`Basin::offered`] say so.
-pub fn basin_map(
-    points: &[DVec3],
+/// The map is of the cost that decided the pose: where membranes say too little and the mask alone answers, of the mask
+/// alone. Costly registrations get fewer points, evenly thinned; [`Basin::points`] and [`Basin::offered`] say so.
+pub fn basin_map<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     engine: impl Into<RegistrationChoice>,
     config: &BasinConfig,
     cancelled: impl Fn() -> bool + Sync,
 ) -> Option<Basin> {
-    let engine = engine.into();
+    let (engine, Contacts { points, images }) = (engine.into(), contacts.into());
     let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
-    let most = if uses_field(engine.by) { MAP_POINTS } else { MAP_POINTS_COSTLY };
+    let most = if engine.by.uses_field() { MAP_POINTS } else { MAP_POINTS_COSTLY };
     let thinned: Vec<DVec3> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
-    basin(config, points.len(), |start| register_from(&thinned, tool, engine, start, false), cancelled)
-}
-
-/// True where the registration compares with the silhouette's field rather than with model points.
-pub(crate) fn uses_field(engine: Registration) -> bool {
-    matches!(engine, Registration::DistanceField | Registration::Certified | Registration::Joint)
+    let whole = Contacts { points: &thinned, images };
+    let by_membrane = || register(whole, tool, engine, false).ok()?.joint.map(|fit| fit.basis.has_membrane());
+    let images = if images.is_empty() || by_membrane() == Some(true) { images } else { &[] };
+    let contacts = Contacts { points: &thinned, images };
+    basin(config, points.len(), |start| register_from(contacts, tool, engine, start, false), cancelled)
 }
 
 /// Model that contact points are compared with at any step of a run, prepared once per tool.
@@ -48,7 +48,7 @@ impl Counterparts {
     /// For a registration with a tool.
     pub fn new(tool: &ToolModel, engine: Registration) -> Self {
         Self {
-            model: (!uses_field(engine)).then(|| {
+            model: (!engine.uses_field()).then(|| {
                 let surface = tool.surface().iter().map(|(p, _)| *p);
                 ModelPoints::new(&in_plane(&surface.collect::<Vec<_>>()))
             }),
@@ -76,7 +76,6 @@ mod tests {
     use crate::align::basin::{Plane, is_same_place};
     use crate::align::testing::{cross, cross_contacts};
     use crate::frames::PlanarPose;
-    use crate::pose::register;
     use strum::IntoEnumIterator as _;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 };
@@ -117,11 +116,12 @@ mod tests {
         for engine in Registration::iter() {
             let config = BasinConfig { size: [5, 3], ..BasinConfig::new(Plane::AngleY) };
             let map = basin_map(&points, &tool, engine, &config, || false).unwrap();
-            let most = if uses_field(engine) { MAP_POINTS } else { MAP_POINTS_COSTLY };
+            let most = if engine.uses_field() { MAP_POINTS } else { MAP_POINTS_COSTLY };
             assert_eq!((map.points, map.offered, map.cells.len()), (most, 901, 15), "{engine}");
             assert!(basin_map(&points, &tool, engine, &config, || true).is_none());
         }
-        let none = basin_map(&[], &tool, Registration::default(), &BasinConfig::new(Plane::YZ), || false).unwrap();
+        let none =
+            basin_map(&[] as &[DVec3], &tool, Registration::default(), &BasinConfig::new(Plane::YZ), || false).unwrap();
         assert!(none.cells.iter().all(|c| c.failure.is_some()) && none.basins.is_empty());
     }
 }

@@ -1,6 +1,5 @@
 //! Contact points to the tool's pose by one of the registrations.
 
-use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Evidence, Register, Scene, icp};
@@ -32,13 +31,13 @@ pub use choice::{RegistrationChoice, Rejection};
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Registration {
-    /// Robust registration on the distance field of the tool's silhouette.
+    /// The membranes' images against the tent over the tool, and the mask.
     #[default]
+    Joint,
+    /// Robust registration on the distance field of the tool's silhouette.
     DistanceField,
     /// Robust registration on the distance field, with a proof by branch and bound.
     Certified,
-    /// The membranes' images against the tent over the tool, and the mask.
-    Joint,
     /// The lab's planar point-to-point loop.
     LabIcp,
     /// Point to point on the silhouette.
@@ -53,7 +52,7 @@ pub enum Registration {
     PointToPlane,
     /// Generalized-ICP in space.
     Gicp,
-    /// The default in the plane, then against the triangles in space.
+    /// The distance field in the plane, then against the triangles in space.
     Refined,
 }
 
@@ -83,12 +82,12 @@ impl Registration {
     /// Description of its method, in one line.
     pub fn description(self) -> &'static str {
         match self {
-            Self::DistanceField => "Robust least squares on the distance field of the silhouette: the default",
+            Self::DistanceField => "The mask alone: robust least squares on the distance field of the silhouette",
             Self::Certified => {
-                "The default's answer with a proof: branch and bound, no pose of the prior is 2 % better"
+                "That of the distance field with a proof: branch and bound, no pose of the prior is 2 % better"
             }
             Self::Joint => {
-                "The whole membrane against the sheet that the tool would lift, with the mask as a weaker term: for bad masks"
+                "The default: the whole membrane against the sheet that the tool would lift, with the mask as a weaker term"
             }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
             Self::PlanarPointToPoint => {
@@ -104,7 +103,7 @@ impl Registration {
                 "Six degrees of freedom, surface to surface with both sides' normals, Huber's kernel, ten starts"
             }
             Self::Refined => {
-                "The default, then robust point to plane against the triangles with six degrees of freedom"
+                "The distance field, then robust point to plane against the triangles with six degrees of freedom"
             }
         }
     }
@@ -115,8 +114,8 @@ impl Registration {
     }
 }
 
-/// Contact points (grasp frame, meters), with the images of the membranes where they are known, to the tool's pose: what every caller ends in. `record` keeps per-iteration
-/// states, per-point residuals and the distances both ways.
+/// Contact points (grasp frame, meters), with the images of the membranes where they are known, to the tool's pose: what
+/// every caller ends in. `record` keeps per-iteration states, per-point residuals and the distances both ways.
 ///
 /// # Errors
 /// [`AlignError`] for too few points or none near the tool.
@@ -133,14 +132,14 @@ pub fn register<'a>(
 ///
 /// # Errors
 /// As [`register`], and for a start that is not finite.
-pub(crate) fn register_from(
-    points: &[DVec3],
+pub(crate) fn register_from<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     engine: impl Into<RegistrationChoice>,
     start: PlanarPose,
     record: bool,
 ) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), points, tool, Ask { starts: Some(&[start]), record, ..Ask::default() })
+    register_with(&*engine.into().method(), contacts, tool, Ask { starts: Some(&[start]), record, ..Ask::default() })
 }
 
 /// Registers with a registration of any settings.

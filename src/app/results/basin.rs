@@ -6,18 +6,16 @@ use super::super::jobs::{Job, Lane};
 use super::super::keys::BasinKey;
 use super::super::pane::Demand;
 use super::super::results;
-use super::super::results::{Computes, Demands, Registered};
+use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::align::basin::Basin;
 
 impl Computes for BasinKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Basin>> {
-        let Registered { clouds, tool, .. } = results::registered(state, &self.pose)?;
+        let registered = results::registered(state, &self.pose)?;
         let (registration, plane) = (self.pose.registration, self.plane);
-        Some(Job::new(Lane::Compute, "Basin map", move |cx| {
-            touch2touch_work::pose::basin(&clouds.contact_points(), &tool.model, registration, plane, cx)
-        }))
+        Some(Job::new(Lane::Compute, "Basin map", move |cx| registered.basin(registration, plane, cx)))
     }
 
     fn arrived(&self, state: &mut State, _: &Arc<Basin>) {

@@ -5,19 +5,17 @@ use std::sync::Arc;
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImprintSource, InfluenceKey};
 use super::super::results;
-use super::super::results::{Computes, Demands, Registered};
+use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Lookup, State};
 use touch2touch_work::influence::Influence;
 
 impl Computes for InfluenceKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Influence>> {
-        let Registered { clouds, tool, .. } = results::registered(state, &self.0)?;
-        let pose = state.results.poses.get(&self.0)?.grasp_from_object;
-        let sample = state.results.samples.get(&self.0.cloud.place()?.0)?.clone();
-        let registration = self.0.registration;
+        let registered = results::registered(state, &self.0)?;
+        let (pose, registration) = (state.results.poses.get(&self.0)?.clone(), self.0.registration);
         Some(Job::new(Lane::Compute, "Influence of the pixels", move |_| {
-            touch2touch_work::influence::influence(&clouds, &sample, &tool.model, registration, pose)
+            registered.influence(registration, &pose.report)
         }))
     }
 

@@ -108,7 +108,7 @@ impl TypedValueParser for RegistrationsParser {
 
     fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
         let names = [
-            PossibleValue::new("default").help("The same as distance_field"),
+            PossibleValue::new("default").help("The same as joint"),
             PossibleValue::new("lab").help("The same as lab_icp"),
             PossibleValue::new("all").help("All of the following, one after the other"),
         ];

@@ -4,15 +4,14 @@ use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
+use touch2touch_core::align::Contacts;
 use touch2touch_core::pose::{RegistrationChoice, ToolModel};
-use touch2touch_core::sample::Sample;
-use touch2touch_work::cloud::Clouds;
 use touch2touch_work::error::TaskError;
+use touch2touch_work::feel::{Felt, Touch};
 use touch2touch_work::influence::{Place, influence};
 use touch2touch_work::io::names;
 use touch2touch_work::io::npz;
 use touch2touch_work::io::pt::Tensor;
-use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::pose::PoseResult;
 
 /// Influence of a case's pixels on its angle.
@@ -45,16 +44,20 @@ impl NamedPlace {
 /// pose has none. That it cannot be written is an error.
 pub(super) fn write(
     stem: &Path,
-    clouds: &Clouds,
-    sample: &Sample,
+    felt: &Felt,
+    touch: Touch<'_>,
     tool: &ToolModel,
-    (imprint, registration): (ImprintSource, RegistrationChoice),
+    registration: RegistrationChoice,
     found: &PoseResult,
 ) -> anyhow::Result<Result<Influences, TaskError>> {
-    let found = match influence(clouds, sample, tool, registration, found.grasp_from_object) {
+    let sample = touch.sample;
+    let clouds = felt.contact().clouds(sample)?;
+    let of = |contacts: Contacts<'_>| influence(&clouds, contacts, sample, tool, registration, &found.report);
+    let found = match felt.with_contacts(touch, of)? {
         Ok(found) => found,
         Err(why) => return Ok(Err(why)),
     };
+    let imprint = felt.recipe().imprint;
     let registration = registration.to_string().replace([':', '='], "_");
     let file = names::with_ending(stem, &format!("_{}_{registration}_influence.npz", imprint.key()));
     let name = |pad| sample.rig.pad_key(pad).to_string();

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use touch2touch_core::align::Contacts;
 use touch2touch_core::catalog;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -11,7 +12,7 @@ use touch2touch_core::rig::{PadId, PerPad, lab};
 use touch2touch_core::sample::{DepthTouch, Sample};
 use touch2touch_core::sim::{self, SimConfig};
 use touch2touch_core::units::angle_error;
-use touch2touch_work::cloud::contact_points;
+use touch2touch_work::cloud::{contact_points, images};
 use touch2touch_work::compare::LAB_PEAK_M;
 use touch2touch_work::infer::mask::MaskModel;
 
@@ -65,11 +66,12 @@ fn bubble(sample: &Sample, finger: PadId) -> anyhow::Result<&DepthTouch> {
 /// Finds masks and poses of imprints.
 pub(super) struct Judge {
     masks: MaskModel,
+    registration: Registration,
 }
 
 impl Judge {
-    pub(super) fn new(masks: MaskModel) -> Self {
-        Self { masks }
+    pub(super) fn new(masks: MaskModel, registration: Registration) -> Self {
+        Self { masks, registration }
     }
 
     /// The pose errors of the imprints that were measured.
@@ -100,8 +102,9 @@ impl Judge {
         let masks: PerPad<Mask> = [contact(&imprints[0])?, contact(&imprints[1])?].into();
         let imprints = [Some(&imprints[0]), Some(&imprints[1])].into();
         let points = contact_points(&case.sample, &imprints, &masks.as_ref())?;
+        let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints) };
         // Too few contact points are no pose; that is counted.
-        let report = register(&points, &case.tool, Registration::default(), false).ok();
+        let report = register(contacts, &case.tool, self.registration, false).ok();
         Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))
     }
 }

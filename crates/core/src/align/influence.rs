@@ -3,12 +3,13 @@
 //! The registration ends where the pulls of its points balance. Without one of them the balance lies elsewhere, and to
 //! first order the pose moves there by the inverse curvature of the cost times the pull that is missing: one solved
 //! matrix answers for all points, also for those that were not registered. Points on the silhouette pull nothing and
-//! have no influence.
+//! have no influence. Where membranes had a say they hold the pose as well ([`Hold`]), and a point moves it less.
 
 use glam::DVec2;
 use nalgebra::{Matrix3, Vector3};
 
 use super::ANGLE_SCALE_M;
+use super::Hold;
 use super::observability::{DEGENERATE_BELOW, MIN_TELLING, observability};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
@@ -38,7 +39,7 @@ pub enum InfluenceError {
 /// whether it takes part. NaN for points that are not finite.
 ///
 /// Points are `(y, z)`, meters, grasp frame; the pose is where the registration on `field` ended, with a last kernel of
-/// `kernel_m`. Motions that the points leave open (a rod slides along itself) are left where they are.
+/// `kernel_m`, or where membranes and mask together did, with the membranes' `hold`. Motions that the points leave open (a rod slides along itself) are left where they are.
 ///
 /// # Errors
 /// [`InfluenceError`] where the registered points do not determine the angle.
@@ -48,6 +49,7 @@ pub fn influence(
     field: &DistanceField,
     grasp_from_object: PlanarPose,
     kernel_m: f64,
+    hold: Option<&Hold>,
 ) -> Result<Vec<f64>, InfluenceError> {
     let is_registered = |at: usize| registered.get(at) == Some(&true);
     let own: Vec<DVec2> = (0..points_yz.len()).filter(|at| is_registered(*at)).map(|at| points_yz[at]).collect();
@@ -55,20 +57,27 @@ pub fn influence(
         return Err(InfluenceError::NoBalance);
     }
     let seen = observability(&own, field, grasp_from_object);
-    if seen.telling < MIN_TELLING {
+    if seen.telling < MIN_TELLING && hold.is_none() {
         return Err(InfluenceError::TooFewTelling { got: seen.telling });
     }
     let motions = seen.motions.map(Vector3::from);
-    let is_open = |at: &usize| seen.eigenvalues[*at] < DEGENERATE_BELOW;
+    let is_open = |at: &usize| hold.is_none() && seen.eigenvalues[*at] < DEGENERATE_BELOW;
     // A motion that mostly turns leaves the angle open, one that mostly slides does not.
     if (0..3).filter(is_open).map(|at| motions[at][0].powi(2)).sum::<f64>() > 0.5 {
         return Err(InfluenceError::AngleOpen);
     }
     let pull = |point: DVec2| Pull::of(point, seen.center, field, grasp_from_object, kernel_m);
-    let mut curvature = Matrix3::zeros();
+    let (mut curvature, mut together, mut count) = (Matrix3::zeros(), Vector3::zeros(), 0.0);
     for point in own.iter().filter(|p| p.is_finite()) {
         let pull = pull(*point);
         curvature += pull.slope * pull.slope.transpose() * pull.stiffness;
+        together += pull.slope * pull.strength;
+        count += 1.0;
+    }
+    // The mean over the points counts beside the membranes: one point more or less changes the share of all.
+    let share = hold.map_or(Vector3::zeros(), |_| together / f64::max(count, 1.0));
+    if let Some(hold) = hold {
+        curvature += hold.about(seen.center) * count;
     }
     // Along an open motion the curvature is noise: there the pose is held.
     let scale = curvature.trace();
@@ -89,8 +98,9 @@ pub fn influence(
         let step = inverse * slope;
         // The curvature that goes or comes with the point.
         let leverage = stiffness * slope.dot(&step);
-        let way = if is_registered(at) { strength / (1.0 - leverage) } else { -strength / (1.0 + leverage) };
-        step[0] * way / ANGLE_SCALE_M
+        let own = step[0] * strength - (inverse * share)[0];
+        let way = if is_registered(at) { own / (1.0 - leverage) } else { -own / (1.0 + leverage) };
+        way / ANGLE_SCALE_M
     });
     Ok(found.collect())
 }
@@ -149,7 +159,7 @@ mod tests {
             (0..points.len()).filter(|at| takes(*at)).map(|at| points[at]).collect()
         };
         let pose = registered(&own(&|at| takes[at]), field, POSE);
-        let each = influence(points, takes, field, pose, KERNEL_M).unwrap();
+        let each = influence(points, takes, field, pose, KERNEL_M, None).unwrap();
         let square = |p: DVec2| ((p.x / 0.004).floor() as i32, (p.y / 0.004).floor() as i32);
         let all: std::collections::BTreeSet<_> = points.iter().map(|p| square(*p)).collect();
         let mut found = Vec::new();
@@ -193,7 +203,7 @@ mod tests {
     fn what_is_missing_is_said() {
         let field = DistanceField::from_mesh(&cross()).unwrap();
         let all = |points: &[DVec2]| vec![true; points.len()];
-        let of = |points: &[DVec2]| influence(points, &all(points), &field, POSE, KERNEL_M);
+        let of = |points: &[DVec2]| influence(points, &all(points), &field, POSE, KERNEL_M, None);
         assert_eq!(of(&[]), Err(InfluenceError::TooFewTelling { got: 0 }));
         // All on the silhouette: nothing pulls.
         let inside = cross_contacts(500, POSE, 0.0, 1);
@@ -207,21 +217,25 @@ mod tests {
         assert!(found[2000].is_nan() && found[..2000] == whole);
         let nowhere = PlanarPose { theta_rad: f64::NAN, ..POSE };
         let all = vec![true; points.len()];
-        assert_eq!(influence(&points, &all, &field, nowhere, KERNEL_M), Err(InfluenceError::NoBalance));
+        assert_eq!(influence(&points, &all, &field, nowhere, KERNEL_M, None), Err(InfluenceError::NoBalance));
         // No flag is the same as not registered.
-        assert_eq!(influence(&points, &[], &field, POSE, KERNEL_M), Err(InfluenceError::TooFewTelling { got: 0 }));
+        assert_eq!(
+            influence(&points, &[], &field, POSE, KERNEL_M, None),
+            Err(InfluenceError::TooFewTelling { got: 0 })
+        );
     }
 
     #[test]
     fn a_disc_leaves_the_angle_open_and_a_sliding_rod_does_not() {
         let round = DistanceField::from_mesh(&disc(0.01, 96)).unwrap();
         let rim: Vec<DVec2> = (0..2000).map(|i| DVec2::from_angle(f64::from(i)) * 0.0104).collect();
-        let of_disc = influence(&rim, &vec![true; rim.len()], &round, PlanarPose::default(), KERNEL_M);
+        let of_disc = influence(&rim, &vec![true; rim.len()], &round, PlanarPose::default(), KERNEL_M, None);
         assert_eq!(of_disc, Err(InfluenceError::AngleOpen));
         let rod: TriMesh = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.04));
         let field = DistanceField::from_mesh(&rod).unwrap();
         let points = filled(&[DVec2::new(0.0035, 0.02)], 0.0, 4000, PlanarPose::default(), 0.0, 1);
-        let found = influence(&points, &vec![true; points.len()], &field, PlanarPose::default(), KERNEL_M).unwrap();
+        let found =
+            influence(&points, &vec![true; points.len()], &field, PlanarPose::default(), KERNEL_M, None).unwrap();
         // A point beside the rod's end turns it the more, the farther out it is; on the other side the other way.
         let of = |end: f64, side: f64| {
             let near = |p: &DVec2| (p.y - 0.018 * end).abs() < 0.001 && p.x * side > 0.003_2;

@@ -10,6 +10,7 @@
 
 mod cost;
 mod evidence;
+mod hold;
 mod image;
 mod problem;
 mod smooth;
@@ -20,10 +21,12 @@ mod uncertainty;
 
 use serde::{Deserialize, Serialize};
 
+use super::register::check_overlap;
 use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
+pub use hold::Hold;
 use problem::{Problem, check};
 pub use uncertainty::Uncertainty;
 
@@ -161,6 +164,14 @@ impl Register for JointConfig {
         let Some(mut problem) = Problem::new(scene, tool, &config)? else {
             return by_mask(JointFit::by_mask(Basis::NoZone));
         };
+        if ask.starts.is_some() {
+            // Asked is where these lead, not what else would answer.
+            let finite = scene.yz().iter().copied().filter(|p| p.is_finite());
+            if finite.clone().next().is_some() {
+                check_overlap(finite, &tool.field, &config.starts)?;
+            }
+            return Ok(problem.report(scene.yz(), problem.solve()));
+        }
         let mut answer = problem.solve();
         if answer.fit.explained < config.doubtful && problem.forget_mask() {
             // A bad mask can lead all scouts away from what the membrane shows plainly.

@@ -3,8 +3,8 @@
 /// Points per step: as many as keep the reads of a step in flight together.
 pub(super) const LANES: usize = 16;
 /// Adding it to a number below leaves the number's integer part in the low bits.
-const MAGIC: f32 = 8_388_608.0;
-const MAGIC_MASK: u32 = 0x7f_ffff;
+pub(super) const MAGIC: f32 = 8_388_608.0;
+pub(super) const MAGIC_MASK: u32 = 0x7f_ffff;
 
 /// A grid of numbers, row by row: y runs along a row, z over the rows. Fewer than 2^23 cells.
 #[derive(Clone, Copy)]

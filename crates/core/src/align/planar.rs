@@ -134,7 +134,7 @@ impl Answer {
         } else {
             (accept.cost, accept.inliers)
         };
-        let kernel = final_kernel(config);
+        let kernel = config.final_kernel_m();
         if !self.best().stop.converged() {
             Outcome::NotConverged
         } else if !config.prior.allows(self.pose) {
@@ -192,7 +192,7 @@ impl<'a> Problem<'a> {
     /// Several starts, and then a proof that nothing in the prior is better, or what is.
     fn certified(&self, earlier: Option<&Earlier>) -> Result<Answer, AlignError> {
         let config = self.config;
-        let kernel = final_kernel(config);
+        let kernel = config.final_kernel_m();
         let mut answer = self.descend(Rung::Certified, several(&config.prior), self.search(), None)?;
         let mut search = self.search();
         // The proof begins with the best that is known, of the prior if anything there is: it is about the prior.
@@ -316,7 +316,7 @@ impl<'a> Problem<'a> {
         if reach < MIN_SHARE {
             return Err(AlignError::NoOverlap { share: reach });
         }
-        let kernel = final_kernel(config);
+        let kernel = config.final_kernel_m();
         let mut runs = search.scout(&states, &self.scouts, kernels_m);
         let allowed = |run: &Progress| config.prior.allows(run.state.to_pose(c));
         let mut order: Vec<usize> = (0..runs.len()).filter(|&r| runs[r].merged_into.is_none()).collect();
@@ -414,7 +414,7 @@ impl<'a> Problem<'a> {
             directions: None,
             trace: answer.trace,
             fits: if config.record {
-                fits(points_yz, self.field, answer.pose, final_kernel(config))
+                fits(points_yz, self.field, answer.pose, config.final_kernel_m())
             } else {
                 Vec::new()
             },
@@ -427,11 +427,6 @@ fn several(prior: &Prior) -> Vec<PlanarPose> {
     [0.0, -0.45, 0.45, -0.9, 0.9]
         .map(|share| PlanarPose { theta_rad: share * prior.theta_rad, ..PlanarPose::default() })
         .to_vec()
-}
-
-/// The width that decides, meters; [`check`] has seen that there is one.
-fn final_kernel(config: &AlignConfig) -> f64 {
-    config.kernels_m.last().copied().unwrap_or(f64::NAN)
 }
 
 fn check(config: &AlignConfig) -> Result<(), AlignError> {

@@ -139,7 +139,7 @@ impl RegistrationChoice {
                 };
                 match self.by {
                     Registration::DistanceField | Registration::Certified => {
-                        AlignConfig::default().kernels_m.last().copied()
+                        Some(AlignConfig::default().final_kernel_m())
                     }
                     Registration::LabIcp | Registration::Joint => None,
                     Registration::Refined => of_pairs(RefineConfig::default().space),
@@ -183,6 +183,11 @@ impl Registration {
             Self::PointToPlane => Some(IcpConfig::point_to_plane()),
             Self::Gicp => Some(IcpConfig::gicp()),
         }
+    }
+
+    /// True where it compares with the silhouette's field rather than with model points.
+    pub fn uses_field(self) -> bool {
+        matches!(self, Self::DistanceField | Self::Certified | Self::Joint)
     }
 
     /// True where it can be given a gate.

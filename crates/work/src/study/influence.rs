@@ -5,8 +5,7 @@ use serde::Serialize;
 
 use crate::cloud::Clouds;
 use crate::error::TaskError;
-use touch2touch_core::align;
-use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::align::{self, AlignConfig, AlignReport, Basis, Contacts, Hold, Scene};
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::label::grow;
 use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel};
@@ -66,27 +65,37 @@ impl Influence {
     }
 }
 
-/// Influence of each pixel of a pair's imprints on the angle that was registered from their contact points.
+/// Influence of each pixel of a pair's imprints on the angle that was registered from their contact points: `report` is of
+/// `contacts`, which are those of `clouds`.
 ///
 /// # Errors
-/// If the registration is not one on the distance field, or the points do not determine the angle.
+/// If the registration has no cost by pixels, or the points do not determine the angle.
 pub fn influence(
     clouds: &Clouds,
+    contacts: Contacts<'_>,
     sample: &Sample,
     tool: &ToolModel,
     registration: RegistrationChoice,
-    grasp_from_object: PlanarPose,
+    report: &AlignReport,
 ) -> Result<Influence, TaskError> {
-    let on_field = matches!(registration.by, Registration::DistanceField | Registration::Certified);
-    let kernel_m = registration.gate_m().filter(|_| on_field).ok_or_else(|| {
-        let why = format!("{} has no cost that says what its pixels are worth", registration.label());
-        let hint = format!("Choose {} or {}.", Registration::DistanceField.label(), Registration::Certified.label());
-        TaskError::new(WHAT, why).with_hint(hint)
-    })?;
+    let hold = Hold::of(&Scene::new(contacts), tool, report);
+    let kernel_m = match (report.joint.map(|fit| fit.basis), &hold) {
+        (Some(Basis::Membrane), _) => {
+            return Err(TaskError::new(WHAT, "the membranes alone decided the pose: no pixel of the mask had a say"));
+        }
+        (_, Some(hold)) => hold.kernel_m,
+        (Some(_), None) => AlignConfig::default().final_kernel_m(),
+        (None, None) if registration.by.uses_field() => registration.gate_m().unwrap_or_default(),
+        (None, None) => {
+            let why = format!("{} has no cost that says what its pixels are worth", registration.label());
+            let hint = format!("Choose {} or {}.", Registration::Joint.label(), Registration::DistanceField.label());
+            return Err(TaskError::new(WHAT, why).with_hint(hint));
+        }
+    };
     let all = || clouds.fingers.iter().flatten();
     let yz: Vec<DVec2> = all().flat_map(|f| &f.points).map(|p| DVec2::new(p.y, p.z)).collect();
     let registered: Vec<bool> = all().flat_map(|f| &f.contact).copied().collect();
-    let each = align::influence(&yz, &registered, &tool.field, grasp_from_object, kernel_m)
+    let each = align::influence(&yz, &registered, &tool.field, report.grasp_from_object, kernel_m, hold.as_ref())
         .map_err(|err| TaskError::from_error(WHAT, &err))?;
     let px_per_mm = sample.rig.depth_px_per_mm();
     let (mut pixels, mut places, mut from) = (PerPad::default(), Vec::new(), 0);
@@ -162,11 +171,12 @@ fn most(mut places: Vec<Place>) -> Vec<Place> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cloud::clouds;
+    use crate::cloud::{clouds, images};
     use crate::pose::pose;
-    use touch2touch_core::align::{AlignConfig, Ask};
+    use touch2touch_core::align::{Ask, JointConfig, Register};
+    use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::DepthMap;
-    use touch2touch_core::pose::register_with;
+    use touch2touch_core::pose::{register, register_with};
     use touch2touch_core::{catalog, sim};
 
     /// A simulated grasp with masks of its true contact, `grown_px` too large.
@@ -185,18 +195,24 @@ mod tests {
         clouds(sample, &parts).unwrap()
     }
 
-    /// Predicted and true changes of the angle, degrees, where squares of 5 mm leave the mask or what lies beside joins it;
-    /// registered from at most so many points.
-    fn squares(tool: usize, seed: u64, points: usize) -> Vec<(f64, f64)> {
+    /// A registration from one start, as a squares' test runs it.
+    type From<'a> = &'a dyn Fn(PlanarPose) -> Box<dyn Register>;
+
+    /// Predicted and true changes of the angle, degrees, where squares of 5 mm leave the mask or what lies beside joins it.
+    fn squares(tool: usize, seed: u64, from: From<'_>) -> Vec<(f64, f64)> {
         let (sample, model, masks) = grasp(tool, seed, 2.0);
+        let imprints = sample.rig.pads().map(|pad| Some(&sample.pad(pad)?.depth()?.imprint)).collect();
+        let images = images(&sample, &imprints);
         let register = |masks: &PerPad<Mask>, start: PlanarPose| {
-            let config = AlignConfig { points, starts: vec![start], ..AlignConfig::default() };
-            let contact = lifted(&sample, masks).contact_points();
-            register_with(&config, &contact, &model, Ask::default()).unwrap().grasp_from_object
+            let points = lifted(&sample, masks).contact_points();
+            register_with(&*from(start), Contacts { points: &points, images: &images }, &model, Ask::default()).unwrap()
         };
         let truth = sample.grasp_from_object.unwrap();
         let (before, base) = (lifted(&sample, &masks), register(&masks, truth));
-        let found = influence(&before, &sample, &model, RegistrationChoice::default(), base).unwrap();
+        let contacts = Contacts { points: &before.contact_points(), images: &images };
+        let by = Registration::DistanceField.into();
+        let found = influence(&before, contacts, &sample, &model, by, &base).unwrap();
+        let base = base.grasp_from_object;
         assert!(found.places.is_sorted_by(|a, b| a.angle_deg.abs() >= b.angle_deg.abs()));
         assert!(found.places.iter().all(|place| place.pixels > 0 && place.point_m.iter().all(|v| v.is_finite())));
         assert_eq!(found.places.len(), PLACES);
@@ -218,7 +234,8 @@ mod tests {
                     }
                     if predicted != 0.0 {
                         // The lab's angle is that of the inverse.
-                        let change = base.theta_rad - register(&changed, base).theta_rad;
+                        let after = register(&changed, base).grasp_from_object;
+                        let change = base.theta_rad - after.theta_rad;
                         pairs.push((predicted.to_degrees(), change.to_degrees()));
                     }
                 }
@@ -227,32 +244,44 @@ mod tests {
         pairs
     }
 
-    /// Correlation of predicted and true changes over squares of three grasps.
-    fn correlation(points: usize) -> f64 {
+    /// Correlation of predicted and true changes over squares of three grasps, and the mean size of the true ones, degrees.
+    fn correlation(from: From<'_>) -> (f64, f64) {
         let grasps = [(0, 3), (3, 5), (5, 8)];
-        let pairs: Vec<_> = grasps.into_iter().flat_map(|(tool, seed)| squares(tool, seed, points)).collect();
+        let pairs: Vec<_> = grasps.into_iter().flat_map(|(tool, seed)| squares(tool, seed, from)).collect();
         assert!(pairs.len() > 300, "{}", pairs.len());
         let n = pairs.len() as f64;
         let mean = |f: &dyn Fn(&(f64, f64)) -> f64| pairs.iter().map(f).sum::<f64>() / n;
         let (a, b) = (mean(&|p| p.0), mean(&|p| p.1));
         let both = mean(&|p| (p.0 - a) * (p.1 - b));
-        both / (mean(&|p| (p.0 - a).powi(2)) * mean(&|p| (p.1 - b).powi(2))).sqrt()
+        let correlation = both / (mean(&|p| (p.0 - a).powi(2)) * mean(&|p| (p.1 - b).powi(2))).sqrt();
+        (correlation, mean(&|p| p.1.abs()))
     }
 
     #[test]
     fn the_influence_of_squares_is_what_registering_anew_says() {
-        let (all, thinned) = (correlation(usize::MAX), correlation(AlignConfig::default().points));
+        let by_mask = |points, start| -> Box<dyn Register> {
+            Box::new(AlignConfig { points, starts: vec![start], ..AlignConfig::default() })
+        };
+        let (all, by_mask_alone) = correlation(&|start| by_mask(usize::MAX, start));
+        let (thinned, _) = correlation(&|start| by_mask(AlignConfig::default().points, start));
         assert!(all > 0.8, "{all}");
         // The product thins, and which points stay changes with the mask: that moves the angle as much as a square does.
         assert!(thinned > 0.2 && thinned < all, "{thinned}");
+        let (joint, with_membranes) = correlation(&|start| {
+            let whole = [64, usize::MAX];
+            Box::new(JointConfig { starts: vec![start], mask_points: whole, ..JointConfig::default() })
+        });
+        assert!(joint > 0.6, "{joint}");
+        assert!(with_membranes < 0.5 * by_mask_alone, "membranes hold: {with_membranes} {by_mask_alone}");
     }
 
     #[test]
     fn it_says_why_there_is_none() {
         let (sample, model, masks) = grasp(0, 3, 2.0);
         let clouds = lifted(&sample, &masks);
+        let report = register(&clouds.contact_points(), &model, Registration::DistanceField, false).unwrap();
         let of = |by: Registration, clouds: &Clouds| {
-            influence(clouds, &sample, &model, by.into(), PlanarPose::default()).unwrap_err()
+            influence(clouds, Contacts::default(), &sample, &model, by.into(), &report).unwrap_err()
         };
         assert!(of(Registration::Gicp, &clouds).why.contains("GICP, 6 DoF"));
         assert!(of(Registration::Gicp, &clouds).hint.unwrap().contains("distance field"));

@@ -191,11 +191,9 @@ impl Felt {
         registration: &dyn Register,
         ask: Ask<'_>,
     ) -> Result<PoseResult, TaskError> {
-        let points = self.points().map_err(Clone::clone)?;
         let tool = touch.tool.map_err(Clone::clone)?;
-        let images = images(touch.sample, &self.contact().imprints.as_ref());
-        let contacts = Contacts { points, images: &images };
-        pose(contacts, tool, registration, ask, touch.sample.grasp_from_object)
+        let truth = touch.sample.grasp_from_object;
+        self.with_contacts(touch, |contacts| pose(contacts, tool, registration, ask, truth))?
     }
 
     /// Candidates for the tool of the touch, the likeliest first.
@@ -211,9 +209,20 @@ impl Felt {
         tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
         registration: &dyn Register,
     ) -> Result<Vec<Candidate>, TaskError> {
+        self.with_contacts(touch, |contacts| which_tool(contacts, tools, registration))
+    }
+
+    /// The contact points with the imprints that they are from, as every registration takes them.
+    ///
+    /// # Errors
+    /// If there are no contact points.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn with_contacts<T>(&self, touch: Touch<'_>, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
         let points = self.points().map_err(Clone::clone)?;
         let images = images(touch.sample, &self.contact().imprints.as_ref());
-        Ok(which_tool(Contacts { points, images: &images }, tools, registration))
+        Ok(of(Contacts { points, images: &images }))
     }
 
     /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on

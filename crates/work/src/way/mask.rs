@@ -121,13 +121,22 @@ impl Default for MaskChoice {
 }
 
 impl MaskChoice {
-    /// Choice with the numbers of its own source only; those of other sources are at their defaults.
+    /// The choice that a recipe's identity does not name. Part of the format: it stays when the default changes.
+    pub(crate) const UNNAMED: Self = Self {
+        source: MaskSource::Auto,
+        threshold_m: 0.005,
+        probability: None,
+        top_percent: 15.0,
+        cad_distance_m: 0.001,
+    };
+
+    /// Choice with the numbers of its own source only; those of other sources are as they go without saying.
     #[must_use]
     pub(crate) fn of_its_source(&self) -> Self {
         let Self { source, threshold_m, probability, top_percent, cad_distance_m } = *self;
         // + 0.0 turns -0 into 0, which means the same.
         let threshold_m = threshold_m + 0.0;
-        let from = Self { source, ..Self::default() };
+        let from = Self { source, ..Self::UNNAMED };
         match source {
             MaskSource::Auto => Self { threshold_m, probability, ..from },
             MaskSource::Unet => Self { probability, ..from },

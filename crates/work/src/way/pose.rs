@@ -2,8 +2,6 @@
 
 use std::time::Instant;
 
-use glam::DVec3;
-
 use crate::error::TaskError;
 use crate::job::JobCx;
 use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
@@ -106,8 +104,8 @@ pub fn pose<'a>(
 ///
 /// # Errors
 /// If the job was told to stop, or no start led anywhere.
-pub fn basin(
-    points: &[DVec3],
+pub fn basin<'a>(
+    contacts: impl Into<Contacts<'a>>,
     tool: &ToolModel,
     registration: RegistrationChoice,
     plane: Plane,
@@ -115,7 +113,7 @@ pub fn basin(
 ) -> Result<Basin, TaskError> {
     const WHAT: &str = "Basin map";
     let config = BasinConfig::new(plane);
-    let map = basin_map(points, tool, registration, &config, || cx.cancel.is_cancelled())
+    let map = basin_map(contacts, tool, registration, &config, || cx.cancel.is_cancelled())
         .ok_or_else(|| TaskError::cancelled(WHAT))?;
     match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
         Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),

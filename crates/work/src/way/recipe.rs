@@ -16,7 +16,7 @@ use crate::infer::recipe_id::Named;
 use crate::labels::{ImprintOf, ImprintSource};
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::ensemble::seeds;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::{Registration, RegistrationChoice};
 use touch2touch_core::postprocess::ShiftMode;
 
 pub use crate::infer::recipe_id::RecipeId;
@@ -136,6 +136,20 @@ impl<M> Default for Recipe<M> {
 }
 
 impl<M> Recipe<M> {
+    /// The choices that an identity does not name. Part of the format: they stay when defaults change.
+    fn unnamed() -> Self {
+        Self {
+            imprint: ImprintSource::Measured,
+            generator: None,
+            shift: ShiftMode::ExactInverse,
+            mask: MaskChoice::UNNAMED,
+            mask_model: None,
+            hand: true,
+            registration: Registration::DistanceField.into(),
+            engine: EngineChoice::Auto,
+        }
+    }
+
     /// Recipe with other models; `None` where one has no counterpart.
     pub(crate) fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
         let generator = match self.generator {
@@ -186,13 +200,13 @@ impl<M> Recipe<M> {
 }
 
 impl Recipe {
-    /// Only what decides the result of a stage: what comes later is at its default, and what is not used as well.
+    /// Only what decides the result of a stage: what comes later, and what is not used, is as it goes without saying.
     #[must_use]
     pub fn until(&self, stage: Stage) -> Self {
         let predicted = self.imprint == ImprintSource::Predicted;
         let masked = stage >= Stage::Mask;
         let unet = masked && self.takes_mask_model() && self.mask_model.is_some();
-        let from = Self::default();
+        let from = Self::unnamed();
         Self {
             imprint: self.imprint,
             generator: self.generator.clone().filter(|_| predicted),
@@ -208,7 +222,7 @@ impl Recipe {
     /// The identity of the result of a stage, of any touch.
     pub fn id(&self, stage: Stage) -> RecipeId {
         let of = self.until(stage);
-        let from = Self::default();
+        let from = Self::unnamed();
         let mut named = match &of.generator {
             Some((model, config)) => Named::prediction(&model.id, config, of.engine),
             None => Named::default(),

@@ -31,8 +31,9 @@ impl Patch {
         let padded = len.next_multiple_of(LANES);
         let [mut y, mut z, mut band] = [(); 3].map(|()| Vec::with_capacity(padded));
         for (place, value) in places {
-            y.push((place.x / STEP_M) as f32);
-            z.push((place.y / STEP_M) as f32);
+            let place = place * (1.0 / STEP_M);
+            y.push(place.x as f32);
+            z.push(place.y as f32);
             band.push(value);
         }
         for list in [&mut y, &mut z, &mut band] {
@@ -57,11 +58,14 @@ struct Read {
 }
 
 impl BandField {
-    fn read(&self, patch: &Patch, at: usize, state: State) -> Read {
-        let turn = DVec2::from_angle(state.phi);
-        let place = (state.place - self.origin) / STEP_M;
-        let (cos, sin) = (turn.x as f32, turn.y as f32);
-        let (place_y, place_z) = (place.x as f32, place.y as f32);
+    /// Turn (cosine, sine) and place (nodes) of a state.
+    fn motion(&self, state: State) -> [f32; 4] {
+        let (turn, place) = (DVec2::from_angle(state.phi), (state.place - self.origin) / STEP_M);
+        [turn.x as f32, turn.y as f32, place.x as f32, place.y as f32]
+    }
+
+    #[inline(always)]
+    fn read(&self, patch: &Patch, at: usize, [cos, sin, place_y, place_z]: [f32; 4]) -> Read {
         let span = at..at + LANES;
         let (y, z, band) = (&patch.y[span.clone()], &patch.z[span.clone()], &patch.band[span]);
         let zero = [0f32; LANES];
@@ -94,8 +98,9 @@ impl BandField {
         let square = kernel * kernel;
         let bend_scale = 4.0 / square;
         let mut sums = LaneSums::default();
+        let motion = self.motion(state);
         for at in (0..patch.y.len()).step_by(LANES) {
-            let Read { ay, az, r, gy, gz, .. } = self.read(patch, at, state);
+            let Read { ay, az, r, gy, gz, .. } = self.read(patch, at, motion);
             let mut counts = [1f32; LANES];
             if patch.len < at + LANES {
                 counts[patch.len - at..].fill(0.0);
@@ -116,8 +121,9 @@ impl BandField {
 
     /// Residuals at a state and the template there, meters.
     pub(super) fn residuals(&self, patch: &Patch, state: State, mut each: impl FnMut(f32, f32)) {
+        let motion = self.motion(state);
         for at in (0..patch.y.len()).step_by(LANES) {
-            let read = self.read(patch, at, state);
+            let read = self.read(patch, at, motion);
             for l in 0..LANES.min(patch.len - at) {
                 each(read.r[l], read.template[l]);
             }

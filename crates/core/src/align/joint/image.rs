@@ -3,10 +3,10 @@
 use glam::{DVec2, Vec3};
 use nalgebra::{SMatrix, SVector};
 
-use super::smooth::{Band, Smooth};
+use super::smooth::{Band, Layer, Smooth};
 use crate::align::PadImage;
+use crate::align::lanes::{MAGIC, MAGIC_MASK};
 use crate::mesh::sampling::spread;
-use crate::relax::Field;
 
 /// The zone is where the free membrane lies less than this above its floor, at least, meters, and less than this share of
 /// the tool's height above it: there the template's plane and the free membrane are the same to the tool.
@@ -14,8 +14,12 @@ const ZONE_M: f32 = 0.5e-3;
 const ZONE_SHARE: f64 = 0.2;
 /// Heights beyond these are no membrane of a closed gripper, meters.
 const LOWEST_M: f32 = -0.05;
-/// Spacing of the image's grid, meters: the finest band is as wide.
-const STEP_M: f64 = 0.75e-3;
+/// Spacing of the image's grid, meters: about the width of the narrowest Gaussian.
+const STEP_M: f64 = 1e-3;
+/// Pixels that are placed at once.
+const LANES: usize = 8;
+/// Pixels from which the shape of the free membrane is.
+const SHAPE_PIXELS: usize = 400;
 /// Highest floor, meters: a gripper that is wide open.
 const HIGHEST_M: f32 = 0.05;
 /// Greatest height that counts, meters.
@@ -30,7 +34,6 @@ const AROUND: usize = 8;
 const MIN_PIXELS: usize = 64;
 /// Least weight under the narrowest Gaussian, of 1 where there is a pixel for each node.
 const MIN_WEIGHT: f32 = 0.05;
-
 /// Greatest weight of a node, in pixels.
 const NODE_WEIGHT: f32 = 1.0;
 
@@ -45,8 +48,8 @@ pub(super) struct Image {
     origin: DVec2,
     /// Nodes of the zone with depth: column and row.
     nodes: Vec<[u16; 2]>,
-    weight: Smooth,
-    weighted: Smooth,
+    /// Of weights and weighted heights.
+    smooth: Smooth<2>,
 }
 
 /// The rays of a camera: the direction of pixel (u, v) is `first + u across + v down`, grasp frame, for a depth of one.
@@ -119,27 +122,31 @@ impl Zone {
         }
         let (mut low, mut high) = (DVec2::INFINITY, DVec2::NEG_INFINITY);
         let mut shape = Quadratic::default();
-        let every = (pixels / 400).max(1);
-        let mut count = 0;
-        for (v, &[first, end]) in spans.iter().enumerate() {
-            for u in first..end {
-                count += 1;
-                let ends = u == first || u + 1 == end;
-                if count % every != 0 && !ends {
-                    continue;
-                }
+        let every = (pixels / SHAPE_PIXELS).max(1);
+        // Way along the zone's pixels from a row's first one to the next that is asked for the shape.
+        let mut next = every - 1;
+        for (v, &[first, end]) in spans.iter().enumerate().filter(|(_, span)| span[0] < span[1]) {
+            let mut look = |u: usize| {
                 let depth = reference[(u, v)];
                 let p = rays.from + depth * (rays.first + u as f32 * rays.across + v as f32 * rays.down);
                 let height = rays.side * p.x;
-                if !(height < zone_m && height > LOWEST_M) {
-                    continue;
+                let place = DVec2::new(f64::from(p.y), f64::from(p.z));
+                let inside = height < zone_m && height > LOWEST_M;
+                if inside {
+                    (low, high) = (low.min(place), high.max(place));
                 }
-                let yz = DVec2::new(f64::from(p.y), f64::from(p.z));
-                (low, high) = (low.min(yz), high.max(yz));
-                if count % every == 0 {
-                    shape.add(yz, f64::from(height));
-                }
+                inside.then_some((place, f64::from(height)))
+            };
+            for u in [first, end - 1] {
+                look(u);
             }
+            while next < end - first {
+                if let Some((place, height)) = look(first + next) {
+                    shape.add(place, height);
+                }
+                next += every;
+            }
+            next -= end - first;
         }
         let size = high - low;
         let sized = size.is_finite() && size.min_element() > 4.0 * STEP_M && size.max_element() < 0.3;
@@ -213,74 +220,137 @@ impl Quadratic {
     }
 }
 
-/// The middle of a membrane image and what surrounds it, as sums of heights and of weights.
+/// The middle of a membrane image and what surrounds it, as sums of weights and of heights.
 struct Splat {
     origin: DVec2,
-    weight: Field,
-    weighted: Field,
+    /// Weight and weighted height of each node.
+    nodes: Layer<2>,
     inside: Vec<bool>,
+}
+
+/// Part of a node's and its right neighbor's weight and weighted height that is from pixels between them.
+type Pair = [f32; 4];
+
+/// Pixels of a part of a row: where they lie on the grid, and their heights.
+struct Placed {
+    node: [u32; LANES],
+    nearest: [u32; LANES],
+    fy: [f32; LANES],
+    fz: [f32; LANES],
+    height: [f32; LANES],
+}
+
+/// Image, camera and grid, to place pixels on the grid.
+struct Placing<'a> {
+    rays: &'a Rays,
+    /// Origin of the rays about the grid's.
+    from: Vec3,
+    floor_m: f32,
+    columns: usize,
+    rows: usize,
+}
+
+impl Placing<'_> {
+    /// Every second pixel from `u` on of row `v`; pixels that have no place get the node after the last.
+    #[inline]
+    fn place(&self, imprint: &[f32; 2 * LANES], reference: &[f32; 2 * LANES], u: usize, v: usize) -> Placed {
+        const PER_M: f32 = (1.0 / STEP_M) as f32;
+        let rays = self.rays;
+        let start = rays.first + v as f32 * rays.down + u as f32 * rays.across;
+        let across = 2.0 * rays.across;
+        let (last_y, last_z) = ((self.columns - 1) as f32, (self.rows - 1) as f32);
+        let columns = self.columns as f32;
+        let none = (self.columns * self.rows) as u32;
+        let (zero, no_node) = ([0f32; LANES], [none; LANES]);
+        let mut placed = Placed { node: no_node, nearest: no_node, fy: zero, fz: zero, height: zero };
+        for l in 0..LANES {
+            let (imprint, reference, along) = (imprint[2 * l], reference[2 * l], l as f32);
+            let depth = reference - imprint;
+            let direction_x = start.x + along * across.x;
+            let height = rays.height(direction_x, depth);
+            let y = (self.from.y + depth * (start.y + along * across.y)) * PER_M;
+            let z = (self.from.z + depth * (start.z + along * across.z)) * PER_M;
+            // False for what is not a number.
+            let usable = (depth > 0.0) & (reference > 0.0) & (height > LOWEST_M);
+            let usable = usable & (y >= 0.0) & (z >= 0.0) & (y < last_y) & (z < last_z);
+            let (round_y, round_z) = ((y + MAGIC) - MAGIC, (z + MAGIC) - MAGIC);
+            let column = if round_y > y { round_y - 1.0 } else { round_y };
+            let row = if round_z > z { round_z - 1.0 } else { round_z };
+            let whole = |n: f32| if usable { (n + MAGIC).to_bits() & MAGIC_MASK } else { none };
+            placed.node[l] = whole(row * columns + column);
+            placed.nearest[l] = whole(round_z * columns + round_y);
+            placed.fy[l] = y - column;
+            placed.fz[l] = z - row;
+            let free = rays.height(direction_x, reference);
+            let free = if free > self.floor_m { free } else { self.floor_m };
+            placed.height[l] = (if height < CLIP_M { height } else { CLIP_M }) - free;
+        }
+        placed
+    }
 }
 
 impl Splat {
     fn new(image: &PadImage<'_>, rays: &Rays, zone: &Zone) -> Self {
-        let floor_m = zone.floor_m;
         let origin = zone.low - MARGIN_M;
         let count = ((zone.high + MARGIN_M - origin) / STEP_M).ceil() + 1.0;
         let (columns, rows) = (count.x as usize, count.y as usize);
-        let mut splat = Self {
-            origin,
-            weight: Field::filled(columns, rows, 0.0),
-            weighted: Field::filled(columns, rows, 0.0),
-            inside: vec![false; columns * rows],
-        };
-        let scale = (1.0 / STEP_M) as f32;
         let from = Vec3::new(rays.from.x, rays.from.y - origin.x as f32, rays.from.z - origin.y as f32);
-        let (last_y, last_z) = ((columns - 1) as f32, (rows - 1) as f32);
+        let placing = Placing { rays, from, floor_m: zone.floor_m, columns, rows };
+        // One more than there are, for the pixels that have no place.
+        let mut pairs: Vec<Pair> = vec![[0.0; 4]; columns * (rows + 1) + 1];
+        let mut inside = vec![false; columns * rows + 1];
         let reference = &image.camera.depth_reference;
+        let width = reference.width();
         for (v, (&[first, end], inner)) in zone.spans.iter().zip(&zone.inner).enumerate() {
-            let start = rays.first + v as f32 * rays.down;
             if first == end {
                 continue;
             }
-            let columns_seen = first.saturating_sub(AROUND)..(end + AROUND).min(reference.width());
-            let pixels = image.imprint.row(v).iter().zip(reference.row(v)).enumerate();
-            for (u, (imprint, reference)) in pixels.take(columns_seen.end).skip(columns_seen.start) {
-                let depth = reference - imprint;
-                let direction = start + u as f32 * rays.across;
-                let height = rays.height(direction.x, depth);
-                let y = (from.y + depth * direction.y) * scale;
-                let z = (from.z + depth * direction.z) * scale;
-                let usable = depth > 0.0 && *reference > 0.0 && height > LOWEST_M;
-                // False for what is not a number.
-                if !(usable && y >= 0.0 && z >= 0.0 && y < last_y && z < last_z) {
-                    continue;
-                }
-                let (column, row) = (y as usize, z as usize);
-                let (fy, fz) = (y - column as f32, z - row as f32);
-                let at = row * columns + column;
-                let height = height.min(CLIP_M) - rays.height(direction.x, *reference).max(floor_m);
-                let (near, far) = ([(1.0 - fy) * (1.0 - fz), fy * (1.0 - fz)], [(1.0 - fy) * fz, fy * fz]);
-                for (node, weight) in
-                    [(at, near[0]), (at + 1, near[1]), (at + columns, far[0]), (at + columns + 1, far[1])]
-                {
-                    splat.weight.values[node] += weight;
-                    splat.weighted.values[node] += weight * height;
-                }
-                if u >= inner[0] && u < inner[1] {
-                    let nearest = at + usize::from(fy >= 0.5) + columns * usize::from(fz >= 0.5);
-                    splat.inside[nearest] = true;
+            // Every second pixel, as on a chessboard.
+            let first = first.saturating_sub(AROUND) / 2 * 2 + v % 2;
+            let end = (end + AROUND).min(width);
+            for u in (first..end).step_by(2 * LANES) {
+                let part = |row: &[f32]| -> [f32; 2 * LANES] {
+                    let row = &row[u..end.min(u + 2 * LANES)];
+                    row.try_into().unwrap_or_else(|_| {
+                        let mut part = [f32::NAN; 2 * LANES];
+                        part[..row.len()].copy_from_slice(row);
+                        part
+                    })
+                };
+                let placed = placing.place(&part(image.imprint.row(v)), &part(reference.row(v)), u, v);
+                for l in 0..LANES {
+                    let (fy, fz, height) = (placed.fy[l], placed.fz[l], placed.height[l]);
+                    let pair = [1.0 - fy, (1.0 - fy) * height, fy, fy * height];
+                    let above = placed.node[l] as usize;
+                    for (at, share) in [(above, 1.0 - fz), (above + columns, fz)] {
+                        pairs[at].iter_mut().zip(pair).for_each(|(sum, value)| *sum += share * value);
+                    }
+                    let pixel = u + 2 * l;
+                    if pixel >= inner[0] && pixel < inner[1] {
+                        inside[placed.nearest[l] as usize] = true;
+                    }
                 }
             }
         }
-        // A slope that faces the camera has more pixels than one that is turned away, and counts no more for that.
-        for (weight, weighted) in splat.weight.values.iter_mut().zip(&mut splat.weighted.values) {
-            if *weight > NODE_WEIGHT {
-                *weighted *= NODE_WEIGHT / *weight;
-                *weight = NODE_WEIGHT;
-            }
-        }
-        splat
+        inside.pop();
+        Self { origin, nodes: at_nodes(&pairs, columns, rows), inside }
     }
+}
+
+/// Weight and weighted height of the nodes.
+fn at_nodes(pairs: &[Pair], columns: usize, rows: usize) -> Layer<2> {
+    let mut nodes = Layer::zero(columns, rows);
+    for (row, pairs) in pairs.chunks_exact(columns).take(rows).enumerate() {
+        let mut left = [0.0; 2];
+        for (node, &[weight, weighted, right_weight, right_weighted]) in nodes.row_mut(row).iter_mut().zip(pairs) {
+            let weight = left[0] + weight;
+            // A slope that faces the camera has more pixels than one that is turned away, and counts no more for that.
+            let scale = NODE_WEIGHT / if weight > NODE_WEIGHT { weight } else { NODE_WEIGHT };
+            *node = [weight * scale, (left[1] + weighted) * scale];
+            left = [right_weight, right_weighted];
+        }
+    }
+    nodes
 }
 
 impl Image {
@@ -292,12 +362,12 @@ impl Image {
         let rays = Rays::new(image)?;
         let zone = Zone::new(image, &rays, tops_m[usize::from(rays.side > 0.0)])?;
         let splat = Splat::new(image, &rays, &zone);
-        let columns = splat.weight.columns;
-        let (weight, weighted) = (Smooth::new(&splat.weight, STEP_M), Smooth::new(&splat.weighted, STEP_M));
+        let columns = splat.nodes.columns;
+        let smooth = Smooth::new(&splat.nodes, STEP_M, STEP_M * STEP_M / 6.0);
         let nodes: Vec<[u16; 2]> = (0..splat.inside.len())
             .filter(|&i| splat.inside[i])
             .map(|i| [i % columns, i / columns])
-            .filter(|[column, row]| weight.at(0, *column, *row) >= MIN_WEIGHT)
+            .filter(|[column, row]| smooth.at(0, *column, *row)[0] >= MIN_WEIGHT)
             .map(|at| at.map(|n| n as u16))
             .collect();
         let side = f64::from(rays.side);
@@ -307,8 +377,7 @@ impl Image {
             floor_m: f64::from(zone.floor_m),
             origin: splat.origin,
             nodes,
-            weight,
-            weighted,
+            smooth,
         })
     }
 
@@ -327,7 +396,10 @@ impl Image {
     pub(super) fn sample(&self, band: Band, count: usize) -> impl ExactSizeIterator<Item = (DVec2, f32)> + '_ {
         spread(self.nodes.len(), count).into_iter().map(move |i| {
             let [column, row] = self.nodes[i].map(usize::from);
-            let mean = |sigma: usize| self.weighted.at(sigma, column, row) / self.weight.at(sigma, column, row);
+            let mean = |sigma: usize| {
+                let [weight, weighted] = self.smooth.at(sigma, column, row);
+                weighted / weight
+            };
             let place = self.origin + DVec2::new(column as f64, row as f64) * STEP_M;
             (place, mean(band[0]) - mean(band[1]))
         })

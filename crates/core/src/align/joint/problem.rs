@@ -21,7 +21,7 @@ use crate::tool::ToolModel;
 /// Smallest area of the membranes that is compared, square meters.
 const MIN_AREA_M2: f64 = 1e-4;
 /// Position in [`JointConfig::points`] of what decides the answer. It is in the finest band.
-const LAST: usize = 3;
+pub(super) const LAST: usize = 3;
 /// Kernels of the mask's own scouts, meters, wide to narrow.
 const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
 /// Angles of further starts as shares of the prior's, by rung.
@@ -122,10 +122,14 @@ impl Descents<'_, '_> {
         self.lookups += joint.lookups;
     }
 
-    /// Through the bands from one start.
-    fn scout(&mut self, run: usize, at: &mut Progress, from: usize) {
+    /// Through the bands from one start, until it meets the end of a run before.
+    fn scout(&mut self, runs: &[Progress], at: &mut Progress, from: usize) {
         for stage in from..LAST {
-            self.descend(run, at, stage, self.problem.config.weight.scouts);
+            if let Some(met) = runs.iter().find(|met| alike(&met.state, &at.state)) {
+                *at = Progress { iterations: at.iterations, ..*met };
+                return;
+            }
+            self.descend(runs.len(), at, stage, self.problem.config.weight.scouts);
         }
     }
 }
@@ -197,7 +201,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The images as a stage compares them.
-    fn patches(&self, stage: usize) -> Patches<'_> {
+    pub(super) fn patches(&self, stage: usize) -> Patches<'_> {
         self.patches_of(stage.min(BANDS.len() - 1), self.config.points[stage])
     }
 
@@ -231,15 +235,16 @@ impl<'a> Problem<'a> {
         let order = loop {
             for start in &starts[runs.len()..] {
                 let mut at = Progress::new(State::from_pose(*start, self.centroid));
-                descents.scout(runs.len(), &mut at, 0);
+                descents.scout(&runs, &mut at, 0);
                 runs.push(at);
             }
             if rung == Rung::Single
-                && let Some(mut at) = self.mask_scout(&mut descents.lookups)
+                && let Some(found) = self.mask_scout(&mut descents.lookups)
             {
-                descents.scout(runs.len(), &mut at, 1);
+                let mut at = Progress::new(found);
+                descents.scout(&runs, &mut at, 1);
                 runs.push(at);
-                starts.push(PlanarPose::default());
+                starts.push(found.to_pose(self.centroid));
             }
             let order = self.order(&runs);
             let best = &runs[order[0]];
@@ -282,13 +287,13 @@ impl<'a> Problem<'a> {
     }
 
     /// Pose to which the mask alone leads from the middle of the prior.
-    fn mask_scout(&self, lookups: &mut usize) -> Option<Progress> {
+    fn mask_scout(&self, lookups: &mut usize) -> Option<State> {
         let [scouts, _] = self.mask.as_ref()?;
         let mut search = Search::new(&self.tool.field, self.centroid, self.config.max_iterations, false);
         let from = [State::from_pose(PlanarPose::default(), self.centroid)];
         let found = search.scout(&from, scouts, &MASK_SCOUTS_M).pop();
         *lookups += search.lookups;
-        found
+        Some(found?.state)
     }
 
     /// Refines the best two scouts that are apart and cost about the same; which is the best.

@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::smooth::{BANDS, Smooth};
+use super::smooth::{BANDS, Layer, Smooth};
 use crate::relax::Field;
 use crate::tent::{STEP_M, heights, tent};
 use crate::tool::ToolModel;
@@ -50,13 +50,14 @@ fn made(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Tem
     let mut heights = heights(&tool.mesh, side)?;
     heights.field.values.iter_mut().for_each(|height| *height = (*height - floor_m as f32).max(0.0));
     let sheet = tent(&heights, curvature);
-    let smooth = Smooth::new(&sheet.field, STEP_M);
+    let smooth = Smooth::new(&Layer::of(&sheet.field), STEP_M, 0.0);
     let (columns, rows) = (sheet.field.columns, sheet.field.rows);
     Some(BANDS.map(|[narrow, wide]| {
         let mut field = Field::filled(columns, rows, 0.0);
         for row in 0..rows {
             for column in 0..columns {
-                field.values[row * columns + column] = smooth.at(narrow, column, row) - smooth.at(wide, column, row);
+                field.values[row * columns + column] =
+                    smooth.at(narrow, column, row)[0] - smooth.at(wide, column, row)[0];
             }
         }
         BandField { field, origin: sheet.origin }

@@ -5,7 +5,7 @@ use nalgebra::{Matrix2x3, Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::cost::{Joint, Relief, noise_m};
-use super::problem::Problem;
+use super::problem::{LAST, Problem};
 use crate::align::batch::State;
 use crate::align::observability::{Observability, observability};
 use crate::align::search::Cost as _;
@@ -102,7 +102,22 @@ impl Uncertainty {
     }
 }
 
+/// Curvature by motions of the tool in the hand, of that by steps of the points in the object frame, which go the other way.
+fn in_the_hand([a, b, c, d, e, f]: &[f64; 6], pose: PlanarPose) -> Matrix3<f64> {
+    let turn = -DVec2::from_angle(pose.theta_rad);
+    let to_hand = Matrix3::new(-1.0, 0.0, 0.0, 0.0, turn.x, -turn.y, 0.0, turn.y, turn.x);
+    to_hand * Matrix3::new(*a, *b, *c, *b, *d, *e, *c, *e, *f) * to_hand.transpose()
+}
+
 impl Problem<'_> {
+    /// Curvature of the membranes' part of the cost that decides the answer, about (angle times [`ANGLE_SCALE_M`], y, z) of the
+    /// tool turned about the centroid.
+    pub(super) fn answer_curvature(&self, pose: PlanarPose) -> Matrix3<f64> {
+        let patches = self.patches(LAST);
+        let mut joint = Joint { fingers: &patches, kernel_m: self.config().kernels_m[LAST], mask: None, lookups: 0 };
+        in_the_hand(&joint.sums(State::from_pose(pose, self.centroid())).h, pose)
+    }
+
     /// Uncertainty of a pose from the membranes.
     pub(super) fn uncertainty(&self, pose: PlanarPose) -> Uncertainty {
         let at = State::from_pose(pose, self.centroid());
@@ -110,11 +125,7 @@ impl Problem<'_> {
         let noise_m = noise_m(Relief::of(&patches, at, KERNEL_M).residuals_m).max(1e-6);
         let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
         let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * SHARED_M * noise_m);
-        let [a, b, c, d, e, f] = joint.sums(at).h.map(|h| h * scale);
-        // From steps of the points in the object frame to motions of the tool in the hand, which go the other way.
-        let turn = -DVec2::from_angle(pose.theta_rad);
-        let to_hand = Matrix3::new(-1.0, 0.0, 0.0, 0.0, turn.x, -turn.y, 0.0, turn.y, turn.x);
-        let information = to_hand * Matrix3::new(a, b, c, b, d, e, c, e, f) * to_hand.transpose();
+        let information = in_the_hand(&joint.sums(at).h, pose) * scale;
         Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
     }
 }
