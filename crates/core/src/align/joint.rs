@@ -173,12 +173,9 @@ impl Register for JointConfig {
             return Ok(problem.report(scene.yz(), problem.solve()));
         }
         let mut answer = problem.solve();
-        if answer.fit.explained < config.doubtful && problem.forget_mask() {
+        if answer.fit.explained < config.doubtful {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
-            let alone = problem.solve();
-            if alone.fit.explained > answer.fit.explained + config.explained {
-                answer = alone;
-            }
+            answer = problem.solve_without_mask(&answer, config.explained).unwrap_or(answer);
         }
         if answer.fit.explained < config.explained {
             return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });

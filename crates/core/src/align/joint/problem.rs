@@ -195,9 +195,16 @@ impl<'a> Problem<'a> {
         self.config
     }
 
-    /// Leaves the mask out from now on; whether there was one.
-    pub(super) fn forget_mask(&mut self) -> bool {
-        self.mask.take().is_some()
+    /// The answer without the mask, if there is one to leave out and that answer is better by `gain` of what the tool explains;
+    /// it leaves the mask out from then on.
+    pub(super) fn solve_without_mask(&mut self, answer: &Answer, gain: f64) -> Option<Answer> {
+        let mask = self.mask.take()?;
+        let alone = self.solve();
+        if alone.fit.explained > answer.fit.explained + gain {
+            return Some(alone);
+        }
+        self.mask = Some(mask);
+        None
     }
 
     /// The images as a stage compares them.
