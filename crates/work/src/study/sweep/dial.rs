@@ -299,7 +299,7 @@ mod tests {
 
     #[test]
     fn where_a_dial_stands_is_a_value_that_changes_nothing() {
-        let in_force = Recipe::default();
+        let in_force = Recipe { registration: Registration::DistanceField.into(), ..Recipe::default() };
         let (threshold, unet) = (MaskRecipe::Threshold(0.005.into()), MaskRecipe::Unet("id".into(), None));
         assert_eq!(Dial::Threshold.of(&in_force, &threshold, None), Dial::Threshold.parse("5").ok());
         assert_eq!(Dial::Threshold.of(&in_force, &unet, None), None);
