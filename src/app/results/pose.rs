@@ -51,7 +51,7 @@ impl Registered {
         self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
     }
 
-    /// Where starts lead.
+    /// Basin map: the poses that many starts lead to.
     ///
     /// # Errors
     /// As [`pose::basin`].

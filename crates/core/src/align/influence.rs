@@ -39,7 +39,8 @@ pub enum InfluenceError {
 /// whether it takes part. NaN for points that are not finite.
 ///
 /// Points are `(y, z)`, meters, grasp frame; the pose is where the registration on `field` ended, with a last kernel of
-/// `kernel_m`, or where membranes and mask together did, with the membranes' `hold`. Motions that the points leave open (a rod slides along itself) are left where they are.
+/// `kernel_m`, or where membranes and mask together did, with the membranes' `hold`. Motions that nothing determines (a rod
+/// slides along itself) are left where they are.
 ///
 /// # Errors
 /// [`InfluenceError`] where the registered points do not determine the angle.

@@ -23,14 +23,11 @@ pub struct Hold {
 impl Hold {
     /// The hold of a report's answer; `None` where membrane and mask did not both have a say.
     pub fn of(scene: &Scene<'_>, tool: &ToolModel, report: &AlignReport) -> Option<Self> {
-        let weight = report.joint.map(|fit| fit.mask_weight).filter(|weight| *weight > 0.0)?;
-        if !report.joint?.basis.has_membrane() {
-            return None;
-        }
+        let fit = report.joint.filter(|fit| fit.basis.has_membrane() && fit.mask_weight > 0.0)?;
         let config = JointConfig::default();
         let problem = Problem::new(scene, tool, &config).ok()??;
         let kernel_m = config.mask_kernels_m[1];
-        let curvature = problem.answer_curvature(report.grasp_from_object) * (kernel_m * kernel_m / weight);
+        let curvature = problem.answer_curvature(report.grasp_from_object) * (kernel_m * kernel_m / fit.mask_weight);
         Some(Self { curvature, center: problem.centroid(), kernel_m })
     }
 
