@@ -8,11 +8,13 @@
 //!
 //! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
 
+mod certify;
 mod cost;
 mod evidence;
 mod hold;
 mod image;
 mod problem;
+mod pyramid;
 mod smooth;
 mod template;
 #[cfg(test)]
@@ -183,6 +185,7 @@ impl Register for JointConfig {
         if answer.fit.explained < config.explained {
             return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
         }
+        if std::env::var("PROVE").is_ok() { problem.prove(&mut answer); }
         Ok(problem.report(scene.yz(), answer))
     }
 }

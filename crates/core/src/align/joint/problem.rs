@@ -13,7 +13,7 @@ use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
 use crate::align::search::{Progress, Search, minimize};
-use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
+use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, Certificate, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
@@ -27,7 +27,7 @@ const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
 /// Angles of further starts as shares of the prior's, by rung.
 const MORE: [[f64; 2]; 2] = [[0.45, -0.45], [0.9, -0.9]];
 /// Steps that move no point by more than about this, meters, end the descents.
-const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
+pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
 
 /// Refuses settings that make no sense.
 pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
@@ -81,7 +81,8 @@ pub(super) struct Answer {
     starts: Vec<PlanarPose>,
     runs: Vec<Progress>,
     winner: usize,
-    rung: Rung,
+    pub(super) rung: Rung,
+    pub(super) certificate: Option<Certificate>,
     pub(super) fit: JointFit,
     lookups: usize,
     trace: Vec<TraceStep>,
@@ -195,6 +196,10 @@ impl<'a> Problem<'a> {
         self.config
     }
 
+    pub(super) fn mask(&self) -> Option<&[Cloud; 2]> {
+        self.mask.as_ref()
+    }
+
     /// Leaves the mask out from now on; whether there was one.
     pub(super) fn forget_mask(&mut self) -> bool {
         self.mask.take().is_some()
@@ -273,7 +278,7 @@ impl<'a> Problem<'a> {
         };
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
         let Descents { lookups, trace, .. } = descents;
-        Answer { starts, runs, winner, rung, fit, lookups, trace, points }
+        Answer { starts, runs, winner, rung, certificate: None, fit, lookups, trace, points }
     }
 
     /// Runs by preference: within the prior before outside, then the cheaper one.
@@ -346,7 +351,7 @@ impl<'a> Problem<'a> {
             winner: answer.winner,
             rung: answer.rung,
             ladder: Vec::new(),
-            certificate: None,
+            certificate: answer.certificate,
             iterations: runs.iter().map(|run| run.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),
