@@ -113,6 +113,9 @@ pub(super) fn prove(cost: &mut impl Bounded, centroid: DVec2, config: &AlignConf
         budget: before + config.budget,
         cost,
     };
+    if !proof.allows(&proof.best) {
+        proof.best.cost = f64::INFINITY;
+    }
     let mut regions = proof.slabs(config.prior.theta_rad * WIDER[0]);
     for region in &mut regions {
         proof.look(region, 0);
@@ -136,7 +139,7 @@ pub(super) fn certify(
     best: Progress,
 ) -> (Certificate, Progress) {
     let centroid = search.centroid;
-    let mut cost = Contacts { points: Undecided::new(search.field, cloud, kernel), search };
+    let mut cost = MaskCost { points: Undecided::new(search.field, cloud, kernel), search };
     let proved = prove(&mut cost, centroid, config, best);
     let certificate = Certificate {
         certified: proved.certified,
@@ -189,12 +192,12 @@ impl<'a> Undecided<'a> {
 }
 
 /// The cost of contact points on the field.
-struct Contacts<'a, 's> {
+struct MaskCost<'a, 's> {
     points: Undecided<'s>,
     search: &'a mut Search<'s>,
 }
 
-impl Bounded for Contacts<'_, '_> {
+impl Bounded for MaskCost<'_, '_> {
     fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2] {
         let count = self.points.whole().len() as f64;
         let floor = self.points.floor(region, level, enough * count);
@@ -251,6 +254,11 @@ impl<C: Bounded> Proof<'_, C> {
         pose.y_m.abs().max(pose.z_m.abs()) <= self.shift_m + way
     }
 
+    /// True where a run ended at a pose that the prior allows; what is cheaper elsewhere proves nothing about it.
+    fn allows(&self, run: &Progress) -> bool {
+        self.config.prior.allows(run.state.to_pose(self.centroid))
+    }
+
     /// Cost from which a region is done: it holds no pose that beats the best by more than the gap.
     fn enough(&self) -> f64 {
         self.best.cost * (1.0 - self.config.gap) - self.cost.negligible()
@@ -263,7 +271,10 @@ impl<C: Bounded> Proof<'_, C> {
         let [lower, here] = self.cost.bound(region, level, enough);
         region.lower = region.lower.max(lower);
         if lower < enough && here < 0.999 * self.best.cost {
-            let found = self.cost.descend(region.middle);
+            let mut found = self.cost.descend(region.middle);
+            if !self.allows(&found) {
+                found = Progress { cost: here, ..Progress::new(region.middle) };
+            }
             if found.cost < self.best.cost {
                 self.best = found;
             }

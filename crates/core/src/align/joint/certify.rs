@@ -1,7 +1,8 @@
-//! Branch and bound on the joint cost.
+//! Branch and bound on the joint cost: a proof that no pose of the prior fits membrane and mask much better.
 
 use super::cost::{Joint, MaskPart};
 use super::problem::{Answer, LAST, Patches, Problem, STEPS_M};
+use super::smooth::BANDS;
 use crate::align::batch::State;
 use crate::align::certify::{Bounded, NEGLIGIBLE, Region, Undecided, prove};
 use crate::align::search::{Progress, minimize};
@@ -93,32 +94,28 @@ impl Bounded for Places<'_> {
 }
 
 impl Problem<'_> {
-    /// Proves an answer, or finds a better one.
+    /// Proves that no pose of the prior is better than an answer, or takes what is better. The cost is that of the answer
+    /// with its weight of the mask, on fewer places; what is found is refined on all, and counts only if it is cheaper there.
     pub(super) fn prove(&self, answer: &mut Answer) {
         let config = self.config();
-        let points: usize = std::env::var("PLACES").map_or(config.points[LAST], |v| v.parse().unwrap());
-        let fingers = self.patches_of(2, points);
-        let fingers = fingers.into_iter().map(|(template, patch)| (template, patch.outermost_first())).collect();
+        let fingers = self.patches_of(BANDS.len() - 1, config.proof_points);
         let mask = self.mask().map(|[_, cloud]| Mask {
             points: Undecided::new(&self.tool().field, cloud, config.mask_kernels_m[1]),
             field: &self.tool().field,
             kernel_m: config.mask_kernels_m[1],
             weight: answer.fit.mask_weight,
         });
-        let t = std::time::Instant::now();
-        let mut cost =
-            Places { fingers, kernel_m: config.kernels_m[LAST], mask, max_iterations: config.max_iterations, lookups: 0 };
+        let mut cost = Places {
+            fingers: fingers.into_iter().map(|(template, patch)| (template, patch.outermost_first())).collect(),
+            kernel_m: config.kernels_m[LAST],
+            mask,
+            max_iterations: config.max_iterations,
+            lookups: 0,
+        };
         let best = cost.descend(answer.end());
-        for (t, p) in &cost.fingers { t.floor(p, best.state, 1.0, crate::align::batch::Extent::new([0.0;3]), 0.0); }
-        let t1 = t.elapsed();
         let proved = prove(&mut cost, self.centroid(), &config.mask, best);
+        answer.lookups += cost.lookups();
         let square = config.kernels_m[LAST].powi(2);
-        eprintln!(
-            "{} cost {:.4} -> {:.4} bound {:.4} mw {:.3} nodes {} lookups {} ms {:.1} + {:.1} moved {:.2} deg {:.2} mm",
-            proved.certified, best.cost, proved.best.cost, proved.lower_bound, answer.fit.mask_weight, proved.nodes, proved.lookups,
-            t1.as_secs_f64() * 1e3, (t.elapsed() - t1).as_secs_f64() * 1e3,
-            (proved.best.state.phi - best.state.phi).to_degrees(), proved.best.state.place.distance(best.state.place) * 1e3,
-        );
         answer.certificate = Some(Certificate {
             certified: proved.certified,
             points: cost.points(),
@@ -128,5 +125,11 @@ impl Problem<'_> {
             lookups: proved.lookups,
         });
         answer.rung = Rung::Certified;
+        if !proved.best.state.is_near(&answer.end()) {
+            self.follow(answer, proved.best.state);
+        }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -15,6 +15,7 @@ use crate::tent::STEP_M;
 const FLAT: f32 = 0.1;
 
 /// Places of a membrane image with its band there; padded to whole steps.
+#[derive(Clone)]
 pub(super) struct Patch {
     /// Places about a common center, in nodes.
     pub(super) y: Vec<f32>,
