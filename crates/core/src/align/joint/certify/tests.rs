@@ -38,14 +38,16 @@ fn cost(field: &BandField, patch: &Patch, state: State) -> f64 {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(600))]
+    #![proptest_config(ProptestConfig::with_cases(2000))]
 
     #[test]
     fn no_pose_of_a_box_costs_less_than_its_bound(
         middle in proptest::array::uniform3(-1.0..1.0f64),
         half in proptest::array::uniform3(-4.0..0.0f64),
-        inside in proptest::collection::vec(proptest::array::uniform3(-1.0..1.0f64), 8),
+        inside in proptest::collection::vec(proptest::array::uniform3(-1.0..1.0f64), 24),
         rough in proptest::sample::select(vec![0.0f32, 5e-5, 4e-4]),
+        // Of few places: in a sum of many, what one bound lacks another has to spare.
+        count in proptest::sample::select(vec![1, 2, 5, 90]),
         seed in 0..1000u64,
     ) {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -53,11 +55,11 @@ proptest! {
         let middle = State { phi: 0.5 * middle[0], place: DVec2::new(middle[1], middle[2]) * 6e-3 };
         // Places on the band and off it, most of them where the middle fits.
         let mut places: Vec<(DVec2, f32)> = Vec::new();
-        for i in 0..90 {
+        for i in 0..count {
             let place = DVec2::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5) * 0.034;
             let node = (DVec2::from_angle(middle.phi).rotate(place) + middle.place - field.origin) / STEP_M;
             let fits = field.field.at(node.x, node.y) as f32 + 1e-4 * (rng.random::<f32>() - 0.5);
-            places.push((place, if i % 5 == 0 { 2e-3 * (rng.random::<f32>() - 0.5) } else { fits }));
+            places.push((place, if i % 2 == 0 { 2e-3 * (rng.random::<f32>() - 0.5) } else { fits }));
         }
         let patch = Patch::new(places.into_iter()).outermost_first();
         // Boxes of all sizes: from 4 degrees by 4 mm down to a ten-thousandth of that.
