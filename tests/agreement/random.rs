@@ -69,7 +69,10 @@ impl Draws {
         let mut mask = recipe.mask;
         (mask.threshold_m, mask.top_percent) = (self.one(0.002..0.007f32), self.one(4.0..20.0f32));
         let by = recipe.registration.by;
-        let slow = matches!(by, Registration::Certified | Registration::LabIcp | Registration::Gicp);
+        let slow = matches!(
+            by,
+            Registration::Certified | Registration::JointCertified | Registration::LabIcp | Registration::Gicp
+        );
         let registration = if slow { RegistrationChoice::default() } else { recipe.registration };
         Recipe { mask, registration, ..recipe }
     }

@@ -31,6 +31,7 @@ mod register;
 mod search;
 #[cfg(test)]
 pub(crate) mod testing;
+mod windows;
 
 use std::borrow::Cow;
 

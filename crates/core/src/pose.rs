@@ -34,6 +34,8 @@ pub enum Registration {
     /// The membranes' images against the tent over the tool, and the mask.
     #[default]
     Joint,
+    /// The membranes' images and the mask, with a proof by branch and bound.
+    JointCertified,
     /// Robust registration on the distance field of the tool's silhouette.
     DistanceField,
     /// Robust registration on the distance field, with a proof by branch and bound.
@@ -68,6 +70,7 @@ impl Registration {
             Self::DistanceField => "ICP (distance field)",
             Self::Certified => "ICP (distance field), certified",
             Self::Joint => "Joint (membrane and mask)",
+            Self::JointCertified => "Joint (membrane and mask), certified",
             Self::LabIcp => "ICP (paper)",
             Self::PlanarPointToPoint => "ICP point-point, planar",
             Self::PlanarPointToPlane => "ICP point-plane, planar",
@@ -88,6 +91,9 @@ impl Registration {
             }
             Self::Joint => {
                 "The default: the whole membrane against the sheet that the tool would lift, with the mask as a weaker term"
+            }
+            Self::JointCertified => {
+                "That of membrane and mask with a proof: branch and bound, no pose of the prior is 2 % better"
             }
             Self::LabIcp => "The paper's loop: planar point to point, one start, up to 200 iterations, no rejection",
             Self::PlanarPointToPoint => {

@@ -8,6 +8,7 @@ use glam::DVec2;
 
 use super::ANGLE_SCALE_M;
 use super::lanes::{LANES, LaneSums, Lattice, Sums};
+use super::windows::{Floor, Slopes};
 use crate::field::{CELL_M, DistanceField};
 use crate::frames::PlanarPose;
 
@@ -159,14 +160,6 @@ impl Extent {
     }
 }
 
-/// For each cell, between which values the slope of the field lies in a window around it: middle and half range by y
-/// and z, meters per cell.
-pub(super) struct Slopes {
-    cells: Vec<[f32; 4]>,
-    /// Reach of the window from anywhere in the cell, meters.
-    pub(super) reach: f64,
-}
-
 impl DistanceField {
     /// Cost, slope and curvature in one pass. `state` maps the cloud's centroid frame to the object frame.
     pub(super) fn sums(&self, cloud: &Cloud, state: State, kernel: f64) -> Sums {
@@ -287,8 +280,7 @@ impl DistanceField {
         }
     }
 
-    /// Lower bound of the cloud's cost anywhere in a box of states about `state`, and its cost at `state` itself
-    /// (square meters, summed over the points).
+    /// Lower bound of the cloud's cost anywhere in a box of states about `state` (square meters, summed over the points).
     ///
     /// Without `slopes`: in the box a point moves by at most its way, its distance to the silhouette shrinks by no more
     /// than that (see [`widened`]), and the kernel grows with the distance. The sums stop at `enough`.
@@ -304,7 +296,7 @@ impl DistanceField {
         extent: Extent,
         slopes: Option<&Slopes>,
         enough: f64,
-    ) -> (f64, f64) {
+    ) -> Floor {
         /// Steps between two looks at the sum.
         const LOOK: usize = 4;
         /// Below this share of the kernel's width it bends up, so that it lies above its tangent.
@@ -369,14 +361,8 @@ impl DistanceField {
                 slope[2][l] += pull * mz[l];
             }
         }
-        let fall: f64 = slope
-            .iter()
-            .zip(extent.half)
-            .zip([1.0, 1.0 / CELL_M, 1.0 / CELL_M])
-            .map(|((lanes, half), scale)| sum(lanes).abs() * half * scale)
-            .sum();
-        // Less what the sums may have been rounded up.
-        ((sum(&low) * (1.0 - 1e-5) - fall * (1.0 + 1e-5)).max(0.0), sum(&here))
+        let [turn, y, z] = slope.map(|lanes| sum(&lanes));
+        Floor { low: sum(&low), slope: [turn, y / CELL_M, z / CELL_M], here: sum(&here) }
     }
 
     /// The part of the cloud that may lie outside the silhouette somewhere in a box of states as in
@@ -432,32 +418,9 @@ impl DistanceField {
 
     /// [`Slopes`] for windows of one, two and four cells around each cell.
     pub(super) fn slopes(&self) -> [Slopes; 3] {
-        // Kept as greatest values of (-y, y, -z, z), so that joining windows is one maximum.
-        let (columns, rows) = (self.columns, self.rows);
+        let grid = Lattice { columns: self.columns, rows: self.rows, values: &self.values };
         // At the border of the grid nothing is known of what comes behind.
-        let unknown = [CELL_M as f32 * 100.0; 4];
-        let mut greatest = vec![unknown; columns * rows];
-        for row in 1..rows - 2 {
-            for column in 1..columns - 2 {
-                let at = row * columns + column;
-                let [a, b] = [self.values[at], self.values[at + 1]];
-                let [c, d] = [self.values[at + columns], self.values[at + columns + 1]];
-                let (near, far, left, right) = (b - a, d - c, c - a, d - b);
-                greatest[at] = [-near.min(far), near.max(far), -left.min(right), left.max(right)];
-            }
-        }
-        let mut window = 0;
-        [1usize, 2, 4].map(|reach| {
-            greatest = widen(&greatest, columns, reach - window);
-            window = reach;
-            let cells = greatest
-                .iter()
-                .map(|[down, up, back, front]| {
-                    [0.5 * (up - down), 0.5 * (front - back), 0.5 * (up + down), 0.5 * (front + back)]
-                })
-                .collect();
-            Slopes { cells, reach: reach as f64 * CELL_M }
-        })
+        Slopes::of(grid, CELL_M, [1, 2, 4], [CELL_M as f32 * 100.0; 4])
     }
 
     /// Replaces what was read for lanes off the grid.
@@ -485,21 +448,4 @@ impl DistanceField {
 fn widened(way: f32) -> f32 {
     let (far, near) = ((way * way + 0.5).sqrt(), std::f32::consts::SQRT_2 * way);
     (if far < near { far } else { near }) * CELL_M as f32
-}
-
-/// The greatest values within `reach` cells along both axes.
-fn widen(values: &[[f32; 4]], columns: usize, reach: usize) -> Vec<[f32; 4]> {
-    let greater =
-        |a: [f32; 4], b: [f32; 4]| -> [f32; 4] { std::array::from_fn(|i| if b[i] > a[i] { b[i] } else { a[i] }) };
-    let (mut from, mut to) = (values.to_vec(), values.to_vec());
-    let count = values.len();
-    // Rows run into each other at their ends, which only makes windows at the border larger.
-    for step in std::iter::repeat_n(1, reach).chain(std::iter::repeat_n(columns, reach)) {
-        let inner = from[..count - 2 * step].iter().zip(&from[step..]).zip(&from[2 * step..]);
-        for (out, ((a, b), c)) in to[step..count - step].iter_mut().zip(inner) {
-            *out = greater(greater(*a, *b), *c);
-        }
-        std::mem::swap(&mut from, &mut to);
-    }
-    from
 }

@@ -8,14 +8,16 @@
 
 use glam::DVec2;
 
-use super::batch::{Cloud, Extent, Slopes, State};
+use super::batch::{Cloud, Extent, State};
 use super::search::{Progress, Search};
+use super::windows::{Floor, Slopes};
 use super::{AlignConfig, Certificate};
+use crate::field::DistanceField;
 
 /// The box is this much larger than the prior (24 degrees, 6 mm for the default).
 const WIDER: [f64; 2] = [24.0 / 22.5, 1.2];
 /// Cost per point, as a share of the squared kernel width, below which differences do not matter.
-const NEGLIGIBLE: f64 = 1e-4;
+pub(super) const NEGLIGIBLE: f64 = 1e-4;
 /// Boxes of the angle to start from, half as wide as this, radians.
 const SLAB_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Cuts in a row; boxes are then some nanometers wide.
@@ -23,38 +25,112 @@ const DEEPEST: usize = 48;
 
 /// Poses about a middle one.
 #[derive(Clone, Copy, Debug)]
-struct Region {
-    middle: State,
-    extent: Extent,
-    /// No pose in it costs less, square meters, all points together.
+pub(super) struct Region {
+    pub(super) middle: State,
+    pub(super) extent: Extent,
+    /// No pose in it costs less, per point.
     lower: f64,
 }
 
+impl Region {
+    /// The halves along an axis: angle, y, z.
+    fn halved(&self, axis: usize) -> [Self; 2] {
+        [-0.5, 0.5].map(|side| {
+            let mut part = *self;
+            let mut half = part.extent.half;
+            let step = side * half[axis];
+            half[axis] *= 0.5;
+            part.extent = Extent::new(half);
+            match axis {
+                0 => part.middle.phi += step,
+                1 => part.middle.place.x += step,
+                _ => part.middle.place.y += step,
+            }
+            part
+        })
+    }
+}
+
+/// Cost per point that is to be proved least.
+pub(super) trait Bounded {
+    /// Lower bound of the cost in a region that was cut `level` times, and the cost in its middle. Where the bound reaches
+    /// `enough`, both may stop there.
+    fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2];
+
+    /// Told before a region is cut: what is decided in all of it need not be asked in its parts.
+    fn narrow(&mut self, region: &Region, level: usize);
+
+    /// The end of a descent.
+    fn descend(&mut self, from: State) -> Progress;
+
+    /// Distance of the outermost point from the centroid, meters.
+    fn radius(&self) -> f64;
+
+    /// Differences below it do not matter.
+    fn negligible(&self) -> f64;
+
+    /// Look-ups so far.
+    fn lookups(&self) -> usize;
+}
+
 /// Proof by branch and bound under way: its question, and how far the answer has come.
-struct Proof<'a, 's> {
-    search: &'a mut Search<'s>,
-    kernel: f64,
+struct Proof<'a, C> {
+    cost: &'a mut C,
+    config: &'a AlignConfig,
     centroid: DVec2,
     /// Largest size of y and z of a pose, meters, `grasp_from_object`.
     shift_m: f64,
-    /// Distance of the outermost point from the centroid, meters.
     radius: f64,
-    gap: f64,
     best: Progress,
-    /// The whole cloud, and what is undecided of it on each level.
-    clouds: Vec<Cloud>,
-    slopes: [Slopes; 3],
     /// Least bound of the boxes that are done or given up.
     least: f64,
     nodes: usize,
-    lookups: usize,
     budget: usize,
 }
 
-/// Searches the prior, a little widened, from the answer `best`; returns the better one if there is one.
-///
-/// `cloud` is what the costs are about; `best.cost` is about it too. Of the settings, the prior, the gap and the
-/// budget count.
+/// Outcome of branch and bound, in the unit of the cost.
+pub(super) struct Proved {
+    /// True where no pose in the box is cheaper by more than the gap.
+    pub(super) certified: bool,
+    pub(super) best: Progress,
+    pub(super) lower_bound: f64,
+    pub(super) nodes: usize,
+    pub(super) lookups: usize,
+}
+
+/// Searches the prior, a little widened, from the answer `best`, whose cost is `cost`'s. Of the settings, the prior, the
+/// gap and the budget count.
+pub(super) fn prove(cost: &mut impl Bounded, centroid: DVec2, config: &AlignConfig, best: Progress) -> Proved {
+    let before = cost.lookups();
+    let mut proof = Proof {
+        config,
+        centroid,
+        shift_m: config.prior.shift_m * WIDER[1],
+        radius: cost.radius(),
+        best,
+        least: f64::INFINITY,
+        nodes: 0,
+        budget: before + config.budget,
+        cost,
+    };
+    if !proof.allows(&proof.best) {
+        proof.best.cost = f64::INFINITY;
+    }
+    let mut regions = proof.slabs(config.prior.theta_rad * WIDER[0]);
+    for region in &mut regions {
+        proof.look(region, 0);
+    }
+    proof.cut_all(regions, 0);
+    Proved {
+        certified: proof.least >= proof.enough(),
+        best: proof.best,
+        lower_bound: proof.least.min(proof.best.cost),
+        nodes: proof.nodes,
+        lookups: proof.cost.lookups() - before,
+    }
+}
+
+/// Searches the prior as [`prove`] does for the best pose of `cloud`; returns the better one if there is one.
 pub(super) fn certify(
     search: &mut Search<'_>,
     cloud: &Cloud,
@@ -62,41 +138,98 @@ pub(super) fn certify(
     kernel: f64,
     best: Progress,
 ) -> (Certificate, Progress) {
-    let whole = cloud.outermost_first();
     let centroid = search.centroid;
-    let mut proof = Proof {
-        kernel,
-        centroid,
-        shift_m: config.prior.shift_m * WIDER[1],
-        radius: whole.radius(),
-        gap: config.gap,
-        best,
-        clouds: vec![whole],
-        slopes: search.field.slopes(),
-        least: f64::INFINITY,
-        nodes: 0,
-        lookups: 0,
-        budget: config.budget,
-        search,
-    };
-    let mut regions = proof.slabs(config.prior.theta_rad * WIDER[0]);
-    for region in &mut regions {
-        proof.look(region, 0);
-    }
-    proof.cut_all(regions, 0);
-    let points = cloud.len() as f64;
+    let mut cost = MaskCost { points: Undecided::new(search.field, cloud, kernel), search };
+    let proved = prove(&mut cost, centroid, config, best);
     let certificate = Certificate {
-        certified: proof.least >= proof.enough(),
+        certified: proved.certified,
         points: cloud.len(),
-        cost_m2: proof.best.cost,
-        lower_bound_m2: proof.least.min(proof.best.cost * points) / points,
-        nodes: proof.nodes,
-        lookups: proof.lookups,
+        cost_m2: proved.best.cost,
+        lower_bound_m2: proved.lower_bound,
+        nodes: proved.nodes,
+        lookups: proved.lookups,
     };
-    (certificate, proof.best)
+    (certificate, proved.best)
 }
 
-impl Proof<'_, '_> {
+/// Contact points on the field, and what is undecided of them on each level of the cuts.
+pub(super) struct Undecided<'a> {
+    field: &'a DistanceField,
+    kernel: f64,
+    /// The whole cloud first.
+    clouds: Vec<Cloud>,
+    slopes: [Slopes; 3],
+    pub(super) lookups: usize,
+}
+
+impl<'a> Undecided<'a> {
+    pub(super) fn new(field: &'a DistanceField, cloud: &Cloud, kernel: f64) -> Self {
+        let clouds = vec![cloud.outermost_first()];
+        Self { field, kernel, clouds, slopes: field.slopes(), lookups: 0 }
+    }
+
+    pub(super) fn whole(&self) -> &Cloud {
+        &self.clouds[0]
+    }
+
+    /// Lower bound of the cost, summed over the points, square meters.
+    pub(super) fn floor(&mut self, region: &Region, level: usize, enough: f64) -> Floor {
+        let way = region.extent.way(self.whole().radius());
+        let slopes = self.slopes.iter().find(|s| way < s.reach);
+        let cloud = &self.clouds[level];
+        self.lookups += cloud.asked();
+        self.field.bound(cloud, region.middle, self.kernel, region.extent, slopes, enough)
+    }
+
+    pub(super) fn narrow(&mut self, region: &Region, level: usize) {
+        if self.clouds.len() == level + 1 {
+            self.clouds.push(Cloud::default());
+        }
+        let (upper, lower) = self.clouds.split_at_mut(level + 1);
+        self.lookups += upper[level].asked();
+        self.field.undecided(&upper[level], region.middle, region.extent, &mut lower[0]);
+    }
+}
+
+/// The cost of contact points on the field.
+struct MaskCost<'a, 's> {
+    points: Undecided<'s>,
+    search: &'a mut Search<'s>,
+}
+
+impl Bounded for MaskCost<'_, '_> {
+    fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2] {
+        let count = self.points.whole().len() as f64;
+        let floor = self.points.floor(region, level, enough * count);
+        [floor.least(region.extent), floor.here].map(|cost| cost / count)
+    }
+
+    fn narrow(&mut self, region: &Region, level: usize) {
+        self.points.narrow(region, level);
+    }
+
+    fn descend(&mut self, from: State) -> Progress {
+        let mut found = Progress::new(from);
+        let before = self.search.lookups;
+        self.search.descend_quietly(&mut found, self.points.whole(), self.points.kernel);
+        self.points.lookups += self.search.lookups - before;
+        found
+    }
+
+    fn radius(&self) -> f64 {
+        self.points.whole().radius()
+    }
+
+    fn negligible(&self) -> f64 {
+        NEGLIGIBLE * self.points.kernel.powi(2)
+    }
+
+    fn lookups(&self) -> usize {
+        self.points.lookups
+    }
+}
+
+impl<C: Bounded> Proof<'_, C> {
     /// Regions that cover the poses with angles up to `theta_rad`.
     fn slabs(&self, theta_rad: f64) -> Vec<Region> {
         let count = (theta_rad / SLAB_RAD).ceil().max(1.0) as i32;
@@ -121,30 +254,27 @@ impl Proof<'_, '_> {
         pose.y_m.abs().max(pose.z_m.abs()) <= self.shift_m + way
     }
 
-    /// Cost from which a region is done, summed over the points: it holds no pose that beats the best by more than the
-    /// gap.
+    /// True where a run ended at a pose that the prior allows; what is cheaper elsewhere proves nothing about it.
+    fn allows(&self, run: &Progress) -> bool {
+        self.config.prior.allows(run.state.to_pose(self.centroid))
+    }
+
+    /// Cost from which a region is done: it holds no pose that beats the best by more than the gap.
     fn enough(&self) -> f64 {
-        let points = self.clouds[0].len() as f64;
-        let negligible = NEGLIGIBLE * self.kernel * self.kernel * points;
-        self.best.cost * points * (1.0 - self.gap) - negligible
+        self.best.cost * (1.0 - self.config.gap) - self.cost.negligible()
     }
 
     /// Bounds a region, and follows its middle if that is better than the best so far.
     fn look(&mut self, region: &mut Region, level: usize) {
-        let way = region.extent.way(self.radius);
-        let slopes = self.slopes.iter().find(|s| way < s.reach);
-        let cloud = &self.clouds[level];
-        self.lookups += cloud.asked();
         self.nodes += 1;
-        let (lower, here) =
-            self.search.field.bound(cloud, region.middle, self.kernel, region.extent, slopes, self.enough());
+        let enough = self.enough();
+        let [lower, here] = self.cost.bound(region, level, enough);
         region.lower = region.lower.max(lower);
-        let points = self.clouds[0].len() as f64;
-        if lower < self.enough() && here < 0.999 * self.best.cost * points {
-            let mut found = Progress::new(region.middle);
-            let before = self.search.lookups;
-            self.search.descend_quietly(&mut found, &self.clouds[0], self.kernel);
-            self.lookups += self.search.lookups - before;
+        if lower < enough && here < 0.999 * self.best.cost {
+            let mut found = self.cost.descend(region.middle);
+            if !self.allows(&found) {
+                found = Progress { cost: here, ..Progress::new(region.middle) };
+            }
             if found.cost < self.best.cost {
                 self.best = found;
             }
@@ -155,7 +285,7 @@ impl Proof<'_, '_> {
     fn cut_all(&mut self, mut regions: Vec<Region>, level: usize) {
         regions.sort_by(|a, b| a.lower.total_cmp(&b.lower));
         for region in regions {
-            if region.lower >= self.enough() || self.lookups >= self.budget || level >= DEEPEST {
+            if region.lower >= self.enough() || self.cost.lookups() >= self.budget || level >= DEEPEST {
                 self.least = self.least.min(region.lower);
             } else {
                 self.cut(&region, level);
@@ -164,12 +294,7 @@ impl Proof<'_, '_> {
     }
 
     fn cut(&mut self, region: &Region, level: usize) {
-        if self.clouds.len() == level + 1 {
-            self.clouds.push(Cloud::default());
-        }
-        let (upper, lower) = self.clouds.split_at_mut(level + 1);
-        self.lookups += upper[level].asked();
-        self.search.field.undecided(&upper[level], region.middle, region.extent, &mut lower[0]);
+        self.cost.narrow(region, level);
         // Halved are the widths that move the outermost point farthest.
         let half = region.extent.half;
         let ways = [half[0] * self.radius, half[1], half[2]];
@@ -177,24 +302,7 @@ impl Proof<'_, '_> {
         let halved = ways.map(|way| way > 0.6 * most);
         let mut parts = vec![*region];
         for axis in (0..3).filter(|&a| halved[a]) {
-            parts = parts
-                .into_iter()
-                .flat_map(|part| {
-                    [-0.5, 0.5].map(|side| {
-                        let mut part = part;
-                        let mut half = part.extent.half;
-                        let step = side * half[axis];
-                        half[axis] *= 0.5;
-                        part.extent = Extent::new(half);
-                        match axis {
-                            0 => part.middle.phi += step,
-                            1 => part.middle.place.x += step,
-                            _ => part.middle.place.y += step,
-                        }
-                        part
-                    })
-                })
-                .collect();
+            parts = parts.iter().flat_map(|part| part.halved(axis)).collect();
         }
         parts.retain(|part| self.meets_the_box(part));
         for part in &mut parts {
@@ -213,7 +321,6 @@ mod tests {
     use super::*;
     use crate::align::testing::{cross, cross_contacts, cuboid, filled};
     use crate::align::{AlignReport, Rung, align};
-    use crate::field::DistanceField;
     use crate::frames::PlanarPose;
     use glam::DVec3;
 
@@ -252,7 +359,8 @@ mod tests {
             let plain = field().bound(&cloud, middle, KERNEL_M, extent, None, f64::INFINITY);
             let tangent = field().bound(&undecided, middle, KERNEL_M, extent, fitting, f64::INFINITY);
             let here = field().sums(&cloud, middle, KERNEL_M).cost;
-            prop_assert!((plain.1 - here).abs() <= 1e-5 * here + 1e-15, "{} is not {here}", plain.1);
+            prop_assert!((plain.here - here).abs() <= 1e-5 * here + 1e-15, "{} is not {here}", plain.here);
+            let [plain, tangent] = [plain, tangent].map(|floor| floor.least(extent));
             for at in inside {
                 let state = State {
                     phi: middle.phi + at[0] * half[0],
@@ -261,8 +369,8 @@ mod tests {
                 let cost = field().sums(&cloud, state, KERNEL_M).cost;
                 // A ten-thousandth for the sums in f32.
                 let limit = cost * (1.0 + 1e-4) + 1e-12;
-                prop_assert!(plain.0 <= limit, "{} is above {cost} in {half:?}", plain.0);
-                prop_assert!(tangent.0 <= limit, "with slopes {} is above {cost} in {half:?}", tangent.0);
+                prop_assert!(plain <= limit, "{plain} is above {cost} in {half:?}");
+                prop_assert!(tangent <= limit, "with slopes {tangent} is above {cost} in {half:?}");
             }
         }
     }

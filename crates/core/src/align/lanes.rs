@@ -25,6 +25,12 @@ pub(super) struct Located {
 }
 
 impl Lattice<'_> {
+    /// Values at the four corners of a cell.
+    pub(super) fn cell(&self, column: usize, row: usize) -> [f32; 4] {
+        let at = row * self.columns + column;
+        [0, 1, self.columns, self.columns + 1].map(|corner| self.values[at + corner])
+    }
+
     /// Positions of points given in cells.
     #[inline]
     pub(super) fn locate(&self, y: &[f32; LANES], z: &[f32; LANES]) -> Located {

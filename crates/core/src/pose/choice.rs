@@ -141,7 +141,7 @@ impl RegistrationChoice {
                     Registration::DistanceField | Registration::Certified => {
                         Some(AlignConfig::default().final_kernel_m())
                     }
-                    Registration::LabIcp | Registration::Joint => None,
+                    Registration::LabIcp | Registration::Joint | Registration::JointCertified => None,
                     Registration::Refined => of_pairs(RefineConfig::default().space),
                     by => by.icp().and_then(of_pairs),
                 }
@@ -161,6 +161,7 @@ impl RegistrationChoice {
             Registration::DistanceField => Box::new(rejection.on_field(AlignConfig::default())),
             Registration::Certified => Box::new(rejection.on_field(AlignConfig::certified())),
             Registration::Joint => Box::new(JointConfig::default()),
+            Registration::JointCertified => Box::new(JointConfig::certified()),
             Registration::LabIcp => Box::new(LabIcpConfig::default()),
             Registration::Refined => {
                 let RefineConfig { planar, space } = RefineConfig::default();
@@ -175,7 +176,12 @@ impl Registration {
     /// Settings of a registration that is put together as an ICP; `None` for the others.
     fn icp(self) -> Option<IcpConfig> {
         match self {
-            Self::DistanceField | Self::Certified | Self::Joint | Self::LabIcp | Self::Refined => None,
+            Self::DistanceField
+            | Self::Certified
+            | Self::Joint
+            | Self::JointCertified
+            | Self::LabIcp
+            | Self::Refined => None,
             Self::PlanarPointToPoint => Some(IcpConfig::planar_point_to_point()),
             Self::PlanarPointToPlane => Some(IcpConfig::planar_point_to_plane()),
             Self::PlanarGicp => Some(IcpConfig::planar_gicp()),
@@ -187,12 +193,12 @@ impl Registration {
 
     /// True where it compares with the silhouette's field rather than with model points.
     pub fn uses_field(self) -> bool {
-        matches!(self, Self::DistanceField | Self::Certified | Self::Joint)
+        matches!(self, Self::DistanceField | Self::Certified | Self::Joint | Self::JointCertified)
     }
 
     /// True where it can be given a gate.
     pub(crate) fn has_gate(self) -> bool {
-        !matches!(self, Self::LabIcp | Self::Joint)
+        !matches!(self, Self::LabIcp | Self::Joint | Self::JointCertified)
     }
 
     /// True where it asks for a proof where nothing else settles the pose, so that it has a provisional answer before.

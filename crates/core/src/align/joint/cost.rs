@@ -6,7 +6,7 @@ use super::template::BandField;
 use crate::align::ANGLE_SCALE_M;
 use crate::align::TraceStep;
 use crate::align::batch::{Cloud, State};
-use crate::align::lanes::{LANES, LaneSums, Lattice, Sums};
+use crate::align::lanes::{LANES, LaneSums, Lattice, Located, Sums};
 use crate::align::search::{Cost, Progress};
 use crate::field::DistanceField;
 use crate::tent::STEP_M;
@@ -15,9 +15,10 @@ use crate::tent::STEP_M;
 const FLAT: f32 = 0.1;
 
 /// Places of a membrane image with its band there; padded to whole steps.
+#[derive(Clone)]
 pub(super) struct Patch {
     /// Places about a common center, in nodes.
-    y: Vec<f32>,
+    pub(super) y: Vec<f32>,
     z: Vec<f32>,
     /// Meters.
     band: Vec<f32>,
@@ -45,48 +46,72 @@ impl Patch {
     pub(super) fn len(&self) -> usize {
         self.len
     }
+
+    /// Squared distance of a place from the center, square nodes.
+    fn squared(&self, i: usize) -> f32 {
+        self.y[i] * self.y[i] + self.z[i] * self.z[i]
+    }
+
+    /// Greatest distance of a place from the center, meters.
+    pub(super) fn radius(&self) -> f64 {
+        f64::from((0..self.len).map(|i| self.squared(i)).fold(0f32, f32::max).sqrt()) * STEP_M
+    }
+
+    /// Patch with the places far from the center first: neighbors in it move about equally far when it turns.
+    pub(super) fn outermost_first(&self) -> Self {
+        let mut order: Vec<usize> = (0..self.len).collect();
+        order.sort_by(|&a, &b| self.squared(b).total_cmp(&self.squared(a)));
+        order.extend(self.len..self.y.len());
+        let [y, z, band] = [&self.y, &self.z, &self.band].map(|list| order.iter().map(|&i| list[i]).collect());
+        Self { y, z, band, len: self.len }
+    }
 }
 
 /// Residuals of a step of lanes and how they change with the place: meters, and meters per node.
-struct Read {
-    ay: [f32; LANES],
-    az: [f32; LANES],
-    r: [f32; LANES],
-    gy: [f32; LANES],
-    gz: [f32; LANES],
-    template: [f32; LANES],
+pub(super) struct Read {
+    pub(super) ay: [f32; LANES],
+    pub(super) az: [f32; LANES],
+    pub(super) r: [f32; LANES],
+    pub(super) gy: [f32; LANES],
+    pub(super) gz: [f32; LANES],
+    pub(super) template: [f32; LANES],
+    /// Change of each slope along the other axis.
+    pub(super) twist: [f32; LANES],
+    /// Cells and positions within them.
+    pub(super) at: Located,
 }
 
 impl BandField {
     /// Turn (cosine, sine) and place (nodes) of a state.
-    fn motion(&self, state: State) -> [f32; 4] {
+    pub(super) fn motion(&self, state: State) -> [f32; 4] {
         let (turn, place) = (DVec2::from_angle(state.phi), (state.place - self.origin) / STEP_M);
         [turn.x as f32, turn.y as f32, place.x as f32, place.y as f32]
     }
 
     #[inline(always)]
-    fn read(&self, patch: &Patch, at: usize, [cos, sin, place_y, place_z]: [f32; 4]) -> Read {
+    pub(super) fn read(&self, patch: &Patch, at: usize, [cos, sin, place_y, place_z]: [f32; 4]) -> Read {
         let span = at..at + LANES;
         let (y, z, band) = (&patch.y[span.clone()], &patch.z[span.clone()], &patch.band[span]);
         let zero = [0f32; LANES];
-        let mut read = Read { ay: zero, az: zero, r: zero, gy: zero, gz: zero, template: zero };
-        let (mut ty, mut tz) = (zero, zero);
+        let [mut ay, mut az, mut ty, mut tz] = [zero; 4];
         for l in 0..LANES {
-            read.ay[l] = cos * y[l] - sin * z[l];
-            read.az[l] = sin * y[l] + cos * z[l];
-            ty[l] = read.ay[l] + place_y;
-            tz[l] = read.az[l] + place_z;
+            ay[l] = cos * y[l] - sin * z[l];
+            az[l] = sin * y[l] + cos * z[l];
+            ty[l] = ay[l] + place_y;
+            tz[l] = az[l] + place_z;
         }
         let lattice = Lattice { columns: self.field.columns, rows: self.field.rows, values: &self.field.values };
         // Off the grid the border's value counts, which is next to nothing.
         let at = lattice.locate(&ty, &tz);
         let [a, b, c, d] = lattice.corners_of(&at);
+        let mut read = Read { ay, az, r: zero, gy: zero, gz: zero, template: zero, twist: zero, at };
         for l in 0..LANES {
             let (ab, cd) = (b[l] - a[l], d[l] - c[l]);
-            let (near, far) = (a[l] + ab * at.fy[l], c[l] + cd * at.fy[l]);
-            read.template[l] = near + (far - near) * at.fz[l];
+            let (near, far) = (a[l] + ab * read.at.fy[l], c[l] + cd * read.at.fy[l]);
+            read.template[l] = near + (far - near) * read.at.fz[l];
             read.r[l] = read.template[l] - band[l];
-            read.gy[l] = ab + (cd - ab) * at.fz[l];
+            read.twist[l] = cd - ab;
+            read.gy[l] = ab + (cd - ab) * read.at.fz[l];
             read.gz[l] = far - near;
         }
         read

@@ -13,7 +13,9 @@ use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
 use crate::align::search::{Progress, Search, minimize};
-use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
+use crate::align::{
+    ANGLE_SCALE_M, AlignError, AlignReport, Certificate, MIN_POINTS, Run, Rung, Scene, TraceStep, clean,
+};
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
@@ -27,7 +29,7 @@ const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
 /// Angles of further starts as shares of the prior's, by rung.
 const MORE: [[f64; 2]; 2] = [[0.45, -0.45], [0.9, -0.9]];
 /// Steps that move no point by more than about this, meters, end the descents.
-const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
+pub(super) const STEPS_M: [f64; 4] = [1e-4, 5e-5, 5e-5, 1e-5];
 
 /// Refuses settings that make no sense.
 pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
@@ -36,7 +38,7 @@ pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
     if config.starts.iter().any(|s| !s.is_finite()) {
         return bad("starts");
     }
-    if config.points.iter().chain(&config.mask_points).any(|n| *n < MIN_POINTS) {
+    if config.points.iter().chain(&config.mask_points).chain([&config.proof_points]).any(|n| *n < MIN_POINTS) {
         return bad("points");
     }
     if !config.kernels_m.iter().chain(&config.mask_kernels_m).all(positive) {
@@ -51,6 +53,9 @@ pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
     }
     if config.max_iterations == 0 {
         return bad("max_iterations");
+    }
+    if !(config.mask.gap > 0.0 && config.mask.gap < 1.0) {
+        return bad("gap");
     }
     Ok(())
 }
@@ -81,9 +86,10 @@ pub(super) struct Answer {
     starts: Vec<PlanarPose>,
     runs: Vec<Progress>,
     winner: usize,
-    rung: Rung,
+    pub(super) rung: Rung,
+    pub(super) certificate: Option<Certificate>,
     pub(super) fit: JointFit,
-    lookups: usize,
+    pub(super) lookups: usize,
     trace: Vec<TraceStep>,
     points: usize,
 }
@@ -120,6 +126,12 @@ impl Descents<'_, '_> {
         let sums = minimize(&mut noted, at, config.max_iterations, STEPS_M[stage]);
         (at.cost, at.inliers, at.inlier_squares) = (sums.cost, sums.inliers, sums.inlier_squares);
         self.lookups += joint.lookups;
+    }
+
+    /// Share of the membranes' relief that the tool explains at a state, and the noise that it leaves, meters.
+    fn told(&self, state: State) -> (f64, f64) {
+        let relief = Relief::of(&self.patches[LAST], state, self.problem.config.kernels_m[LAST]);
+        (relief.explained(), noise_m(relief.residuals_m))
     }
 
     /// Through the bands from one start, until it meets the end of a run before.
@@ -207,6 +219,10 @@ impl<'a> Problem<'a> {
         None
     }
 
+    pub(super) fn mask(&self) -> Option<&[Cloud; 2]> {
+        self.mask.as_ref()
+    }
+
     /// The images as a stage compares them.
     pub(super) fn patches(&self, stage: usize) -> Patches<'_> {
         self.patches_of(stage.min(BANDS.len() - 1), self.config.points[stage])
@@ -227,6 +243,11 @@ impl<'a> Problem<'a> {
         self.config.mask.prior.allows(at.state.to_pose(self.centroid))
     }
 
+    fn descents(&self) -> Descents<'_, 'a> {
+        let patches = std::array::from_fn(|stage| self.patches(stage));
+        Descents { problem: self, patches, lookups: 0, trace: Vec::new() }
+    }
+
     /// Two scouts from the middle of the prior, one by the bands and one by the mask; two more, and two more, while the best
     /// is alone, has a rival of nearly its cost elsewhere, or lies where no gripper holds a tool. Then the best two are
     /// refined.
@@ -234,8 +255,7 @@ impl<'a> Problem<'a> {
         let config = self.config;
         let own = config.starts.is_empty();
         let mut starts = if own { vec![PlanarPose::default()] } else { config.starts.clone() };
-        let patches = std::array::from_fn(|stage| self.patches(stage));
-        let mut descents = Descents { problem: self, patches, lookups: 0, trace: Vec::new() };
+        let mut descents = self.descents();
         let mut runs: Vec<Progress> = Vec::new();
         let mut rung = if own { Rung::Single } else { Rung::Fixed };
         let mut more = MORE.iter().filter(|_| own);
@@ -267,8 +287,7 @@ impl<'a> Problem<'a> {
             starts.extend(shares.map(|share| PlanarPose { theta_rad: share * theta_rad, ..PlanarPose::default() }));
         };
         let best = runs[order[0]];
-        let relief = Relief::of(&descents.patches[LAST], best.state, config.kernels_m[LAST]);
-        let (explained, noise_m) = (relief.explained(), noise_m(relief.residuals_m));
+        let (explained, noise_m) = descents.told(best.state);
         let mask_weight = self.mask_weight(noise_m, best.state);
         let winner = self.refine(&mut runs, &order, &mut descents, mask_weight);
         let fit = JointFit {
@@ -280,7 +299,24 @@ impl<'a> Problem<'a> {
         };
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
         let Descents { lookups, trace, .. } = descents;
-        Answer { starts, runs, winner, rung, fit, lookups, trace, points }
+        Answer { starts, runs, winner, rung, certificate: None, fit, lookups, trace, points }
+    }
+
+    /// Refines one more state for an answer, and takes it if it is better.
+    pub(super) fn follow(&self, answer: &mut Answer, state: State) {
+        let mut descents = self.descents();
+        let (run, mut at) = (answer.runs.len(), Progress::new(state));
+        descents.descend(run, &mut at, LAST, answer.fit.mask_weight);
+        answer.runs.push(at);
+        answer.starts.push(state.to_pose(self.centroid));
+        answer.lookups += descents.lookups;
+        answer.trace.append(&mut descents.trace);
+        let won = answer.runs[answer.winner];
+        let allowed = [&at, &won].map(|run| self.allowed(run));
+        if allowed == [true, false] || allowed[0] == allowed[1] && at.cost < won.cost {
+            answer.winner = run;
+            (answer.fit.explained, answer.fit.noise_m) = descents.told(at.state);
+        }
     }
 
     /// Runs by preference: within the prior before outside, then the cheaper one.
@@ -353,7 +389,7 @@ impl<'a> Problem<'a> {
             winner: answer.winner,
             rung: answer.rung,
             ladder: Vec::new(),
-            certificate: None,
+            certificate: answer.certificate,
             iterations: runs.iter().map(|run| run.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),

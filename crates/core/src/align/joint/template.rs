@@ -5,6 +5,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
+use super::pyramid::Pyramid;
 use super::smooth::{BANDS, Layer, Smooth};
 use crate::relax::Field;
 use crate::tent::{STEP_M, heights, tent};
@@ -22,6 +23,7 @@ pub(super) struct BandField {
     pub(super) field: Field,
     /// `(y, z)` of node (0, 0), meters.
     pub(super) origin: DVec2,
+    pub(super) pyramid: Pyramid,
 }
 
 /// The bands of one side of a tool, in the order of [`BANDS`].
@@ -60,6 +62,6 @@ fn made(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Tem
                     smooth.at(narrow, column, row)[0] - smooth.at(wide, column, row)[0];
             }
         }
-        BandField { field, origin: sheet.origin }
+        BandField { field, origin: sheet.origin, pyramid: Pyramid::default() }
     }))
 }

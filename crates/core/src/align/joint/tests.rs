@@ -18,16 +18,16 @@ use crate::units::angle_error;
 use crate::verdict::{Grade, Verdict};
 
 /// A touch of the simulator: imprints, cameras and true contact of both fingers, the tool and the pose.
-struct Touch {
+pub(super) struct Touch {
     imprints: [DepthMap; 2],
     cameras: [DepthCamera; 2],
     masks: [Mask; 2],
-    tool: ToolModel,
-    truth: PlanarPose,
+    pub(super) tool: ToolModel,
+    pub(super) truth: PlanarPose,
 }
 
 impl Touch {
-    fn new(tool: usize, seed: u64) -> Self {
+    pub(super) fn new(tool: usize, seed: u64) -> Self {
         let sample = simulate(&tools()[tool], random_grasp(seed), seed, &SimConfig::default());
         let touch = |f: usize| sample.pad(lab::PADS[f]).unwrap().depth().unwrap();
         Self {
@@ -39,20 +39,20 @@ impl Touch {
         }
     }
 
-    fn points(&self) -> Vec<DVec3> {
+    pub(super) fn points(&self) -> Vec<DVec3> {
         (0..2).flat_map(|f| lift(&self.imprints[f], &self.cameras[f], Some(&self.masks[f])).unwrap().points).collect()
     }
 
-    fn images(&self) -> Vec<PadImage<'_>> {
+    pub(super) fn images(&self) -> Vec<PadImage<'_>> {
         (0..2).map(|f| PadImage { imprint: &self.imprints[f], camera: &self.cameras[f] }).collect()
     }
 
-    fn by(&self, method: &dyn Register) -> Result<AlignReport, AlignError> {
+    pub(super) fn by(&self, method: &dyn Register) -> Result<AlignReport, AlignError> {
         let contacts = Contacts { points: &self.points(), images: &self.images() };
         method.run(&Scene::new(contacts), &self.tool, Ask::default())
     }
 
-    fn error_deg(&self, report: &AlignReport) -> f64 {
+    pub(super) fn error_deg(&self, report: &AlignReport) -> f64 {
         angle_error(report.grasp_from_object.theta_rad, self.truth.theta_rad).abs().to_degrees()
     }
 }
