@@ -46,6 +46,7 @@ use output::PrintError;
 pub use args::{JsonArgs, LimitArgs, at_least_one};
 pub use output::{Output, says};
 pub use recipe::{ModelArgs, RuntimeArg};
+pub use simulate::condition;
 
 use touch2touch_core::rig::Rig;
 use touch2touch_work::io::dataset::ToolScale;

@@ -23,7 +23,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, register};
 use touch2touch_core::tool::{ToolError, ToolModel};
 use touch2touch_core::units::{angle_error, scale_to_meters};
-use touch2touch_work::io::cases::{self, Case};
+use touch2touch_work::io::cases::{Case, Suite};
 
 /// A box with the given half sizes about `center`, closed, facing outwards.
 fn cuboid(center: DVec3, half: DVec3) -> TriMesh {
@@ -78,9 +78,9 @@ fn pose(degrees: f64, y_mm: f64, z_mm: f64) -> PlanarPose {
 /// One simulated grasp for the rows about depth images.
 fn case() -> (&'static Case, &'static ToolModel) {
     static CASE: LazyLock<(Case, ToolModel)> = LazyLock::new(|| {
-        let tools = cases::simulated_tools();
-        let case = cases::simulated(3, 10, 5, &tools);
-        let model = tool(tools[case.tool].mesh());
+        let suite = Suite::new(10, 5);
+        let case = suite.case(3);
+        let model = tool(suite.tools()[case.tool].mesh());
         (case, model)
     });
     (&CASE.0, &CASE.1)

@@ -66,8 +66,8 @@ impl Part {
     }
 }
 
-/// Reads the key of a condition.
-fn condition() -> impl TypedValueParser<Value = Condition> {
+/// Parser of the key of a condition.
+pub fn condition() -> impl TypedValueParser<Value = Condition> {
     PossibleValuesParser::new(Condition::iter().map(|c| PossibleValue::new(c.key()).help(c.description())))
         .map(|key| key.parse().unwrap_or_default())
 }

@@ -1,13 +1,20 @@
 //! `touch2touch-bench cases`: fresh known grasps from the built-in simulator.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use touch2touch::headless::{Common, Output, VerbResult};
-use touch2touch_work::io::cases;
+use super::generator::timed_run;
+use touch2touch::headless::{Common, Output, VerbResult, condition};
+use touch2touch_core::rig::Rig;
+use touch2touch_core::sim::Condition;
+use touch2touch_work::bundles::{self, BundleKind};
+use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::infer::generator::Generator;
+use touch2touch_work::io::cases::{self, Suite};
 use touch2touch_work::io::stl;
 
 /// Arguments of `bench cases`.
@@ -22,6 +29,18 @@ pub(super) struct CasesArgs {
     /// Seed of tools, poses, noise and masks.
     #[arg(long, default_value_t = 1)]
     seed: u64,
+    /// Fault of the pairs, as in the paper's Table I: matters to what is predicted from the GelSlims.
+    #[arg(long, default_value = "plain", value_parser = condition())]
+    condition: Condition,
+    /// Bubbles of any size, pressed on 2 to 15 mm deep, in place of the nominal ones.
+    #[arg(long)]
+    any_depth: bool,
+    /// Imprints that the generator predicts from the GelSlims in place of the measured ones.
+    #[arg(long)]
+    predicted: bool,
+    /// The generator's bundle (default: the shipped one).
+    #[arg(long, requires = "predicted")]
+    bundle: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
@@ -43,25 +62,41 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
     if cases::case_files(&args.out).is_ok() {
         anyhow::bail!("{} already holds cases: name a new folder", args.out.display());
     }
-    let tools = cases::simulated_tools();
     let count = args.count as usize;
+    let mut suite = Suite::new(count, args.seed).with_condition(args.condition);
+    if args.any_depth {
+        suite = suite.with_any_depth();
+    }
+    let generator = args.predicted.then(|| open(args.bundle.as_deref())).transpose()?.map(Mutex::new);
     let output = Output::new(args.common, "simulating", count);
-    for (number, mesh) in cases::simulated_meshes().iter().enumerate() {
-        stl::write(&cases::tool_file(&args.out, number), mesh)?;
+    for (number, tool) in suite.tools().iter().enumerate() {
+        stl::write(&cases::tool_file(&args.out, number), &tool.mesh())?;
     }
     let digits = (count - 1).to_string().len().max(3);
     (0..count).into_par_iter().try_for_each(|i| {
-        let case = cases::simulated(i, count, args.seed, &tools);
-        output.step(&tools[case.tool].name);
-        cases::write(&args.out.join(format!("case_{i:0digits$}.npz")), &case)
+        let (sample, mut case) = suite.felt(i);
+        if let Some(generator) = &generator {
+            let mut generator = generator.lock().unwrap_or_else(PoisonError::into_inner);
+            let config = generator.spec().defaults;
+            (_, case.imprints) = timed_run(&mut generator, &sample, &config)?;
+        }
+        output.step(&suite.tools()[case.tool].name);
+        anyhow::Ok(cases::write(&args.out.join(format!("case_{i:0digits$}.npz")), &case)?)
     })?;
     let written = Written {
         out: args.out.clone(),
         cases: count,
-        tools: tools.iter().map(|t| t.name.clone()).collect(),
+        tools: suite.tools().iter().map(|t| t.name.clone()).collect(),
         seed: args.seed,
         seconds: start.elapsed().as_secs_f64(),
     };
-    output.finish(&written, || format!("{count} cases of {} tools in {}", tools.len(), args.out.display()))?;
+    output.finish(&written, || format!("{count} cases of {} tools in {}", suite.tools().len(), args.out.display()))?;
     Ok(true)
+}
+
+/// The generator that predicts.
+fn open(bundle: Option<&Path>) -> anyhow::Result<Generator> {
+    let available = bundles::find(&[]);
+    let bundle = available.take(BundleKind::Generator, bundle, &Rig::lab())?.open("Open the generator")?;
+    Ok(Generator::open(&bundle, EngineChoice::Auto)?)
 }

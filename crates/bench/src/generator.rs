@@ -11,7 +11,8 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use self::cases::{Case, Judge, Score};
-use self::timing::{First, Overhead, timed_run};
+pub(super) use self::timing::timed_run;
+use self::timing::{First, Overhead};
 use super::Machine;
 use super::figures::quantile;
 use super::front::{self, Axis, FrontPoint, Picture};
@@ -278,7 +279,7 @@ fn measure(
     for case in cases {
         output.step(&case.name);
         for (index, config) in configs.iter().enumerate() {
-            let (ms, imprints) = timed_run(generator, case, config)?;
+            let (ms, imprints) = timed_run(generator, &case.sample, config)?;
             times[index].push(ms);
             scores[index].push(judge.score(case, &imprints)?);
         }

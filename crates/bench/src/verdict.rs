@@ -23,7 +23,7 @@ use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, regist
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::which_tool;
-use touch2touch_work::io::cases::{self, Case, CaseSet};
+use touch2touch_work::io::cases::{Case, CaseSet, Suite};
 
 /// Arguments of `bench verdict`.
 #[derive(Debug, Args)]
@@ -321,7 +321,7 @@ fn text(report: &Report) -> String {
 
 /// Source of the grasps; the `tool` of each is a position among the meshes.
 enum Source {
-    Fresh { count: usize, seed: u64, tools: Vec<ToolSpec> },
+    Fresh(Suite),
     Known(Vec<Case>),
 }
 
@@ -329,8 +329,9 @@ impl Source {
     /// The source with the meshes of its tools.
     fn new(args: &VerdictArgs) -> anyhow::Result<(Self, Vec<TriMesh>)> {
         let Some(folder) = &args.cases else {
-            let (count, seed) = (args.count as usize, args.simulation_seed);
-            return Ok((Self::Fresh { count, seed, tools: cases::simulated_tools() }, cases::simulated_meshes()));
+            let suite = Suite::new(args.count as usize, args.simulation_seed);
+            let meshes = suite.tools().iter().map(ToolSpec::mesh).collect();
+            return Ok((Self::Fresh(suite), meshes));
         };
         let mut set = CaseSet::open(folder)?;
         let masks = masks(&set, args.masks, &args.model)?;
@@ -345,14 +346,14 @@ impl Source {
 
     fn count(&self) -> usize {
         match self {
-            Self::Fresh { count, .. } => *count,
+            Self::Fresh(suite) => suite.count(),
             Self::Known(cases) => cases.len(),
         }
     }
 
     fn case(&self, i: usize) -> Case {
         match self {
-            Self::Fresh { count, seed, tools } => cases::simulated(i, *count, *seed, tools),
+            Self::Fresh(suite) => suite.case(i),
             Self::Known(cases) => cases[i].clone(),
         }
     }

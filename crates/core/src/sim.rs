@@ -35,7 +35,7 @@ pub use membrane::{Dome, Membrane};
 pub(crate) use rig::INTRINSICS;
 pub use rig::{RANGE_M, gelslim_yz, grasp_from_camera, outward};
 pub use spoil::{Spoil, spoil_mask};
-pub use training::{Drawn, Mix, training_touch};
+pub use training::{Drawn, Mix, of_any_depth, training_touch};
 
 use super::catalog::ToolSpec;
 use super::noise::{Noise, Stream};

@@ -11,6 +11,7 @@ use touch2touch_core::diffusion::{GaussianNoise, GenerateConfig, Progress, Tenso
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
 use touch2touch_core::rig::{PadId, Rig, lab};
+use touch2touch_core::sample::Sample;
 use touch2touch_work::infer::bundle::{Bundle, TimestepType};
 use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Input};
 use touch2touch_work::infer::generator::{Generator, Item, Observer, prepare};
@@ -50,9 +51,9 @@ pub(super) struct First {
     pub(super) preview_percent: Option<f64>,
 }
 
-fn differences(case: &Case) -> anyhow::Result<[&RgbGrid; 2]> {
+fn differences(sample: &Sample) -> anyhow::Result<[&RgbGrid; 2]> {
     let of = |finger| {
-        let touch = case.sample.pad(finger).and_then(|touch| touch.color());
+        let touch = sample.pad(finger).and_then(|touch| touch.color());
         touch.map(|g| &g.difference).ok_or_else(|| anyhow::anyhow!("a simulated grasp has both GelSlim images"))
     };
     Ok([of(lab::RIGHT)?, of(lab::LEFT)?])
@@ -63,21 +64,21 @@ fn ms_since(begin: Instant) -> f64 {
 }
 
 /// Both fingers from image to meters, with nothing remembered from runs before.
-pub(super) fn timed_run(
+pub(crate) fn timed_run(
     generator: &mut Generator,
-    case: &Case,
+    sample: &Sample,
     config: &GenerateConfig,
 ) -> anyhow::Result<(f64, [DepthMap; 2])> {
-    run_observed(generator, case, config, &mut |_| ControlFlow::Continue(()))
+    run_observed(generator, sample, config, &mut |_| ControlFlow::Continue(()))
 }
 
 fn run_observed(
     generator: &mut Generator,
-    case: &Case,
+    sample: &Sample,
     config: &GenerateConfig,
     observer: &mut dyn Observer,
 ) -> anyhow::Result<(f64, [DepthMap; 2])> {
-    let images = differences(case)?;
+    let images = differences(sample)?;
     generator.forget_conditions();
     let begin = Instant::now();
     let items = [0, 1].map(|image| Item { image, seed: config.seed });
@@ -135,18 +136,18 @@ pub(super) fn overhead(
     let (mut generated, mut alone, mut percent) = (Vec::new(), Vec::new(), Vec::new());
     for index in 0..PAIRS {
         let case = &cases[index % cases.len()];
-        let images = differences(case)?
+        let images = differences(&case.sample)?
             .iter()
             .map(|image| Ok(Tensor::stack(&[prepare(image, &spec.input)?]).expect("one tensor can be stacked")))
             .collect::<anyhow::Result<Vec<_>>>()?;
         // In turn first and second: a machine that gets slower meanwhile favors neither.
         let (with, without);
         if index % 2 == 0 {
-            with = timed_run(generator, case, &config)?.0;
+            with = timed_run(generator, &case.sample, &config)?.0;
             without = bare(generator, &images, &config, steps)?;
         } else {
             without = bare(generator, &images, &config, steps)?;
-            with = timed_run(generator, case, &config)?.0;
+            with = timed_run(generator, &case.sample, &config)?.0;
         }
         percent.push(100.0 * (with / without - 1.0));
         generated.push(with);
@@ -199,12 +200,12 @@ pub(super) fn first(
     let begin = Instant::now();
     let mut generator = Generator::open(bundle, choice)?;
     let load_ms = ms_since(begin);
-    let (cold_ms, _) = timed_run(&mut generator, case, config)?;
+    let (cold_ms, _) = timed_run(&mut generator, &case.sample, config)?;
     let (mut warm, mut seen, mut previews) = (Vec::new(), Vec::new(), Vec::new());
     for _ in 0..WARM {
-        warm.push(timed_run(&mut generator, case, config)?.0);
+        warm.push(timed_run(&mut generator, &case.sample, config)?.0);
         let mut looker = Looker { begin: Instant::now(), first_ms: None };
-        seen.push(run_observed(&mut generator, case, config, &mut looker)?.0);
+        seen.push(run_observed(&mut generator, &case.sample, config, &mut looker)?.0);
         previews.extend(looker.first_ms);
     }
     let median = |values: &[f64]| quantile(values.iter().copied(), 0.5);

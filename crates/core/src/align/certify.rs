@@ -201,7 +201,7 @@ impl Bounded for MaskCost<'_, '_> {
     fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2] {
         let count = self.points.whole().len() as f64;
         let floor = self.points.floor(region, level, enough * count);
-        [floor.least(region.extent), floor.here].map(|cost| cost / count)
+        [floor.least(region.extent.half), floor.here].map(|cost| cost / count)
     }
 
     fn narrow(&mut self, region: &Region, level: usize) {
@@ -360,7 +360,7 @@ mod tests {
             let tangent = field().bound(&undecided, middle, KERNEL_M, extent, fitting, f64::INFINITY);
             let here = field().sums(&cloud, middle, KERNEL_M).cost;
             prop_assert!((plain.here - here).abs() <= 1e-5 * here + 1e-15, "{} is not {here}", plain.here);
-            let [plain, tangent] = [plain, tangent].map(|floor| floor.least(extent));
+            let [plain, tangent] = [plain, tangent].map(|floor| floor.least(extent.half));
             for at in inside {
                 let state = State {
                     phi: middle.phi + at[0] * half[0],

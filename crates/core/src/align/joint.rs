@@ -8,6 +8,7 @@
 //!
 //! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
 
+mod bound;
 mod certify;
 mod cost;
 mod evidence;

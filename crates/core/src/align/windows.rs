@@ -1,6 +1,5 @@
 //! Values and slopes of a grid in windows around each cell, for lower bounds of costs over boxes of poses.
 
-use super::batch::Extent;
 use super::lanes::Lattice;
 
 /// For each cell, between which values the slope of a grid lies in a window around it: middle and half range by y and z,
@@ -96,9 +95,9 @@ impl Floor {
         self.here += scale * other.here;
     }
 
-    /// Least cost anywhere in a box of this size, less what the sums may have been rounded up.
-    pub(super) fn least(&self, extent: Extent) -> f64 {
-        let fall: f64 = self.slope.iter().zip(extent.half).map(|(slope, half)| slope.abs() * half).sum();
+    /// Least cost anywhere in a box whose half widths (angle, y, z) are `half`, less what the sums may have been rounded up.
+    pub(super) fn least(&self, half: [f64; 3]) -> f64 {
+        let fall: f64 = self.slope.iter().zip(half).map(|(slope, half)| slope.abs() * half).sum();
         (self.low * (1.0 - 1e-5) - fall * (1.0 + 1e-5)).max(0.0)
     }
 }

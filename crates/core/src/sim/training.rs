@@ -96,7 +96,7 @@ fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
 
 /// The bubble in another size, pressed on as lightly or as hard as any gripper does; slower distortions weigh more where the
 /// imprint is shallow.
-fn of_any_depth(bubble: BubbleConfig, rng: &mut ChaCha8Rng) -> BubbleConfig {
+pub fn of_any_depth(bubble: BubbleConfig, rng: &mut ChaCha8Rng) -> BubbleConfig {
     let press_m = 0.002 * 7.5_f64.powf(rng.random_range(0.0..1.0));
     let size = rng.random_range(0.55..1.0);
     BubbleConfig {

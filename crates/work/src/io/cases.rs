@@ -29,7 +29,7 @@ use touch2touch_core::rig::lab;
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sensor::Intrinsics;
 
-pub use simulated::{simulated, simulated_meshes, simulated_tools, stratum};
+pub use simulated::{Suite, stratum};
 
 /// Difficulty of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, strum::EnumIter, strum::Display)]

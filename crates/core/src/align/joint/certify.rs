@@ -45,18 +45,18 @@ impl Bounded for Places<'_> {
         let mut all = Floor::default();
         for (template, patch) in &self.fingers {
             self.lookups += patch.len();
-            let left = (enough - all.least(region.extent)) * points;
+            let left = (enough - all.least(region.extent.half)) * points;
             all.add(&template.floor(patch, region.middle, self.kernel_m, region.extent, left), 1.0 / points);
-            if all.least(region.extent) >= enough {
-                return [all.least(region.extent), all.here];
+            if all.least(region.extent.half) >= enough {
+                return [all.least(region.extent.half), all.here];
             }
         }
         if let Some(mask) = &mut self.mask {
             let scale = mask.scale();
-            let left = (enough - all.least(region.extent)) / scale;
+            let left = (enough - all.least(region.extent.half)) / scale;
             all.add(&mask.points.floor(region, level, left), scale);
         }
-        [all.least(region.extent), all.here]
+        [all.least(region.extent.half), all.here]
     }
 
     fn narrow(&mut self, region: &Region, level: usize) {

@@ -12,9 +12,9 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{Case, Stratum};
 use touch2touch_core::catalog::{self, Bar, ToolSpec};
-use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_core::sim::{self, Spoil, spoil_mask};
+use touch2touch_core::sample::Sample;
+use touch2touch_core::sim::{self, Condition, Spoil, spoil_mask};
 
 /// Deviation of the camera's true angle and place from the nominal ones, per axis.
 const CALIBRATION_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
@@ -22,8 +22,8 @@ const CALIBRATION_M: f64 = 0.2e-3;
 /// Share of pixels without depth.
 const DROPPED: f64 = 0.01;
 
-/// The tools that [`simulated`] uses; the position is [`Case::tool`]. The last two are straight.
-pub fn simulated_tools() -> Vec<ToolSpec> {
+/// The tools of the plain [`Suite`]; the position is [`Case::tool`]. The last two are straight.
+fn plain_tools() -> Vec<ToolSpec> {
     let is_rod = |t: &&ToolSpec| t.name.ends_with("_rod");
     let rod = catalog::tools().iter().find(is_rod).cloned();
     let mut tools: Vec<ToolSpec> = catalog::tools().iter().filter(|t| !is_rod(t)).cloned().collect();
@@ -36,11 +36,6 @@ pub fn simulated_tools() -> Vec<ToolSpec> {
     tools
 }
 
-/// The CAD models of [`simulated_tools`].
-pub fn simulated_meshes() -> Vec<TriMesh> {
-    simulated_tools().iter().map(ToolSpec::mesh).collect()
-}
-
 /// The kind of case `position` of `count`: 70 % nominal, then 20 % hard, then 10 % degenerate.
 pub fn stratum(position: usize, count: usize) -> Stratum {
     match (10 * position).checked_div(count).unwrap_or(0) {
@@ -50,57 +45,112 @@ pub fn stratum(position: usize, count: usize) -> Stratum {
     }
 }
 
-/// Case number `position` of a suite of `count` with the given seed. About 60 ms of one core in release.
-pub fn simulated(position: usize, count: usize, seed: u64, tools: &[ToolSpec]) -> Case {
-    // One seed per case, so that a case does not depend on how its neighbors came about.
-    let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
-    let stratum = stratum(position, count);
-    let straight = tools.len() - 2;
-    let tool = match stratum {
-        Stratum::Degenerate => straight + position % 2,
-        Stratum::Nominal | Stratum::Hard => position % straight,
-    };
-    let mut config = sim::SimConfig::default();
-    config.bubble.calibration_rad = CALIBRATION_RAD;
-    config.bubble.calibration_m = CALIBRATION_M;
-    config.bubble.dropped_share = 0.0;
-    if stratum == Stratum::Hard {
-        config.bubble.press_m *= 2.0 / 3.0;
-        config.bubble.noise_m *= 1.5;
+/// Suite of fresh cases.
+#[derive(Clone, Debug)]
+pub struct Suite {
+    count: usize,
+    seed: u64,
+    condition: Condition,
+    any_depth: bool,
+    /// Plain forms of the tools, then those of every other case where the condition has another.
+    tools: Vec<ToolSpec>,
+}
+
+impl Suite {
+    /// Plain cases, by whose number the kinds are shared out.
+    pub fn new(count: usize, seed: u64) -> Self {
+        Self { count, seed, condition: Condition::Plain, any_depth: false, tools: plain_tools() }
     }
-    let sample = sim::simulate(&tools[tool], sim::random_grasp(rng.random()), rng.random(), &config);
-    let spoil = if stratum == Stratum::Hard { Spoil::hard() } else { Spoil::nominal() };
-    let mask_seed: u64 = rng.random();
-    // Of the degenerate cases, three of four have one blank finger, either one equally often.
-    let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
-    let touch = |finger: PadId| {
-        let touch = sample.pad(finger).and_then(|t| t.depth());
-        touch.expect("the simulator presses both fingers")
-    };
-    let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
-    let clean = lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
-    let mut masks = lab::PADS.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
-    if let Some(finger) = blank {
-        let finger: usize = finger;
-        masks[finger].as_mut_slice().fill(false);
+
+    /// The same grasps with a fault of the pairs.
+    #[must_use]
+    pub fn with_condition(self, condition: Condition) -> Self {
+        let forms = if condition == Condition::Mixed { 0..2 } else { 0..1 };
+        let tools = forms.flat_map(|form| plain_tools().into_iter().map(move |tool| condition.tool(&tool, form)));
+        Self { condition, tools: tools.collect(), ..self }
     }
-    let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
-    for (f, imprint) in imprints.iter_mut().enumerate() {
-        let reference = camera(lab::PADS[f]).depth_reference;
-        for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
-            if rng.random_bool(DROPPED) {
-                *value = if f == 0 { *reference } else { f32::NAN };
+
+    /// The same grasps by bubbles of any size, pressed on as lightly or as hard as any gripper does.
+    #[must_use]
+    pub fn with_any_depth(self) -> Self {
+        Self { any_depth: true, ..self }
+    }
+
+    /// The tools; the position is [`Case::tool`].
+    pub fn tools(&self) -> &[ToolSpec] {
+        &self.tools
+    }
+
+    /// Number of cases.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Case number `position`. About 60 ms of one core in release.
+    pub fn case(&self, position: usize) -> Case {
+        self.felt(position).1
+    }
+
+    /// The case with the touch that it is of.
+    pub fn felt(&self, position: usize) -> (Sample, Case) {
+        let Self { count, seed, condition, any_depth, ref tools } = *self;
+        let plain = plain_tools().len();
+        // One seed per case, so that a case does not depend on how its neighbors came about.
+        let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
+        let stratum = stratum(position, count);
+        let straight = plain - 2;
+        let tool = match stratum {
+            Stratum::Degenerate => straight + position % 2,
+            Stratum::Nominal | Stratum::Hard => position % straight,
+        };
+        let mut config = sim::SimConfig::default();
+        config.bubble.calibration_rad = CALIBRATION_RAD;
+        config.bubble.calibration_m = CALIBRATION_M;
+        config.bubble.dropped_share = 0.0;
+        if stratum == Stratum::Hard {
+            config.bubble.press_m *= 2.0 / 3.0;
+            config.bubble.noise_m *= 1.5;
+        }
+        if any_depth {
+            config.bubble = sim::of_any_depth(config.bubble, &mut rng);
+        }
+        let tool = (tool + position % 2 * plain) % tools.len();
+        let sample = condition.simulate(&tools[tool], sim::random_grasp(rng.random()), rng.random(), &config);
+        let spoil = if stratum == Stratum::Hard { Spoil::hard() } else { Spoil::nominal() };
+        let mask_seed: u64 = rng.random();
+        // Of the degenerate cases, three of four have one blank finger, either one equally often.
+        let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
+        let touch = |finger: PadId| {
+            let touch = sample.pad(finger).and_then(|t| t.depth());
+            touch.expect("the simulator presses both fingers")
+        };
+        let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
+        let clean =
+            lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
+        let mut masks = lab::PADS.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
+        if let Some(finger) = blank {
+            let finger: usize = finger;
+            masks[finger].as_mut_slice().fill(false);
+        }
+        let mut imprints = lab::PADS.map(|f| touch(f).imprint.clone());
+        for (f, imprint) in imprints.iter_mut().enumerate() {
+            let reference = camera(lab::PADS[f]).depth_reference;
+            for (value, reference) in imprint.as_mut_slice().iter_mut().zip(reference.as_slice()) {
+                if rng.random_bool(DROPPED) {
+                    *value = if f == 0 { *reference } else { f32::NAN };
+                }
             }
         }
-    }
-    Case {
-        imprints,
-        cameras: lab::PADS.map(camera),
-        masks,
-        masks_clean: clean,
-        grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),
-        tool,
-        stratum,
+        let case = Case {
+            imprints,
+            cameras: lab::PADS.map(camera),
+            masks,
+            masks_clean: clean,
+            grasp_from_object: sample.grasp_from_object.expect("the simulator knows the pose"),
+            tool,
+            stratum,
+        };
+        (sample, case)
     }
 }
 
@@ -113,17 +163,16 @@ mod tests {
         let count = |s| (0..200).filter(|&i| stratum(i, 200) == s).count();
         assert_eq!((count(Stratum::Nominal), count(Stratum::Hard), count(Stratum::Degenerate)), (140, 40, 20));
         assert_eq!(stratum(0, 0), Stratum::Nominal);
-        let tools = simulated_tools();
+        let tools = plain_tools();
         assert_eq!(tools.len(), 13);
         assert!(tools[11].name.ends_with("_rod") && tools[12].name == "peg");
     }
 
     #[test]
     fn a_case_repeats_and_has_what_the_recipe_says() {
-        let tools = simulated_tools();
-        let case = simulated(3, 10, 5, &tools);
-        assert_eq!(case.masks, simulated(3, 10, 5, &tools).masks);
-        assert_ne!(case.masks, simulated(3, 10, 6, &tools).masks);
+        let case = Suite::new(10, 5).case(3);
+        assert_eq!(case.masks, Suite::new(10, 5).case(3).masks);
+        assert_ne!(case.masks, Suite::new(10, 6).case(3).masks);
         assert_ne!(case.masks, case.masks_clean);
         let dropped = |f: usize| {
             let pixels = case.imprints[f].as_slice().iter().zip(case.cameras[f].depth_reference.as_slice());

@@ -78,8 +78,8 @@ proptest! {
             let cost = cost(&field, &patch, state);
             // A ten-thousandth for the sums in f32.
             let limit = cost * (1.0 + 1e-4) + 1e-6;
-            prop_assert!(floor.least(extent) <= limit, "{} is above {cost} in {half:?}", floor.least(extent));
-            prop_assert!(stopped.least(extent) <= limit, "stopped, {} is above {cost}", stopped.least(extent));
+            prop_assert!(floor.least(extent.half) <= limit, "{} is above {cost} in {half:?}", floor.least(extent.half));
+            prop_assert!(stopped.least(extent.half) <= limit, "stopped, {} is above {cost}", stopped.least(extent.half));
         }
     }
 }
@@ -94,7 +94,7 @@ fn bounds_close_in_on_the_cost_as_boxes_shrink() {
     let bound = |half_m: f64| {
         let extent = Extent::new([half_m / 0.01, half_m, half_m]);
         let floor = field.floor(&patch, state, KERNEL_M, extent, f64::INFINITY);
-        floor.least(extent) / floor.here
+        floor.least(extent.half) / floor.here
     };
     let shares = [2e-3, 3e-4, 3e-5, 3e-6].map(bound);
     assert!(shares.is_sorted() && shares[1] > 0.02 && shares[2] > 0.75 && shares[3] > 0.97, "{shares:?}");
