@@ -93,10 +93,10 @@ fn said(output: &std::process::Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
-/// `adapt --out`, with the shipped generator in two steps and masks without a model.
+/// `adapt --out`, with the shipped generator in two steps.
 fn adapt(dir: &Path, set: &Path, out: &Path, more: &[&str]) -> (std::process::Output, Value) {
     let [set, out] = [set, out].map(|p| p.to_str().unwrap());
-    let fixed = ["adapt", set, "--out", out, "--steps", "2", "--mask", "threshold", "--json"];
+    let fixed = ["adapt", set, "--out", out, "--steps", "2", "--json"];
     let ran = run(&[&fixed[..], more].concat(), dir);
     let json = serde_json::from_slice(&ran.stdout).unwrap_or(Value::Null);
     (ran, json)
@@ -127,7 +127,6 @@ fn a_fit_to_spoilt_data_is_refused_and_one_to_sound_data_is_written() {
     for (name, more) in [
         ("sound", &["--seed", "5"][..]),
         ("other grasps", &["--seed", "6"]),
-        ("misaligned", &["--seed", "5", "--condition", "misaligned"]),
         ("noise", &["--seed", "5", "--condition", "noise"]),
         ("mixed", &["--seed", "5", "--condition", "mixed"]),
     ] {
@@ -138,4 +137,8 @@ fn a_fit_to_spoilt_data_is_refused_and_one_to_sound_data_is_written() {
         assert_eq!(found["objections"], Value::Array(Vec::new()), "{name}: {}", said(&ran));
         assert!(out.is_dir() && ran.status.success(), "{name}: {}", said(&ran));
     }
+    // Bubbles that grasped elsewhere than the GelSlims pull a good model away from the poses.
+    let set = simulate(dir.path(), "misaligned", &["--seed", "5", "--condition", "misaligned"]);
+    let (ran, found) = adapt(dir.path(), &set, &dir.path().join("fitted to misaligned"), &[]);
+    assert!(found["objections"].to_string().contains("in-hand angle is worse"), "misaligned: {}", said(&ran));
 }

@@ -237,6 +237,7 @@ fn case_seeds() -> Vec<Seed> {
     };
     let mask = Mask::from_fn(6, 4, |x, _| x > 2);
     let case = Case {
+        predicted: false,
         imprints: [0.0, 1e-3].map(|depth| Grid::from_fn(6, 4, |x, _| depth * x as f32)),
         cameras: [camera.clone(), camera],
         masks: [mask.clone(), mask.clone()],

@@ -79,6 +79,7 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
             let mut generator = generator.lock().unwrap_or_else(PoisonError::into_inner);
             let config = generator.spec().defaults;
             (_, case.imprints) = timed_run(&mut generator, &sample, &config)?;
+            case.predicted = true;
         }
         output.step(&suite.tools()[case.tool].name);
         anyhow::Ok(cases::write(&args.out.join(format!("case_{i:0digits$}.npz")), &case)?)

@@ -136,7 +136,8 @@ pub(super) fn run(args: &DatasetArgs) -> VerbResult {
             .par_iter()
             .map(|p| {
                 let points = contact_points(&p.grasp.imprints, &p.cameras, &p.grasp.masks).unwrap_or_default();
-                let image = |f: usize| PadImage { imprint: &p.grasp.imprints[f], camera: &p.cameras[f] };
+                let image =
+                    |f: usize| PadImage { imprint: &p.grasp.imprints[f], camera: &p.cameras[f], predicted: false };
                 let contacts = Contacts { points: &points, images: &[image(0), image(1)] };
                 let report = register(contacts, &tools[p.grasp.tool], args.engine, false);
                 report.map_or(f64::NAN, |r| angle_error(r.grasp_from_object.theta_rad, p.truth.theta_rad))

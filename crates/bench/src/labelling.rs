@@ -173,7 +173,7 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
             let same = |from: &&Case| std::sync::Arc::ptr_eq(&from.tool, &case.tool);
             let from = cases[..index].iter().rev().find(same).or_else(|| cases[index + 1..].iter().find(same));
             let truth = true_masks(case)?;
-            let true_pose = registered(case, &imprints, &truth);
+            let true_pose = registered(case, (imprint, &imprints), &truth);
             let proposed = proposals((&recipe, &models), case, from, (imprint, &imprints), &truth)?;
             if imprint == ImprintSource::Measured {
                 persons.correct(&proposed, &imprints, &truth, args.simulation_seed);
@@ -191,7 +191,7 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
                         );
                     }
                 }
-                let pose = registered(case, &imprints, &masks);
+                let pose = registered(case, (imprint, &imprints), &masks);
                 one.errors.push(pose.map(|pose| apart_deg(pose, case.truth)));
                 one.apart.extend(pose.zip(true_pose).map(|(a, b)| apart_deg(a, b)));
                 one.ms.push(ms);
@@ -280,10 +280,14 @@ fn true_masks(case: &Case) -> anyhow::Result<PerPad<Mask>> {
     Ok(masks)
 }
 
-fn registered(case: &Case, imprints: &PerPad<DepthMap>, masks: &PerPad<Mask>) -> Option<PlanarPose> {
+fn registered(
+    case: &Case,
+    (of, imprints): (ImprintSource, &PerPad<DepthMap>),
+    masks: &PerPad<Mask>,
+) -> Option<PlanarPose> {
     let points = contact_points(&case.sample, &imprints.as_ref(), &masks.as_ref()).ok()?;
     let method = RegistrationChoice::default().method();
-    let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints.as_ref()) };
+    let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints.as_ref(), of) };
     pose(contacts, &case.tool, &*method, Ask::default(), None).ok().map(|answer| answer.grasp_from_object)
 }
 
@@ -328,7 +332,7 @@ fn proposals(
         Ok(propose::near_cad(&distances, within_m, cad_pose).mask)
     };
     each("CAD at the true pose", &mut |pad, imprint| near_cad(case.truth, CadPose::Truth, pad, imprint))?;
-    if let Some(pose) = registered(case, imprints, &by_model) {
+    if let Some(pose) = registered(case, (of, imprints), &by_model) {
         each("CAD at the registered pose", &mut |pad, imprint| {
             near_cad(pose, CadPose::Registered(pose), pad, imprint)
         })?;
@@ -429,7 +433,7 @@ fn follow(
     for case in cases {
         let mut masks = masks_of(case)?;
         let imprint = |pad| Some(&case.sample.pad(pad)?.depth()?.imprint);
-        let images = images(&case.sample, &case.sample.rig.pads().map(imprint).collect());
+        let images = images(&case.sample, &case.sample.rig.pads().map(imprint).collect(), ImprintSource::Measured);
         for stroke in 0..STROKES_EACH {
             let pad = lab::PADS[stroke % lab::PADS.len()];
             let (Some(mask), Some(imprint_of_it)) = (masks.get_mut(pad), imprint(pad)) else { continue };

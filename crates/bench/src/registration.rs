@@ -266,7 +266,11 @@ pub(super) fn points(case: &Case, masks: &[Mask; 2]) -> Result<Vec<DVec3>, Cloud
 
 /// Views of the cameras of both fingers.
 pub(super) fn images(case: &Case) -> [PadImage<'_>; 2] {
-    std::array::from_fn(|f| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f] })
+    std::array::from_fn(|f| PadImage {
+        imprint: &case.imprints[f],
+        camera: &case.cameras[f],
+        predicted: case.predicted,
+    })
 }
 
 fn prepare(set: &CaseSet, masks: &[[Mask; 2]]) -> anyhow::Result<Vec<Prepared>> {

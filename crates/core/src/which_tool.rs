@@ -79,6 +79,7 @@ mod tests {
             let images = lab::PADS.map(|pad| crate::align::PadImage {
                 imprint: &touch(pad).imprint,
                 camera: touch(pad).camera.as_ref().unwrap(),
+                predicted: false,
             });
             let contacts = Contacts { points: &points, images: &images };
             let all = which_tool(contacts, models.iter().map(|(name, m)| (name.as_str(), m)), &JointConfig::default());

@@ -34,6 +34,7 @@ pub(crate) struct Registered {
     sample: Arc<Sample>,
     /// Of the fingers that have a mask.
     imprints: PerPad<Imprint>,
+    source: ImprintSource,
 }
 
 impl Registered {
@@ -75,7 +76,7 @@ impl Registered {
     fn with_contacts<T>(&self, of: impl FnOnce(Contacts<'_>) -> T) -> T {
         let points = self.clouds.contact_points();
         let imprints = self.imprints.as_ref().map(|imprint| imprint?.get().ok());
-        let images = images(&self.sample, &imprints);
+        let images = images(&self.sample, &imprints, self.source);
         of(Contacts { points: &points, images: &images })
     }
 }
@@ -88,7 +89,7 @@ fn registering(state: &State, key: &PoseKey, ask: Ask<'static>) -> Option<Job<Po
 
 /// The inputs of a registration; `None` if they are not there.
 pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
-    let (pair, _) = key.cloud.place()?;
+    let (pair, source) = key.cloud.place()?;
     let tool = ToolKey { dataset: pair.dataset, name: key.tool.clone() };
     let mut imprints = PerPad::default();
     for (finger, (imprint, _)) in key.cloud.parts.entries().filter(|(_, (_, mask))| mask.is_some()) {
@@ -101,6 +102,7 @@ pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
         truth: sample.grasp_from_object,
         sample,
         imprints,
+        source,
     })
 }
 

@@ -15,6 +15,7 @@ use touch2touch_core::units::angle_error;
 use touch2touch_work::cloud::{contact_points, images};
 use touch2touch_work::compare::LAB_PEAK_M;
 use touch2touch_work::infer::mask::MaskModel;
+use touch2touch_work::labels::ImprintSource;
 
 /// A grasp of a simulated tool.
 pub(crate) struct Case {
@@ -79,7 +80,10 @@ impl Judge {
         let mut errors = Vec::new();
         for case in cases {
             let imprints = [bubble(&case.sample, lab::RIGHT)?, bubble(&case.sample, lab::LEFT)?];
-            errors.push(self.error_rad(case, &imprints.map(|b| b.imprint.clone()))?.unwrap_or(f64::NAN));
+            errors.push(
+                self.error_rad(case, (ImprintSource::Measured, &imprints.map(|b| b.imprint.clone())))?
+                    .unwrap_or(f64::NAN),
+            );
         }
         Ok(AngleSummary::from_errors(&errors))
     }
@@ -94,15 +98,19 @@ impl Judge {
             mse += 0.5 * metrics::mse(imprint, truth)?;
             psnr_db[finger.index()] = metrics::psnr(imprint, truth, LAB_PEAK_M)?.db();
         }
-        Ok(Score { mse_m2: mse, psnr_db, error_rad: self.error_rad(case, imprints)? })
+        Ok(Score { mse_m2: mse, psnr_db, error_rad: self.error_rad(case, (ImprintSource::Predicted, imprints))? })
     }
 
-    fn error_rad(&mut self, case: &Case, imprints: &[DepthMap; 2]) -> anyhow::Result<Option<f64>> {
+    fn error_rad(
+        &mut self,
+        case: &Case,
+        (source, imprints): (ImprintSource, &[DepthMap; 2]),
+    ) -> anyhow::Result<Option<f64>> {
         let mut contact = |imprint| Ok::<_, anyhow::Error>(Some(self.masks.contact(imprint, None)?.mask));
         let masks: PerPad<Mask> = [contact(&imprints[0])?, contact(&imprints[1])?].into();
         let imprints = [Some(&imprints[0]), Some(&imprints[1])].into();
         let points = contact_points(&case.sample, &imprints, &masks.as_ref())?;
-        let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints) };
+        let contacts = Contacts { points: &points, images: &images(&case.sample, &imprints, source) };
         // Too few contact points are no pose; that is counted.
         let report = register(contacts, &case.tool, self.registration, false).ok();
         Ok(report.map(|r| angle_error(r.grasp_from_object.theta_rad, case.truth.theta_rad)))

@@ -58,6 +58,8 @@ pub struct JointConfig {
     pub doubtful: f64,
     /// Least share of the membrane's relief that the tool must explain, or the mask alone answers.
     pub explained: f64,
+    /// The same of a predicted one.
+    pub predicted_explained: f64,
     /// Prove by branch and bound that no pose of the prior is better, or find what is.
     pub prove: bool,
     /// Places of the membranes, spread evenly, that a proof is about; the answer is then refined on all.
@@ -86,6 +88,8 @@ pub struct MaskWeight {
     pub noise_m: f64,
     /// Least and greatest weight for the answer.
     pub range: [f64; 2],
+    /// Least weight beside predicted images: their errors are no noise, so that nothing is seen of them in the images.
+    pub predicted: f64,
     /// Mean cost of the mask at the membrane's pose from which on it counts less, by its inverse.
     pub agrees: f64,
 }
@@ -99,11 +103,19 @@ impl Default for JointConfig {
             kernels_m: [4e-3, 1e-3, 0.5e-3, 0.5e-3],
             mask_points: [64, 400],
             mask_kernels_m: [2e-3, 1e-3],
-            weight: MaskWeight { scouts: 0.1, answer: 0.02, noise_m: 0.075e-3, range: [0.02, 0.3], agrees: 0.1 },
+            weight: MaskWeight {
+                scouts: 0.1,
+                answer: 0.02,
+                noise_m: 0.075e-3,
+                range: [0.02, 0.3],
+                predicted: 0.3,
+                agrees: 0.1,
+            },
             max_iterations: 20,
             close: 0.15,
             doubtful: 0.3,
             explained: 0.05,
+            predicted_explained: 0.5,
             prove: false,
             proof_points: 200,
             record: false,
@@ -127,6 +139,10 @@ pub enum Basis {
     /// The mask alone, because the membranes come nowhere near each other, or hardly a pixel has a depth.
     #[strum(to_string = "mask alone: the membranes do not show where they would meet")]
     NoZone,
+    /// The mask alone, because the prediction is no membrane that the tool could make: the generator learned another one, or
+    /// another pressure.
+    #[strum(to_string = "mask alone: the predicted membrane is none that this tool makes at this pressure")]
+    Unlike,
     /// The mask alone, because the tool hardly shows in the membrane.
     #[strum(to_string = "mask alone: too little of the membrane lies on the tool")]
     LittleContact,
@@ -190,6 +206,9 @@ impl Register for JointConfig {
             return Ok(problem.report(scene.yz(), problem.solve()));
         }
         let mut answer = problem.solve();
+        if problem.is_predicted() && answer.fit.explained < config.predicted_explained {
+            return by_mask(JointFit { basis: Basis::Unlike, mask_weight: 1.0, ..answer.fit });
+        }
         if answer.fit.explained < config.doubtful {
             // A bad mask can lead all scouts away from what the membrane shows plainly.
             answer = problem.solve_without_mask(&answer, config.explained).unwrap_or(answer);

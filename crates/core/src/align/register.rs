@@ -21,6 +21,8 @@ pub struct PadImage<'a> {
     pub imprint: &'a DepthMap,
     /// The camera, with the depth of the free membrane.
     pub camera: &'a DepthCamera,
+    /// True where a model predicted it. Such an image has no pixel noise: its errors are of shape, wider than the finest band.
+    pub predicted: bool,
 }
 
 /// Contact points of a grasp, and the images of the membranes that they are from.

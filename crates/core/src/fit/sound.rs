@@ -189,12 +189,16 @@ fn slope(cases: &[&FitPair<'_>], correction: &Correction) -> Option<f64> {
 
 /// Objection to the fit by the angle's errors.
 pub fn angle(before: &AngleSummary, after: &AngleSummary) -> Option<Objection> {
-    let mean_rad = [before, after].map(|angle| angle.mean_deg.map(f64::to_radians));
-    let worse = match mean_rad {
-        [Some(before), Some(after)] => after > before * (1.0 + ANGLE_SHARE) + ANGLE_RAD,
+    let worse = |of: fn(&AngleSummary) -> Option<f64>| match [of(before), of(after)] {
+        [Some(before), Some(after)] => after > before * (1.0 + ANGLE_SHARE) + ANGLE_RAD.to_degrees(),
         [before, after] => before.is_some() && after.is_none(),
     };
-    let lost = after.failed as f64 > before.failed as f64 + (LOST_SHARE * after.count as f64).max(1.0);
+    let chance = (LOST_SHARE * after.count as f64).max(1.0);
+    let held = [before, after].map(|angle| angle.success_10 / 100.0 * angle.count as f64);
+    // One grasp of few that is lost either way moves the mean by as much as it likes.
+    let worse = worse(|angle| angle.mean_deg) && (worse(|angle| angle.median_deg) || held[0] > held[1] + chance);
+    let lost = after.failed as f64 > before.failed as f64 + chance;
+    let mean_rad = [before, after].map(|angle| angle.mean_deg.map(f64::to_radians));
     let failed = [before.failed, after.failed, after.count];
     (worse || lost).then_some(Objection::Angle { mean_rad, failed })
 }

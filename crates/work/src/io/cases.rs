@@ -10,6 +10,7 @@
 //! | `K` | 2 x 3 x 3 | intrinsics of the full camera image |
 //! | `T` | 2 x 4 x 4 | camera to grasp frame, nominal: the true one is a little off |
 //! | `theta_deg`, `yz` | -, 2 | `grasp_from_object`: degrees about +x, meters |
+//! | `predicted` | - | 1 where a model predicted the imprints; may be left out |
 //! | `tool`, `stratum` | - | number of the tool's file; 0 nominal, 1 hard, 2 degenerate |
 
 mod simulated;
@@ -48,6 +49,8 @@ pub enum Stratum {
 pub struct Case {
     /// Reference minus depth, meters; NaN, and where the camera said 0 the reference itself (which lifts to depth 0).
     pub imprints: [DepthMap; 2],
+    /// True where a model predicted them.
+    pub predicted: bool,
     /// Nominal cameras.
     pub cameras: [DepthCamera; 2],
     /// Contact, spoilt like a learned mask.
@@ -226,6 +229,7 @@ pub fn read(file: &Path) -> Result<Case, CaseError> {
     let t = arrays.values("T", 32)?;
     let theta_rad = arrays.values("theta_deg", 1)?[0].to_radians();
     let yz = arrays.values("yz", 2)?;
+    let predicted = arrays.arrays.contains_key("predicted") && arrays.whole("predicted", 1)? == 1;
     let tool = arrays.whole("tool", LAST_TOOL)?;
     let stratum = match arrays.whole("stratum", 2)? {
         0 => Stratum::Nominal,
@@ -252,6 +256,7 @@ pub fn read(file: &Path) -> Result<Case, CaseError> {
     };
     Ok(Case {
         imprints: [imprint(0), imprint(1)],
+        predicted,
         cameras: [camera(0), camera(1)],
         masks,
         masks_clean,
@@ -297,6 +302,7 @@ pub fn write(file: &Path, case: &Case) -> Result<(), CaseError> {
             ("T", Tensor::f64(&[2, 4, 4], t.collect())),
             ("theta_deg", Tensor::f64(&[], vec![pose.theta_rad.to_degrees()])),
             ("yz", Tensor::f64(&[2], vec![pose.y_m, pose.z_m])),
+            ("predicted", whole(case.predicted.into())),
             ("tool", whole(case.tool as i64)),
             ("stratum", whole(case.stratum as i64)),
         ],
@@ -323,6 +329,7 @@ mod tests {
         let mask = Mask::from_fn(6, 4, |x, _| x > 2);
         Case {
             imprints: [imprint.clone(), imprint],
+            predicted: true,
             cameras: [camera.clone(), camera],
             masks: [mask.clone(), mask.map(|m| !m)],
             masks_clean: [mask.clone(), mask],

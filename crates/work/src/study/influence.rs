@@ -172,6 +172,7 @@ fn most(mut places: Vec<Place>) -> Vec<Place> {
 mod tests {
     use super::*;
     use crate::cloud::{clouds, images};
+    use crate::labels::ImprintSource;
     use crate::pose::pose;
     use touch2touch_core::align::{Ask, JointConfig, Register};
     use touch2touch_core::frames::PlanarPose;
@@ -202,7 +203,7 @@ mod tests {
     fn squares(tool: usize, seed: u64, from: From<'_>) -> Vec<(f64, f64)> {
         let (sample, model, masks) = grasp(tool, seed, 2.0);
         let imprints = sample.rig.pads().map(|pad| Some(&sample.pad(pad)?.depth()?.imprint)).collect();
-        let images = images(&sample, &imprints);
+        let images = images(&sample, &imprints, ImprintSource::Measured);
         let register = |masks: &PerPad<Mask>, start: PlanarPose| {
             let points = lifted(&sample, masks).contact_points();
             register_with(&*from(start), Contacts { points: &points, images: &images }, &model, Ask::default()).unwrap()

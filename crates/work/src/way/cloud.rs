@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::error::TaskError;
+use crate::labels::ImprintSource;
 use touch2touch_core::align::PadImage;
 use touch2touch_core::cloud;
 use touch2touch_core::grid::{DepthMap, Mask};
@@ -120,8 +121,9 @@ pub fn contact_points(
 
 /// Views of the pads' depth cameras, for registrations that look at more than contact points. A pad without imprint or
 /// camera is left out.
-pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>) -> Vec<PadImage<'a>> {
-    let image = |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()? });
+pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>, source: ImprintSource) -> Vec<PadImage<'a>> {
+    let predicted = source == ImprintSource::Predicted;
+    let image = |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()?, predicted });
     sample.rig.pads().filter_map(image).collect()
 }
 

@@ -221,7 +221,7 @@ impl Felt {
     /// Before [`Stage::Cloud`].
     pub fn with_contacts<T>(&self, touch: Touch<'_>, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
         let points = self.points().map_err(Clone::clone)?;
-        let images = images(touch.sample, &self.contact().imprints.as_ref());
+        let images = images(touch.sample, &self.contact().imprints.as_ref(), self.recipe.imprint);
         Ok(of(Contacts { points, images: &images }))
     }
 

@@ -2,7 +2,6 @@
 
 use super::cost::{Joint, MaskPart};
 use super::problem::{Answer, LAST, Patches, Problem, STEPS_M};
-use super::smooth::BANDS;
 use crate::align::batch::State;
 use crate::align::certify::{Bounded, NEGLIGIBLE, Region, Undecided, prove};
 use crate::align::search::{Progress, minimize};
@@ -98,7 +97,7 @@ impl Problem<'_> {
     /// with its weight of the mask, on fewer places; what is found is refined on all, and counts only if it is cheaper there.
     pub(super) fn prove(&self, answer: &mut Answer) {
         let config = self.config();
-        let fingers = self.patches_of(BANDS.len() - 1, config.proof_points);
+        let fingers = self.patches_of(self.answer_band(), config.proof_points);
         let mask = self.mask().map(|[_, cloud]| Mask {
             points: Undecided::new(&self.tool().field, cloud, config.mask_kernels_m[1]),
             field: &self.tool().field,

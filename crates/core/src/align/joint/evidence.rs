@@ -142,8 +142,7 @@ impl Problem<'_> {
         if a.imprint.size() != b.imprint.size() {
             return None;
         }
-        let images =
-            [PadImage { imprint: b.imprint, camera: a.camera }, PadImage { imprint: a.imprint, camera: b.camera }];
+        let images = [PadImage { camera: a.camera, ..*b }, PadImage { camera: b.camera, ..*a }];
         let scene = Scene::new(Contacts { points: &[], images: &images });
         let swapped = Problem::new(&scene, self.tool(), self.config()).ok()??;
         let end = swapped.solve().end();

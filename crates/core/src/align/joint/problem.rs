@@ -22,7 +22,7 @@ use crate::tool::ToolModel;
 
 /// Smallest area of the membranes that is compared, square meters.
 const MIN_AREA_M2: f64 = 1e-4;
-/// Position in [`JointConfig::points`] of what decides the answer. It is in the finest band.
+/// Position in [`JointConfig::points`] of what decides the answer.
 pub(super) const LAST: usize = 3;
 /// Kernels of the mask's own scouts, meters, wide to narrow.
 const MASK_SCOUTS_M: [f64; 2] = [8e-3, 2e-3];
@@ -45,7 +45,9 @@ pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
         return bad("kernels_m");
     }
     let weight = &config.weight;
-    if ![weight.scouts, weight.answer, weight.noise_m, weight.range[0], weight.agrees].iter().all(positive)
+    if ![weight.scouts, weight.answer, weight.noise_m, weight.range[0], weight.predicted, weight.agrees]
+        .iter()
+        .all(positive)
         || weight.range[1] < weight.range[0]
         || !weight.range[1].is_finite()
     {
@@ -79,6 +81,8 @@ pub(super) struct Problem<'a> {
     /// The mask's points for scouts and for the answer; `None` where they are too few.
     mask: Option<[Cloud; 2]>,
     not_finite: usize,
+    /// True where a model predicted the images.
+    predicted: bool,
 }
 
 /// Outcome of a search: its starts and their runs.
@@ -191,7 +195,8 @@ impl<'a> Problem<'a> {
                 Cloud::new(spread(points.len(), count).into_iter().map(|i| points[i] - centroid))
             })
         });
-        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite }))
+        let predicted = scene.images().iter().any(|image| image.predicted);
+        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
@@ -225,7 +230,17 @@ impl<'a> Problem<'a> {
 
     /// The images as a stage compares them.
     pub(super) fn patches(&self, stage: usize) -> Patches<'_> {
-        self.patches_of(stage.min(BANDS.len() - 1), self.config.points[stage])
+        let band = if stage == LAST { self.answer_band() } else { stage };
+        self.patches_of(band, self.config.points[stage])
+    }
+
+    /// Band that decides the answer: the finest that is not noise.
+    pub(super) fn answer_band(&self) -> usize {
+        BANDS.len() - 1 - usize::from(self.predicted)
+    }
+
+    pub(super) fn is_predicted(&self) -> bool {
+        self.predicted
     }
 
     /// About `points` places of the images in a band.
@@ -360,7 +375,8 @@ impl<'a> Problem<'a> {
         let (weight, kernel) = (&self.config.weight, self.config.mask_kernels_m[1]);
         let cost = self.tool.field.sums(cloud, state, kernel).cost / (kernel * kernel * cloud.len().max(1) as f64);
         let by_noise = weight.answer * (noise_m / weight.noise_m).powi(4);
-        by_noise.clamp(weight.range[0], weight.range[1]) * (weight.agrees / cost.max(1e-9)).min(1.0)
+        let least = if self.predicted { weight.predicted } else { weight.range[0] };
+        by_noise.max(least).min(weight.range[1]) * (weight.agrees / cost.max(1e-9)).min(1.0)
     }
 
     pub(super) fn report(&self, points_yz: &[DVec2], answer: Answer) -> AlignReport {

@@ -32,13 +32,15 @@ const MOUNTING: [f64; 2] = [0.25 / 180.0 * std::f64::consts::PI, 0.2e-3];
 /// Deviation of the place per axis that no finger can see alone: where the template is not the membrane's own law, or the
 /// oblique camera does not see behind the tool. From fresh grasps under two laws.
 const LAW_M: f64 = 0.2e-3;
-/// Places of the membranes, their band and its kernel, meters: those of the answer.
+/// Places of the membranes, and the kernel, meters, as in the answer.
 const PLACES: usize = 800;
-const BAND: usize = 2;
 const KERNEL_M: f64 = 0.5e-3;
 /// The variance of a place's height is four times this times the noise that is left, meters: neighbors err together, and a
 /// part of what is left is the template's error, which hardly moves the pose. From fresh grasps under two laws.
 const SHARED_M: f64 = 4e-5;
+/// The same of predicted images, whose errors go together over the width of a bar. From fresh grasps that the shipped
+/// generator predicted.
+const PREDICTED_SHARED_M: f64 = 42e-5;
 /// Deviation of a mask's whole outline, meters: its errors go together. From fresh grasps with masks that fit.
 const OUTLINE_M: f64 = 0.07e-3;
 
@@ -121,10 +123,11 @@ impl Problem<'_> {
     /// Uncertainty of a pose from the membranes.
     pub(super) fn uncertainty(&self, pose: PlanarPose) -> Uncertainty {
         let at = State::from_pose(pose, self.centroid());
-        let patches = self.patches_of(BAND, PLACES);
+        let patches = self.patches_of(self.answer_band(), PLACES);
         let noise_m = noise_m(Relief::of(&patches, at, KERNEL_M).residuals_m).max(1e-6);
         let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
-        let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * SHARED_M * noise_m);
+        let shared_m = if self.is_predicted() { PREDICTED_SHARED_M } else { SHARED_M };
+        let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * shared_m * noise_m);
         let information = in_the_hand(&joint.sums(at).h, pose) * scale;
         Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
     }

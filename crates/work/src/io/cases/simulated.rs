@@ -143,6 +143,7 @@ impl Suite {
         }
         let case = Case {
             imprints,
+            predicted: false,
             cameras: lab::PADS.map(camera),
             masks,
             masks_clean: clean,

@@ -13,7 +13,6 @@ use crate::tool::Tools;
 use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Scale;
 
@@ -22,9 +21,6 @@ const MOST_GRASPS: usize = 100;
 
 /// The errors of the angle over grasps whose every touch has a picture; `None` where no truth, camera or CAD model is
 /// known. A grasp without a pose counts as a failure. `tools` are those of the data set.
-///
-/// In place of the joint registration stands that by the mask alone: a prediction fitted to few pairs has the tool's outline
-/// before it has a membrane's shape.
 pub(super) fn angles(
     dataset: &Dataset,
     setup: &AdaptSetup,
@@ -34,10 +30,6 @@ pub(super) fn angles(
     pictures: &[Option<&Grid<f32>>],
     cx: &JobCx,
 ) -> Result<Option<AngleSummary>, TaskError> {
-    let mut recipe = setup.recipe.clone();
-    if recipe.registration.by == Registration::Joint {
-        recipe.registration = Registration::DistanceField.into();
-    }
     let grasps: Vec<&[Gathered]> = touches.chunk_by(|a, b| a.id == b.id).collect();
     let mut errors = Vec::new();
     let (mut at, stride) = (0, grasps.len().div_ceil(MOST_GRASPS).max(1));
@@ -59,7 +51,7 @@ pub(super) fn angles(
         // What people drew on a prediction is of that picture, and each of these is another one.
         let nothing = PairLabels::default();
         let touch = Touch { dataset, pair: first.id, sample: &sample, tool: Ok(tool), labels: &nothing };
-        let felt = Felt::of_imprints(&recipe, imprints);
+        let felt = Felt::of_imprints(&setup.recipe, imprints);
         let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, &cx.quiet());
         let error = felt.ok().and_then(|felt| felt.pose().ok()?.error_rad);
         errors.push(error.unwrap_or(f64::NAN));

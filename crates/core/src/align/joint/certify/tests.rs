@@ -131,7 +131,7 @@ fn no_pose_of_the_prior_costs_less_than_what_is_proved() {
     let weight = answer.fit.mask_weight;
     problem.prove(&mut answer);
     let proved = answer.certificate.unwrap().lower_bound_m2 / KERNEL_M.powi(2);
-    let fingers = problem.patches_of(BANDS.len() - 1, config.proof_points);
+    let fingers = problem.patches_of(problem.answer_band(), config.proof_points);
     let cloud = &problem.mask().unwrap()[1];
     let mask = Some(MaskPart { field: &touch.tool.field, cloud, kernel_m: config.mask_kernels_m[1], weight });
     let mut cost = Joint { fingers: &fingers, kernel_m: KERNEL_M, mask, lookups: 0 };
