@@ -10,6 +10,7 @@ mod generator;
 mod labelling;
 mod peers;
 mod registration;
+mod reliability;
 mod rows;
 mod verdict;
 

@@ -148,6 +148,7 @@ fn engine_row(row: Row, cases: &[Prepared], chosen: &[usize]) -> anyhow::Result<
         cpu_mean_ms: (!cpu.is_empty()).then(|| cpu.iter().sum::<f64>() / cpu.len() as f64),
         error_deg,
         ms,
+        reliability: None,
         offset_mm,
     })
 }

@@ -12,17 +12,18 @@ use strum::IntoEnumIterator as _;
 
 use super::figures::{Outcome, Summary, quantile};
 use super::front::{self, Axis, FrontPoint, Picture};
+use super::reliability::{self, Reliability, scores};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
 use touch2touch::headless::says;
 use touch2touch::headless::{JsonArgs, LimitArgs, ModelArgs, at_least_one};
 use touch2touch::headless::{Output, VerbResult};
-use touch2touch_core::align::{AlignError, AlignReport, Contacts, PadImage, icp};
+use touch2touch_core::align::{AlignError, AlignReport, Ask, Contacts, PadImage, icp};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::pose::{Registration, ToolModel, register};
+use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
 use touch2touch_work::canvas;
@@ -38,9 +39,10 @@ const MAX_REPETITIONS: usize = 15;
 /// Arguments of `bench registration`.
 #[derive(Debug, Args)]
 pub(super) struct RegistrationArgs {
-    /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch-bench cases` writes one).
-    #[arg(long)]
-    cases: PathBuf,
+    /// Folder with `case_*.npz` and `tool_KK.stl` (`touch2touch-bench cases` writes one); several with commas, such as one for
+    /// each law of the membrane: each has its own table, and its files have its name.
+    #[arg(long, required = true, value_delimiter = ',')]
+    cases: Vec<PathBuf>,
     #[command(flatten)]
     json: JsonArgs,
     /// Only these engines, separated by commas.
@@ -213,20 +215,58 @@ fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
 }
 
 pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
-    let mut set = CaseSet::open(&args.cases)?;
-    let chosen = args.limit.spread(set.cases.len());
-    set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
+    let sets: Vec<CaseSet> = args.cases.iter().map(|folder| set(folder, args)).collect::<anyhow::Result<_>>()?;
     let engines: Vec<Registration> =
         if args.engines.is_empty() { Registration::iter().collect() } else { args.engines.clone() };
-    let output = Output::new(args.json.common(), "measuring", set.cases.len() * engines.len());
+    let cases: usize = sets.iter().map(|set| set.cases.len()).sum();
+    let output = Output::new(args.json.common(), "measuring", cases * engines.len());
+    let mut reports = Vec::new();
+    for (folder, set) in args.cases.iter().zip(&sets) {
+        let report = report(folder, set, &engines, args, &output)?;
+        if let Some(file) = args.json.file() {
+            let file = if sets.len() > 1 { beside(file, folder) } else { file.to_owned() };
+            write(&file, &report)?;
+            output.note(&format!("written: {} (pictures beside it)", file.display()));
+        }
+        reports.push(report);
+    }
+    let texts = || reports.iter().map(text).collect::<Vec<_>>().join("\n");
+    match &reports[..] {
+        [report] => output.finish(report, texts)?,
+        _ => output.finish(&reports, texts)?,
+    }
+    Ok(true)
+}
+
+/// The cases of a folder that were asked for.
+fn set(folder: &Path, args: &RegistrationArgs) -> anyhow::Result<CaseSet> {
+    let mut set = CaseSet::open(folder)?;
+    let chosen = args.limit.spread(set.cases.len());
+    set.cases = chosen.into_iter().map(|i| set.cases[i].clone()).collect();
+    Ok(set)
+}
+
+/// The file with the folder's name in its own.
+fn beside(file: &Path, folder: &Path) -> PathBuf {
+    let name = |path: &Path| path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    file.with_file_name(format!("{}_{}.json", name(file), name(folder)))
+}
+
+fn report(
+    folder: &Path,
+    set: &CaseSet,
+    engines: &[Registration],
+    args: &RegistrationArgs,
+    output: &Output,
+) -> anyhow::Result<Report> {
     let machine = Machine::now();
     // One thread, whatever an engine would like to use: the figures are the work, not the machine.
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
-    let masks = masks(&set, args.masks, &args.model)?;
-    let (folder, kind) = (&args.cases, args.masks);
-    let mut report = pool.install(|| measure((folder, kind), &set, &masks, &engines, machine, &output))?;
+    let masks = masks(set, args.masks, &args.model)?;
+    let kind = args.masks;
+    let mut report = pool.install(|| measure((folder, kind), set, &masks, engines, machine, output))?;
     if !args.no_peers {
-        let prepared = prepare(&set, &masks)?;
+        let prepared = prepare(set, &masks)?;
         output.note("asking Python for Open3D and small_gicp ...");
         let asked: Vec<usize> = pairs::spread(prepared.len(), Some(args.peer_limit)).collect();
         match peers::run(&args.python, &prepared, &set.tools, &asked) {
@@ -238,12 +278,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
         }
     }
     report.front = front::front(&report.engines);
-    if let Some(file) = args.json.file() {
-        write(file, &report)?;
-        output.note(&format!("written: {} (.svg and .png beside it)", file.display()));
-    }
-    output.finish(&report, || text(&report))?;
-    Ok(true)
+    Ok(report)
 }
 
 /// True where the mesh is one straight bar: its outline is more than six times as long as wide, by second moments.
@@ -339,6 +374,8 @@ fn measure(
     let mut rows = Vec::new();
     for &engine in engines {
         let (mut outcomes, mut offset_mm, mut calls) = (Vec::new(), Vec::new(), 0);
+        let mut scored = Vec::new();
+        let method = RegistrationChoice::from(engine).method();
         let mut cpu_ms = Some(0.0);
         for (case, (_, whole)) in prepared.iter().zip(&set.cases) {
             output.step(&engine.to_string());
@@ -353,6 +390,12 @@ fn measure(
             calls += result.calls;
             offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
             outcomes.push(outcome(case, result));
+            let judged = register_with(&*method, contacts, model, Ask { evidence: true, ..Ask::default() });
+            scored.extend(
+                judged
+                    .ok()
+                    .and_then(|found| Some(scores(found.evidence.as_ref()?, found.grasp_from_object, case.truth))),
+            );
         }
         rows.push(EngineRow {
             name: engine.to_string(),
@@ -362,6 +405,7 @@ fn measure(
             ms: outcomes.iter().map(|o| Some(o.ms)).collect(),
             cpu_mean_ms: cpu_ms.map(|ms| ms / calls as f64),
             offset_mm,
+            reliability: Reliability::of(&scored),
             summary: Summary::new(&outcomes),
         });
     }
@@ -421,7 +465,13 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
     };
     let axis = Axis { title: &title, time: axis, unit: "°", legend: &front::PEERS };
     let picture = Picture { axis, points: &report.front, default: &report.default };
-    canvas::write(&picture, &file.with_extension("svg"))
+    canvas::write(&picture, &file.with_extension("svg"))?;
+    let by_field = |row: &&EngineRow| row.name.parse().is_ok_and(Registration::uses_field);
+    let lines = report.engines.iter().filter(by_field).filter_map(|row| Some((&*row.name, row.reliability.as_ref()?)));
+    let title = format!("Standard deviation of the angle, {} cases, {} masks", report.cases.len(), report.masks);
+    let picture = reliability::Picture { title: &title, lines: lines.collect() };
+    let name = file.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
+    canvas::write(&picture, &file.with_file_name(format!("{name}_reliability.svg")))
 }
 
 fn text(report: &Report) -> String {
@@ -484,6 +534,11 @@ fn text(report: &Report) -> String {
         let rungs = &row.summary.all.rungs;
         let rungs = if rungs.is_empty() { String::new() } else { format!(" | rungs {rungs:?}") };
         text += &format!("{:width$} {}{flags}{rungs}\n", row.name, strata.join(" | "));
+    }
+    text += "\nerrors in standard deviations, rms (within two): 1 (95 %) where these are right\n";
+    for row in &report.engines {
+        let Some(reliability) = &row.reliability else { continue };
+        text += &format!("{:width$} {}\n", row.name, reliability.text());
     }
     for note in &report.notes {
         text += &format!("note: {note}\n");

@@ -4,6 +4,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use super::figures::Summary;
+use super::reliability::Reliability;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::io::cases::Stratum;
 
@@ -30,6 +31,8 @@ pub(super) struct EngineRow {
     /// Mean processor time of a pose, milliseconds, where the system tells: what is left of the times when other
     /// programs are taken out.
     pub(super) cpu_mean_ms: Option<f64>,
+    /// Errors in the standard deviations that the poses come with.
+    pub(super) reliability: Option<Reliability>,
     /// One value per case in the order of `cases`, `null` where there is no pose or the case was not run.
     pub(super) error_deg: Vec<Option<f64>>,
     pub(super) ms: Vec<Option<f64>>,

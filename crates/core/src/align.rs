@@ -442,6 +442,8 @@ pub struct TraceStep {
     pub grasp_from_object_6dof: Option<DAffine3>,
     /// Cost per point, square meters; comparable only at the same kernel width and number of points.
     pub cost_m2: f64,
+    /// Part of it that is the mask's, where the rest is the membranes'; square meters.
+    pub mask_cost_m2: Option<f64>,
     /// Share of the points within the kernel's width.
     pub inlier_share: f64,
     /// Width of the kernel, meters; infinite without one.

@@ -273,6 +273,7 @@ impl Trace {
                 grasp_from_object: state.to_planar(centroid),
                 grasp_from_object_6dof: self.full.then(|| state.to_affine(centroid)),
                 cost_m2: sums.cost,
+                mask_cost_m2: None,
                 inlier_share: sums.inliers as f64 / self.points as f64,
                 kernel_m: kernel.width_m(),
                 points: self.points,

@@ -335,6 +335,7 @@ impl Loop<'_> {
                 grasp_from_object,
                 grasp_from_object_6dof: None,
                 cost_m2: matched.squares / points as f64,
+                mask_cost_m2: None,
                 inlier_share: matched.inliers as f64 / points as f64,
                 kernel_m: f64::INFINITY,
                 points,

@@ -147,6 +147,7 @@ impl<'a> Search<'a> {
                 grasp_from_object: at.state.to_pose(self.centroid),
                 grasp_from_object_6dof: None,
                 cost_m2: n.cost / points as f64,
+                mask_cost_m2: None,
                 inlier_share: n.inliers as f64 / points as f64,
                 kernel_m,
                 points,

@@ -105,6 +105,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         shown.inspection.report().offered
     );
     text(cx, ui, &used, "Points within the kernel's width, of those in use at this step");
+    if let Some(mask_m2) = step.mask_cost_m2 {
+        let [membranes, mask] = [step.cost_m2 - mask_m2, mask_m2].map(root_mm);
+        let parts = format!("√cost of the membranes {membranes:.2} mm, of the mask {mask:.2} mm");
+        text(cx, ui, &parts, "Parts of the joint cost; their squares add up");
+    }
     let (start, stop) = (shown.inspection.applied(shown.run), shown.inspection.what_next(shown.run, shown.at));
     if shown.is_last() {
         text(cx, ui, &format!("End: {stop}"), "Why this run ended");

@@ -27,8 +27,9 @@ struct Mask<'p> {
 }
 
 impl Mask<'_> {
-    fn scale(&self) -> f64 {
-        self.weight / (self.kernel_m.powi(2) * self.points.whole().len().max(1) as f64)
+    fn part(&self) -> MaskPart<'_> {
+        let Self { field, kernel_m, weight, ref points } = *self;
+        MaskPart { field, cloud: points.whole(), kernel_m, weight }
     }
 }
 
@@ -51,7 +52,7 @@ impl Bounded for Places<'_> {
             }
         }
         if let Some(mask) = &mut self.mask {
-            let scale = mask.scale();
+            let scale = mask.part().scale();
             let left = (enough - all.least(region.extent.half)) / scale;
             all.add(&mask.points.floor(region, level, left), scale);
         }
@@ -65,12 +66,7 @@ impl Bounded for Places<'_> {
     }
 
     fn descend(&mut self, from: State) -> Progress {
-        let mask = self.mask.as_ref().map(|mask| MaskPart {
-            field: mask.field,
-            cloud: mask.points.whole(),
-            kernel_m: mask.kernel_m,
-            weight: mask.weight,
-        });
+        let mask = self.mask.as_ref().map(Mask::part);
         let mut joint = Joint { fingers: &self.fingers, kernel_m: self.kernel_m, mask, lookups: 0 };
         let mut found = Progress::new(from);
         found.cost = minimize(&mut joint, &mut found, self.max_iterations, STEPS_M[LAST]).cost;

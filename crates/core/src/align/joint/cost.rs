@@ -224,6 +224,18 @@ pub(super) struct MaskPart<'a> {
     pub(super) weight: f64,
 }
 
+impl MaskPart<'_> {
+    /// Share of a point's cost in the joint one, per square meter.
+    pub(super) fn scale(&self) -> f64 {
+        self.weight / (self.kernel_m.powi(2) * self.cloud.len().max(1) as f64)
+    }
+
+    /// The part of the joint cost at a state.
+    fn cost(&self, state: State) -> f64 {
+        self.scale() * self.field.sums(self.cloud, state, self.kernel_m).cost
+    }
+}
+
 /// The joint cost of one band: the mean of the membrane's Geman-McClure costs plus `weight` times the mask's, both as
 /// shares of their squared kernel widths, so 0 to 1.
 pub(super) struct Joint<'a> {
@@ -264,7 +276,7 @@ impl Cost for Joint<'_> {
         if let Some(mask) = &self.mask {
             self.lookups += mask.cloud.asked();
             let sums = mask.field.sums(mask.cloud, state, mask.kernel_m);
-            add(&mut all, &sums, mask.weight / (mask.kernel_m.powi(2) * mask.cloud.len().max(1) as f64));
+            add(&mut all, &sums, mask.scale());
         }
         all
     }
@@ -292,6 +304,7 @@ impl Cost for Noted<'_, '_> {
             grasp_from_object: at.state.to_pose(self.centroid),
             grasp_from_object_6dof: None,
             cost_m2: sums.cost * kernel_m * kernel_m,
+            mask_cost_m2: self.cost.mask.map(|mask| mask.cost(at.state) * kernel_m * kernel_m),
             inlier_share: sums.inliers as f64 / points.max(1) as f64,
             kernel_m,
             points,

@@ -29,9 +29,9 @@ pub struct Uncertainty {
 /// Deviation of a camera's true angle about the closing axis from the nominal one, radians, and of its place per axis, meters:
 /// a good mount's. Each finger has its own.
 const MOUNTING: [f64; 2] = [0.25 / 180.0 * std::f64::consts::PI, 0.2e-3];
-/// Deviation of the place per axis that no finger can see alone: where the template is not the membrane's own law, or the
-/// oblique camera does not see behind the tool. From fresh grasps under two laws.
-const LAW_M: f64 = 0.2e-3;
+/// Deviation of the place, y and z, that no finger can see alone: where the template is not the membrane's own law, or the
+/// camera, which looks obliquely along z, does not see behind the tool. From fresh grasps under two laws.
+const LAW_M: [f64; 2] = [0.2e-3, 0.28e-3];
 /// Places of the membranes, and the kernel, meters, as in the answer.
 const PLACES: usize = 800;
 const KERNEL_M: f64 = 0.5e-3;
@@ -53,8 +53,8 @@ impl Uncertainty {
         let held = [theta_rad * ANGLE_SCALE_M, shift_m, shift_m].map(|half| half * half / 3.0);
         let held_only = Matrix3::from_diagonal(&held.into());
         let told = (information + Matrix3::from_diagonal(&held.map(|v| 1.0 / v).into())).try_inverse();
-        let place = MOUNTING[1].powi(2) / cameras + LAW_M.powi(2);
-        let mounting = [(MOUNTING[0] * ANGLE_SCALE_M).powi(2) / cameras, place, place];
+        let place = LAW_M.map(|law| MOUNTING[1].powi(2) / cameras + law.powi(2));
+        let mounting = [(MOUNTING[0] * ANGLE_SCALE_M).powi(2) / cameras, place[0], place[1]];
         let at_center = told.unwrap_or(held_only) + Matrix3::from_diagonal(&mounting.into());
         // The place of the object's origin moves with the angle.
         let arm = (DVec2::new(pose.y_m, pose.z_m) - center).perp() / ANGLE_SCALE_M;
