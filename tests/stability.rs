@@ -3,6 +3,7 @@
 //! The numbers are those of the list of failures that the product is held to (E1 to E12, E24).
 
 mod chain;
+mod membrane;
 
 use std::sync::LazyLock;
 use std::time::Duration;
@@ -75,12 +76,15 @@ fn pose(degrees: f64, y_mm: f64, z_mm: f64) -> PlanarPose {
     PlanarPose { theta_rad: degrees.to_radians(), y_m: 1e-3 * y_mm, z_m: 1e-3 * z_mm }
 }
 
+fn suite() -> Suite {
+    Suite::new(10, 5)
+}
+
 /// One simulated grasp for the rows about depth images.
 fn case() -> (&'static Case, &'static ToolModel) {
     static CASE: LazyLock<(Case, ToolModel)> = LazyLock::new(|| {
-        let suite = Suite::new(10, 5);
-        let case = suite.case(3);
-        let model = tool(suite.tools()[case.tool].mesh());
+        let case = suite().case(3);
+        let model = tool(suite().tools()[case.tool].mesh());
         (case, model)
     });
     (&CASE.0, &CASE.1)

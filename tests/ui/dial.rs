@@ -31,7 +31,7 @@ fn a_dial_is_turned_a_dot_opens_its_pair_and_a_value_is_put_in_force() {
     write_dataset(&data, 2);
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data)) else { return };
     open(&mut rig);
-    rig.harness.get_by_label_contains("Not turned yet");
+    rig.harness.get_by_label_contains("Run it to see what this dial does");
     rig.shoot("dial-empty");
     // A dial that cannot be turned says why, and what can.
     rig.send(DialCommand::Choose(Dial::Trim));

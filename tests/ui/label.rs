@@ -117,7 +117,7 @@ fn tools_draw_by_mouse_and_a_click_on_the_other_finger_paints_nothing() {
         rig.settle();
     }
     assert_eq!(rig.mask(lab::RIGHT), empty);
-    let saved = rig.harness.get_by_label_contains("saved ").rect();
+    let saved = rig.harness.get_by_label("saved").rect();
     assert!(saved.right() < SIZE[0] - 4.0, "{saved:?} is cut off");
     rig.shoot("label-desk");
 }

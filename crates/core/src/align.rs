@@ -57,6 +57,11 @@ pub use register::{Ask, Contacts, PadImage, Register, Scene};
 pub(crate) const ANGLE_SCALE_M: f64 = 0.02;
 /// Fewest points a pose is computed from.
 pub const MIN_POINTS: usize = 32;
+/// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
+const REACH_M: f64 = 0.012;
+/// Fewest points, as a share, that must lie within [`REACH_M`] of the tool at one start, and be near at the end: below, there
+/// is nothing to align.
+const MIN_SHARE: f64 = 0.05;
 
 /// Settings of [`align`]. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -256,7 +256,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         }
         let problems = library.open.as_ref().map_or(0, |o| o.source.problems().len());
         if problems > 0 {
-            let text = RichText::new(format!("{problems} problems")).size(SMALL).color(cx.p.caution);
+            let text = RichText::new(counted(problems, "problem")).size(SMALL).color(cx.p.caution);
             ui.label(text).on_hover_ui(|ui| {
                 if let Some(open) = &cx.state.library.open {
                     for problem in open.source.problems().iter().take(12) {

@@ -53,7 +53,7 @@ fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         (None, None) => {
             let text = "Each value of the dial over the same pairs: one small plot for each, with a dot for every pair";
-            ("Not turned yet".to_owned(), text.to_owned())
+            ("Run it to see what this dial does".to_owned(), text.to_owned())
         }
     };
     let action = Action::TurnDial.command(cx.state).map(|_| ("Run", Action::TurnDial.tooltip()));

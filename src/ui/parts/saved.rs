@@ -1,6 +1,4 @@
-//! When the labels on screen were last written.
-
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+//! State of the saving of the labels on screen.
 
 use eframe::egui::Color32;
 
@@ -12,8 +10,8 @@ use crate::app::labels::Document;
 pub(crate) struct Saved {
     /// The pairs that were not saved yet, at the last look.
     pending: std::collections::BTreeSet<String>,
-    /// When the last of them was.
-    at: Option<Duration>,
+    /// True once one of them was.
+    once: bool,
 }
 
 impl Saved {
@@ -22,17 +20,9 @@ impl Saved {
         if self.pending == *unsaved {
             return;
         }
-        if self.pending.iter().any(|name| !unsaved.contains(name)) {
-            self.at = SystemTime::now().duration_since(UNIX_EPOCH).ok();
-        }
+        self.once |= self.pending.iter().any(|name| !unsaved.contains(name));
         self.pending.clone_from(unsaved);
     }
-}
-
-/// The time of day, universal time.
-fn clock(since_epoch: Duration) -> String {
-    let s = since_epoch.as_secs() % 86_400;
-    format!("{:02}:{:02}:{:02} UTC", s / 3600, s / 60 % 60, s % 60)
 }
 
 /// The state of a pair in words, with its color.
@@ -46,10 +36,7 @@ pub(crate) fn text(saved: &Saved, doc: &Document, pair: &str, p: &Palette) -> (S
     if doc.elsewhere.contains(pair) {
         return ("saved elsewhere".into(), p.caution);
     }
-    match saved.at {
-        Some(at) => (format!("saved {}", clock(at)), p.good),
-        None => (String::new(), p.weak),
-    }
+    if saved.once { ("saved".into(), p.good) } else { (String::new(), p.weak) }
 }
 
 #[cfg(test)]
@@ -57,12 +44,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_moment_of_saving_is_kept() {
-        assert_eq!(clock(Duration::from_secs(86_400 * 3 + 12 * 3600 + 3 * 60 + 11)), "12:03:11 UTC");
+    fn what_was_saved_is_known_when_it_is() {
         let mut saved = Saved::default();
         saved.observe(&["a".to_owned()].into());
-        assert_eq!(saved.at, None);
+        assert!(!saved.once);
         saved.observe(&[].into());
-        assert!(saved.at.is_some());
+        assert!(saved.once);
     }
 }

@@ -16,7 +16,9 @@ use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::register::{Ask, CleanScene, Register, Scene, check_overlap, clean_scene};
-use super::{AlignError, AlignReport, Fate, MIN_POINTS, PointFit, Prior, Run, Rung, Stop, TraceStep, observability};
+use super::{
+    AlignError, AlignReport, Fate, MIN_POINTS, MIN_SHARE, PointFit, Prior, Run, Rung, Stop, TraceStep, observability,
+};
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
@@ -33,8 +35,6 @@ const STEP_COARSE_M: f64 = 5e-5;
 /// Damping at the start and at the end of patience, per unit of weight.
 const DAMPING_START: f64 = 1e-3;
 const DAMPING_MAX: f64 = 1e4;
-/// Fewest pairs, as a share, that must be near at the end: below, there is nothing to align.
-const MIN_SHARE: f64 = 0.05;
 
 /// An ICP. Lengths in meters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -17,20 +17,15 @@ use super::certify::certify;
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
-    AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, Observability, Outcome, PointFit, Prior, Run,
-    Rung, RungAttempt, clean,
+    AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, MIN_SHARE, Observability, Outcome, PointFit,
+    Prior, REACH_M, Run, Rung, RungAttempt, clean,
 };
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 
-/// Fewest points, as a share, that must lie within `REACH_M` of the silhouette at one start, and within the kernel
-/// at the end: below, there is nothing to align.
-const MIN_SHARE: f64 = 0.05;
 /// Points of the descent before the last.
 const MIDDLE_POINTS: usize = 512;
-/// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
-const REACH_M: f64 = 0.012;
 
 /// Finds the planar pose under which the points lie on the tool's silhouette.
 ///

@@ -2,17 +2,12 @@
 
 use glam::{DVec2, DVec3};
 
-use super::{AlignConfig, AlignError, AlignReport, Cleaned, Rung, align, clean};
+use super::{AlignConfig, AlignError, AlignReport, Cleaned, MIN_SHARE, REACH_M, Rung, align, clean};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::grid::DepthMap;
 use crate::sample::DepthCamera;
 use crate::tool::ToolModel;
-
-/// Distance that a start can be expected to bridge, meters: the prior's shift and the sweep of its angle.
-const REACH_M: f64 = 0.012;
-/// Fewest points, as a share, that must lie within [`REACH_M`] of the silhouette at one start.
-const MIN_SHARE: f64 = 0.05;
 
 /// View of the depth camera of one pad.
 #[derive(Clone, Copy, Debug)]

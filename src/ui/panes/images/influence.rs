@@ -81,7 +81,7 @@ fn bar(output: &CanvasOutput) {
     output.painter.rect_filled(frame, 3.0, Color32::from_black_alpha(190));
     let color = Color32::from_gray(225);
     let font = FontId::proportional(10.0);
-    let text = "angle if it left (beside: joined)";
+    let text = "turn of the tool if a pixel changed";
     output.painter.text(frame.center_top() + vec2(0.0, 2.0), Align2::CENTER_TOP, text, font.clone(), color);
     let bar = Rect::from_min_size(frame.min + vec2(6.0, 15.0), vec2(WIDTH, 8.0));
     gradient(&output.painter, bar, 32, |share| {

@@ -147,9 +147,13 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: Imprint
     let end = format!("{RESIDUAL_MM:.0} mm residual");
     painter.text(pos2(bar.right(), y), Align2::RIGHT_TOP, end, font.clone(), cx.p.weak);
     let [shown, of] = lines.shown;
-    let mut text = format!("{shown} of {of} points");
-    if let Some([median, max]) = lines.residual_m {
-        text += &format!(" · median {:.2}, max {:.2}", units::mm(median), units::mm(max));
-    }
+    let points =
+        if shown == of { format!("{of} points") } else { format!("every {}th point", of.div_ceil(shown.max(1))) };
+    let text = match lines.residual_m {
+        Some([median, max]) => {
+            format!("{points}: {} in the middle, at most {}", units::text_mm(median), units::text_mm(max))
+        }
+        None => points,
+    };
     painter.text(pos2(bar.left(), bar.top() - 3.0), Align2::LEFT_BOTTOM, text, font, cx.p.weak);
 }
