@@ -426,7 +426,7 @@ fn figures(cx: &Cx<'_>, ui: &mut Ui, basin: &Basin, hovered: Option<&Cell>) {
         p.text,
     );
     if basin.points < basin.offered {
-        line(ui, format!("{} of {} contact points, evenly thinned", basin.points, basin.offered), p.weak);
+        line(ui, format!("each by {} points, evenly chosen", basin.points), p.weak);
     }
     legend(cx, ui);
 }

@@ -172,7 +172,7 @@ pub struct Basin {
     pub cells: Vec<Cell>,
     /// The places where starts end, cheapest first.
     pub basins: Vec<End>,
-    /// Contact points that every run used.
+    /// Points that every run used: contact points, or places of the membranes.
     pub points: usize,
     /// Contact points there are.
     pub offered: usize,

@@ -168,7 +168,7 @@ fn kernels(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize) {
                 2.0,
                 3.0,
             ));
-            let text = format!("{:.0} mm, {} pts", units::mm(step.kernel_m), step.points);
+            let text = format!("{} mm, {} pts", (10.0 * units::mm(step.kernel_m)).round() / 10.0, step.points);
             let galley = painter.layout_no_wrap(text, font.clone(), p.weak);
             let width = galley.size().x + 6.0;
             let left = if plot.cost.right() - x < width { x - width } else { x };
