@@ -1,5 +1,6 @@
 //! Registration by membrane and mask under spoilt images: what it bears, and where the mask answers in its place.
 
+use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use touch2touch_core::align::{AlignReport, Basis, Contacts, PadImage};
@@ -11,12 +12,19 @@ use touch2touch_work::io::cases::Case;
 
 use super::{case, lifted, suite};
 
-/// The pose by the joint registration on other imprints and masks than the case's own.
-fn joint(imprints: &[DepthMap; 2], masks: &[Mask; 2]) -> AlignReport {
+/// The pose of contact points by the joint registration, with the case's cameras and other imprints than its own.
+fn registered(points: &[DVec3], imprints: &[DepthMap; 2], predicted: bool) -> AlignReport {
     let (case, model) = case();
-    let points = lifted(case, imprints, masks).map(|pad| pad.points).concat();
-    let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted: false };
-    register(Contacts { points: &points, images: &[image(0), image(1)] }, model, Registration::Joint, false).unwrap()
+    let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted };
+    register(Contacts { points, images: &[image(0), image(1)] }, model, Registration::Joint, false).unwrap()
+}
+
+fn points(imprints: &[DepthMap; 2], masks: &[Mask; 2]) -> Vec<DVec3> {
+    lifted(case().0, imprints, masks).map(|pad| pad.points).concat()
+}
+
+fn joint(imprints: &[DepthMap; 2], masks: &[Mask; 2]) -> AlignReport {
+    registered(&points(imprints, masks), imprints, false)
 }
 
 /// Imprints of which each pixel is changed.
@@ -65,12 +73,10 @@ fn m03_without_a_membrane_to_see_the_mask_answers_bit_for_bit() {
         imprints
     };
     let flat = changed(case, |_, _| 0.0);
-    let points = lifted(case, &case.imprints, &case.masks).map(|pad| pad.points).concat();
+    let points = points(&case.imprints, &case.masks);
     let by_mask = register(&points, model, Registration::DistanceField, false).unwrap().grasp_from_object;
     for (name, imprints) in [("no pixel", nothing), ("one pixel", one_pixel), ("flat", flat)] {
-        let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted: false };
-        let contacts = Contacts { points: &points, images: &[image(0), image(1)] };
-        let report = register(contacts, model, Registration::Joint, false).unwrap();
+        let report = registered(&points, &imprints, false);
         let basis = report.joint.unwrap().basis;
         assert!(matches!(basis, Basis::NoZone | Basis::LittleContact), "{name}: {basis:?}");
         assert_eq!(report.grasp_from_object, by_mask, "{name}");
@@ -79,14 +85,10 @@ fn m03_without_a_membrane_to_see_the_mask_answers_bit_for_bit() {
 
 #[test]
 fn m04_points_that_are_there_twice_change_less_than_noise_does() {
-    let (case, model) = case();
-    let points = lifted(case, &case.imprints, &case.masks).map(|pad| pad.points).concat();
+    let (case, _) = case();
+    let points = points(&case.imprints, &case.masks);
     let twice: Vec<_> = points.iter().flat_map(|p| [*p, *p]).collect();
-    let image = |f: usize| PadImage { imprint: &case.imprints[f], camera: &case.cameras[f], predicted: false };
-    let images = [image(0), image(1)];
-    let [a, b] = [&points, &twice].map(|points| {
-        register(Contacts { points, images: &images }, model, Registration::Joint, false).unwrap().grasp_from_object
-    });
+    let [a, b] = [&points, &twice].map(|points| registered(points, &case.imprints, false).grasp_from_object);
     // Of so many points others are chosen.
     assert!(angle_error(a.theta_rad, b.theta_rad).to_degrees() < 0.2, "{a:?} {b:?}");
     assert!((a.y_m - b.y_m).hypot(a.z_m - b.z_m) < 1e-4, "{a:?} {b:?}");
@@ -110,12 +112,10 @@ fn m05_any_number_of_threads_gives_the_same_bits() {
 #[test]
 fn m06_a_prediction_that_is_no_membrane_of_the_tool_is_left_to_the_mask() {
     let (case, model) = case();
-    let points = lifted(case, &case.imprints, &case.masks).map(|pad| pad.points).concat();
+    let points = points(&case.imprints, &case.masks);
     let by_mask = register(&points, model, Registration::DistanceField, false).unwrap().grasp_from_object;
     let basis = |imprints: &[DepthMap; 2]| {
-        let image = |f: usize| PadImage { imprint: &imprints[f], camera: &case.cameras[f], predicted: true };
-        let contacts = Contacts { points: &points, images: &[image(0), image(1)] };
-        let report = register(contacts, model, Registration::Joint, false).unwrap();
+        let report = registered(&points, imprints, true);
         (report.joint.unwrap().basis, report.grasp_from_object)
     };
     // A perfect prediction: the imprint before the camera's noise.

@@ -53,12 +53,12 @@ pub(super) fn pareto(mut points: Vec<FrontPoint>) -> Vec<FrontPoint> {
     points
 }
 
-const INK: RGBColor = RGBColor(30, 34, 40);
-const FAINT: RGBColor = RGBColor(222, 226, 230);
+pub(super) const INK: RGBColor = RGBColor(30, 34, 40);
+pub(super) const FAINT: RGBColor = RGBColor(222, 226, 230);
 const MUTED: RGBColor = RGBColor(105, 112, 122);
-const OURS: RGBColor = RGBColor(28, 100, 200);
-const PEER: RGBColor = RGBColor(205, 95, 20);
-const FRONT: RGBColor = RGBColor(60, 150, 90);
+pub(super) const OURS: RGBColor = RGBColor(28, 100, 200);
+pub(super) const PEER: RGBColor = RGBColor(205, 95, 20);
+pub(super) const FRONT: RGBColor = RGBColor(60, 150, 90);
 /// Height of the letters.
 const LETTERS: f64 = 16.0;
 

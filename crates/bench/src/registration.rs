@@ -215,6 +215,10 @@ fn timed<T>(mut f: impl FnMut() -> T) -> Timed<T> {
 }
 
 pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
+    let mut names = std::collections::BTreeSet::new();
+    if let Some(twice) = args.cases.iter().find(|folder| !names.insert(stem(folder))) {
+        anyhow::bail!("two folders are called {}: their files would have one name; rename one of them", stem(twice));
+    }
     let sets: Vec<CaseSet> = args.cases.iter().map(|folder| set(folder, args)).collect::<anyhow::Result<_>>()?;
     let engines: Vec<Registration> =
         if args.engines.is_empty() { Registration::iter().collect() } else { args.engines.clone() };
@@ -224,7 +228,7 @@ pub(super) fn run(args: &RegistrationArgs) -> VerbResult {
     for (folder, set) in args.cases.iter().zip(&sets) {
         let report = report(folder, set, &engines, args, &output)?;
         if let Some(file) = args.json.file() {
-            let file = if sets.len() > 1 { beside(file, folder) } else { file.to_owned() };
+            let file = if sets.len() > 1 { beside(file, &stem(folder), "json") } else { file.to_owned() };
             write(&file, &report)?;
             output.note(&format!("written: {} (pictures beside it)", file.display()));
         }
@@ -246,10 +250,14 @@ fn set(folder: &Path, args: &RegistrationArgs) -> anyhow::Result<CaseSet> {
     Ok(set)
 }
 
-/// The file with the folder's name in its own.
-fn beside(file: &Path, folder: &Path) -> PathBuf {
-    let name = |path: &Path| path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    file.with_file_name(format!("{}_{}.json", name(file), name(folder)))
+/// Name of a file without its ending, or of a folder.
+fn stem(path: &Path) -> String {
+    path.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned())
+}
+
+/// A file beside another, with one more word in its name.
+fn beside(file: &Path, word: &str, ending: &str) -> PathBuf {
+    file.with_file_name(format!("{}_{word}.{ending}", stem(file)))
 }
 
 fn report(
@@ -382,15 +390,14 @@ fn measure(
             let model = &models[&case.tool];
             let images = images(whole);
             let contacts = Contacts { points: &case.points, images: &images };
-            // What is made once for a tool is not charged to its first case.
-            std::hint::black_box(register(contacts, model, engine, false)).ok();
+            // First, so that what is made once for a tool is not charged to its first case.
+            let judged = register_with(&*method, contacts, model, Ask { evidence: true, ..Ask::default() });
             let before = thread_cpu_ms();
             let result = timed(|| register(contacts, model, engine, false));
             cpu_ms = cpu_ms.zip(thread_cpu_ms().zip(before)).map(|(sum, (after, before))| sum + after - before);
             calls += result.calls;
             offset_mm.push(result.value.as_ref().ok().map(|r| offset(r.grasp_from_object, case.truth)));
             outcomes.push(outcome(case, result));
-            let judged = register_with(&*method, contacts, model, Ask { evidence: true, ..Ask::default() });
             scored.extend(
                 judged
                     .ok()
@@ -470,8 +477,7 @@ fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
     let lines = report.engines.iter().filter(by_field).filter_map(|row| Some((&*row.name, row.reliability.as_ref()?)));
     let title = format!("Standard deviation of the angle, {} cases, {} masks", report.cases.len(), report.masks);
     let picture = reliability::Picture { title: &title, lines: lines.collect() };
-    let name = file.file_stem().map_or_else(String::new, |name| name.to_string_lossy().into_owned());
-    canvas::write(&picture, &file.with_file_name(format!("{name}_reliability.svg")))
+    canvas::write(&picture, &beside(file, "reliability", "svg"))
 }
 
 fn text(report: &Report) -> String {

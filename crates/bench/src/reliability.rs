@@ -4,6 +4,7 @@ use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
+use super::front::{FAINT, FRONT, INK, OURS, PEER};
 use touch2touch_core::align::Evidence;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::units::wrap_angle;
@@ -63,19 +64,12 @@ impl Reliability {
     }
 }
 
-/// Share of a normal distribution within so many standard deviations (Abramowitz and Stegun, 7.1.26; to 2e-7).
+/// Share of a normal distribution within so many standard deviations.
 fn normal_within(limit: f64) -> f64 {
-    let x = limit / std::f64::consts::SQRT_2;
-    let t = 1.0 / (1.0 + 0.327_591_1 * x);
-    let series = [0.254_829_592, -0.284_496_736, 1.421_413_741, -1.453_152_027, 1.061_405_429];
-    let sum = series.iter().rev().fold(0.0, |sum, a| (sum + a) * t);
-    1.0 - sum * (-x * x).exp()
+    libm::erf(limit / std::f64::consts::SQRT_2)
 }
 
-const INK: RGBColor = RGBColor(30, 34, 40);
-const FAINT: RGBColor = RGBColor(222, 226, 230);
-const COLORS: [RGBColor; 4] =
-    [RGBColor(28, 100, 200), RGBColor(205, 95, 20), RGBColor(60, 150, 90), RGBColor(150, 60, 160)];
+const COLORS: [RGBColor; 4] = [OURS, PEER, FRONT, RGBColor(150, 60, 160)];
 
 /// The picture: observed over foretold shares of the angle's errors, a line for each engine.
 pub(super) struct Picture<'a> {

@@ -148,10 +148,10 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: Imprint
     painter.text(pos2(bar.right(), y), Align2::RIGHT_TOP, end, font.clone(), cx.p.weak);
     let [shown, of] = lines.shown;
     let points =
-        if shown == of { format!("{of} points") } else { format!("every {}th point", of.div_ceil(shown.max(1))) };
+        if shown == of { format!("{of} points") } else { format!("1 of {} points", of.div_ceil(shown.max(1))) };
     let text = match lines.residual_m {
         Some([median, max]) => {
-            format!("{points}: {} in the middle, at most {}", units::text_mm(median), units::text_mm(max))
+            format!("{points}: half within {}, all within {}", units::text_mm(median), units::text_mm(max))
         }
         None => points,
     };

@@ -45,6 +45,11 @@ pub fn stratum(position: usize, count: usize) -> Stratum {
     }
 }
 
+/// Number of forms that the tools have under a condition.
+fn forms(condition: Condition) -> usize {
+    if condition == Condition::Mixed { 2 } else { 1 }
+}
+
 /// Suite of fresh cases.
 #[derive(Clone, Debug)]
 pub struct Suite {
@@ -65,8 +70,8 @@ impl Suite {
     /// The same grasps with a fault of the pairs.
     #[must_use]
     pub fn with_condition(self, condition: Condition) -> Self {
-        let forms = if condition == Condition::Mixed { 0..2 } else { 0..1 };
-        let tools = forms.flat_map(|form| plain_tools().into_iter().map(move |tool| condition.tool(&tool, form)));
+        let tools = (0..forms(condition) as u64)
+            .flat_map(|form| plain_tools().into_iter().map(move |tool| condition.tool(&tool, form)));
         Self { condition, tools: tools.collect(), ..self }
     }
 
@@ -94,7 +99,7 @@ impl Suite {
     /// The case with the touch that it is of.
     pub fn felt(&self, position: usize) -> (Sample, Case) {
         let Self { count, seed, condition, any_depth, ref tools } = *self;
-        let plain = plain_tools().len();
+        let plain = tools.len() / forms(condition);
         // One seed per case, so that a case does not depend on how its neighbors came about.
         let mut rng = ChaCha8Rng::seed_from_u64(seed.wrapping_mul(1_000_003).wrapping_add(position as u64));
         let stratum = stratum(position, count);
