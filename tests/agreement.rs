@@ -128,7 +128,7 @@ fn how(action: Action) -> How {
         A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
             Options(&["pose", "demo", "--trace", "--json"])
         }
-        A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
+        A::Distances | A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
         A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
@@ -151,8 +151,11 @@ fn how(action: Action) -> How {
             Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
         }
         A::Section | A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
-        A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::SwitchTheme => Window,
-        A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace => Window,
+        A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop | A::CameraBottom => Window,
+        A::CameraOblique | A::NextSides | A::NextGel | A::SwitchTheme => Window,
+        A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace | A::AdaptWorkspace => {
+            Window
+        }
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
         // Image panes are drawn by `figure`; these are photographs of the window.
         A::SavePane | A::CopyPane | A::OwnPreferences => Window,
@@ -190,8 +193,7 @@ impl Studio {
         let runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
         let mut studio = Self { state: State::default(), runtime };
         studio.runtime.start(&mut studio.state, Some(place));
-        let panes =
-            [Pane::Measured, Pane::Predicted, Pane::Error, Pane::Metrics, Pane::SceneMeasured, Pane::ScenePredicted];
+        let panes = [Pane::Measured, Pane::Predicted, Pane::Compare, Pane::Metrics, Pane::Scene];
         studio.send(ViewCommand::ShowPanes(panes.into_iter().collect()).into());
         studio.send(ViewCommand::ShowBothFingers(true).into());
         studio

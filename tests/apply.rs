@@ -42,7 +42,7 @@ fn from_opening_to_the_figures() {
     assert_eq!(bench.state.library.order.len(), 12);
     assert_eq!(bench.state.pair_name(), "tool_a/data_0", "the first pair is shown at once");
     assert!(matches!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT), Lookup::Waiting));
-    bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Error, Pane::Metrics]));
+    bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Compare, Pane::Metrics]));
     bench.settle();
     assert!(bench.state.tasks.is_idle());
     assert_eq!(results::imprint(&bench.state, ImprintSource::Measured, RIGHT).ready().unwrap().size(), IMPRINT_SIZE);
@@ -89,7 +89,7 @@ fn what_is_not_on_screen_is_not_computed() {
     assert_eq!(bench.services.source.loads(), 0, "no pane, no work");
     bench.send(panes(&[Pane::Log, Pane::Settings]));
     assert!(demand::demands(&bench.state).is_empty());
-    bench.send(panes(&[Pane::GelDifference]));
+    bench.send(panes(&[Pane::GelSlim]));
     bench.settle();
     let loaded = bench.services.source.loads();
     assert_eq!(loaded, 5, "the pair shown and four neighbors on the one side that has any");
@@ -236,7 +236,7 @@ fn the_newest_request_replaces_a_waiting_one() {
 #[test]
 fn a_request_that_runs_is_not_started_twice() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::GelRaw]));
+    bench.send(panes(&[Pane::GelSlim]));
     // Labels first, then the sample, then a neighbor: its answer waits while the screen goes on.
     assert!(bench.runtime.run_one(Lane::Files));
     while bench.services.source.loads() == 0 {

@@ -73,8 +73,7 @@ fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
     std::fs::write(&file, serde_json::to_vec(&settings).unwrap()).unwrap();
     let mut runtime = Runtime::inline(Arc::new(services));
     runtime.start(&mut state, Some(Place::Path(set.clone())));
-    runtime
-        .tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::ScenePredicted].into()))]);
+    runtime.tick(&mut state, vec![Command::View(ViewCommand::ShowPanes([Pane::Predicted, Pane::Scene].into()))]);
     runtime.settle(&mut state);
     let shown = results::chosen(&state, lab::RIGHT).expect("it is predicted by itself");
     assert_eq!((shown.config.steps, shown.config.eta, results::outdated(&state, lab::RIGHT)), (2, 0.1, None));

@@ -95,7 +95,7 @@ fn studio(file: &Path, config: &Path) -> State {
     let services = LiveServices::with_config_folder(Some(config.to_owned()));
     let mut runtime = Runtime::inline(Arc::new(services));
     runtime.start(&mut state, Some(Place::Path(file.to_owned())));
-    let panes = [Pane::Predicted, Pane::Measured, Pane::ScenePredicted].into();
+    let panes = [Pane::Predicted, Pane::Measured, Pane::Scene].into();
     runtime.tick(&mut state, vec![Command::View(ViewCommand::ShowPanes(panes))]);
     runtime.settle(&mut state);
     state

@@ -50,7 +50,7 @@ fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -
     let mut runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
     let mut state = State::default();
     runtime.start(&mut state, Some(place));
-    let panes = [Pane::Predicted, Pane::Measured, Pane::GelDifference, Pane::Error, Pane::Metrics];
+    let panes = [Pane::Predicted, Pane::Measured, Pane::GelSlim, Pane::Compare, Pane::Metrics];
     runtime.tick(&mut state, vec![Command::View(ViewCommand::ShowPanes(panes.into_iter().collect()))]);
     let begin = std::time::Instant::now();
     let mut asked = false;

@@ -9,6 +9,7 @@ mod look;
 mod rig;
 
 mod adapt;
+mod calm;
 mod chain;
 mod compare;
 mod daily;

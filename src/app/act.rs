@@ -19,7 +19,7 @@ use super::state::results::Request;
 use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
-use super::state::workbench::{SceneTool, Section};
+use super::state::workbench::{Layer, SceneTool, Section};
 use super::state::{Absent, State};
 use super::{adapt, dial, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
@@ -55,6 +55,18 @@ impl Absent {
             _ => None,
         }
     }
+}
+
+/// Colors by distance, or no longer.
+fn distances(state: &State) -> Option<Command> {
+    let on = state.workbench.layer == Layer::Distance;
+    does(WorkbenchCommand::SetLayer(if on { Layer::None } else { Layer::Distance }))
+}
+
+/// The next choice of sides that have a 3D view.
+fn next_sides(state: &State) -> Option<Command> {
+    let next = next_of(&state.settings.scene_sides());
+    does(prefer(move |s| _ = s.sides.insert(s.workspace, next)))
 }
 
 fn does(command: impl Into<Command>) -> Option<Command> {

@@ -294,10 +294,22 @@ macro_rules! actions {
             _ => ui(UiRequest::Camera(CameraPreset::Right));
         CameraFront, View, "View from the front", "Looks across the closing axis", [ctrl(K::Num3)],
             _ => ui(UiRequest::Camera(CameraPreset::Front));
+        CameraBack, View, "View from the back", "Looks across the closing axis from the other side", [ctrl(K::Num5)],
+            _ => ui(UiRequest::Camera(CameraPreset::Back));
+        CameraBottom, View, "View from below", "Looks along the tool from its tip", [ctrl(K::Num6)],
+            _ => ui(UiRequest::Camera(CameraPreset::Bottom));
+        CameraOblique, View, "Oblique view", "Looks from above a corner, as a view begins", [ctrl(K::Num7)],
+            _ => ui(UiRequest::Camera(CameraPreset::Oblique));
         CameraTop, View, "View from the top", "Looks along the tool", [ctrl(K::Num4)],
             _ => ui(UiRequest::Camera(CameraPreset::Top));
-        NextLayer, View, "Next layer", "Goes through the layers of the 3D panes: none, residuals, reasons, distance, lines", [plain(K::V)],
+        Distances, View, "Distance to the CAD", "Colors CAD and contact points in 3D by their signed distance in mm, or no longer", [plain(K::V)],
+            state => distances(state);
+        NextLayer, View, "Next paint", "Goes through what contact points are painted with in 3D: one color, residuals, why one was left out, distance, lines", [shift(K::V)],
             state => does(WorkbenchCommand::SetLayer(next_of(&state.workbench.layer)));
+        NextSides, View, "Other 3D side", "Goes through both 3D views, the measured one alone and the predicted one alone", [],
+            state => next_sides(state);
+        NextGel, View, "Other GelSlim image", "Goes through the difference, the image during the touch and the one without contact", [],
+            _ => does(prefer(|s| s.gel = next_of(&s.gel)));
         AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [],
             state => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest));
         BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [],
@@ -334,6 +346,8 @@ macro_rules! actions {
             _ => does(prefer(|s| s.workspace = Workspace::Label));
         EvaluateWorkspace, View, "Evaluate", "The metrics", [],
             _ => does(prefer(|s| s.workspace = Workspace::Evaluate));
+        AdaptWorkspace, View, "Adapt", "Generator and mask model made better on your own sensors", [],
+            _ => does(prefer(|s| s.workspace = Workspace::Adapt));
         ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [],
             _ => ui(UiRequest::ResetWorkspace);
         MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)],

@@ -7,7 +7,7 @@ pub use super::keys::ImportForm;
 pub use super::state::export::{FigureForm, Output};
 pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 pub use command::{equivalent, equivalent_words};
-pub(crate) use setup::{CaseView, can_draw, case_setup, figure_recipes, figure_setup, picture_setup};
+pub(crate) use setup::{CaseView, can_draw, case_setup, figure_recipes, figure_setup, in_figure, picture_setup};
 pub use setup::{PairExport, case_lacks, pair_export};
 
 use std::path::PathBuf;

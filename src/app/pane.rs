@@ -5,9 +5,8 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::keys::ImprintSource;
-use touch2touch_work::figure::FigurePane;
 
-/// The four arrangements of the same panes.
+/// The arrangements of the same panes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum Workspace {
@@ -20,6 +19,8 @@ pub enum Workspace {
     Label,
     /// Numbers.
     Evaluate,
+    /// Models made better on one's own sensors.
+    Adapt,
 }
 
 impl Workspace {
@@ -30,6 +31,7 @@ impl Workspace {
             Self::Align => "Align",
             Self::Label => "Label",
             Self::Evaluate => "Evaluate",
+            Self::Adapt => "Adapt",
         }
     }
 }
@@ -43,12 +45,10 @@ pub enum Kind {
     Color,
     /// Imprints of one side.
     Imprint(ImprintSource),
-    /// Differences of imprints.
-    Error,
     /// Two imprints.
     Versus,
-    /// A 3D view of one side.
-    Scene(ImprintSource),
+    /// 3D views of the sides that are chosen.
+    Scene,
     /// Steps that can be played.
     Steps,
     /// A map that is clicked.
@@ -88,8 +88,8 @@ pub enum Demand {
     Seeds,
     /// Any two imprints against each other.
     Versus,
-    /// Cloud and pose of a side, in 3D.
-    Scene(ImprintSource),
+    /// Cloud and pose in 3D, of the sides that are chosen.
+    Scene,
     /// The poses of both sides.
     Poses,
     /// The poses from each finger alone.
@@ -116,61 +116,39 @@ macro_rules! panes {
         $with! {
             browser { Browser {
                 "Pairs", "The pairs of what is open", Form, needs [Thumbnails, Scores],
-                at [Inspect Left, Align Left, Label Left, Evaluate Left]
+                at [Inspect Left, Align Left, Label Left, Evaluate Left, Adapt Left]
             } }
             metrics { Metrics {
                 "Metrics", "The metrics of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
-                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             generate { Generate {
                 "Generate", "Predicts the Soft Bubble imprint", Form, needs [Pair],
                 at [Inspect Right(1), Align Right(2), Evaluate Right(1)]
             } }
-            scene {
-                SceneMeasured {
-                    "3D measured", "The measured surface on the CAD model, grasp frame",
-                    Scene(Measured), needs [Scene(Measured)],
-                    at [Inspect Bottom(3), Align Top(1), Label Bottom(2), Evaluate Right(1)]
-                }
-                ScenePredicted {
-                    "3D predicted", "The predicted surface on the CAD model, grasp frame",
-                    Scene(Predicted), needs [Scene(Predicted)],
-                    at [Inspect Bottom(2), Align Top(2), Label Bottom(2)]
-                }
-            }
+            scene { Scene {
+                "3D", "Measured and predicted surface on the CAD model, grasp frame", Scene, needs [Scene],
+                at [Inspect Bottom(2), Align Top(1), Label Bottom(2), Evaluate Right(1)]
+            } }
             images {
-                GelDifference {
-                    "GelSlim difference" as "GelSlim diff",
-                    "Touched minus untouched, around mid gray: what the generator sees",
+                GelSlim {
+                    "GelSlim", "The GelSlim image: touched minus untouched, during the touch, or without contact",
                     Color, needs [Pair], at [Inspect Top(1), Label Bottom(1)]
-                }
-                GelRaw {
-                    "GelSlim raw" as "raw", "The GelSlim image during the touch, rotated to line up with the bubble",
-                    Color, needs [Pair], at [Inspect Top(1)]
-                }
-                GelReference {
-                    "GelSlim reference" as "reference",
-                    "The GelSlim image without contact, rotated to line up with the bubble",
-                    Color, needs [Pair], at [Inspect Top(1)]
                 }
                 Measured {
                     "Measured imprint", "What the Soft Bubble measured; dashed: what the GelSlim sees of it",
                     Imprint(Measured), needs [Imprint(Measured)],
-                    at [Inspect Top(2), Align Top(1), Label Top(1), Evaluate Bottom(1)]
+                    at [Inspect Top(2), Align Top(2), Label Top(1), Evaluate Bottom(1), Adapt Bottom(1)]
                 }
                 Predicted {
                     "Predicted imprint", "What the generator predicts from the GelSlim image, in the same colors",
                     Imprint(Predicted), needs [Imprint(Predicted), Ambiguity],
-                    at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2)]
-                }
-                Error {
-                    "Error", "Predicted minus measured: blue too shallow, red too deep", Error, needs [Comparison],
-                    at [Inspect Bottom(1), Evaluate Bottom(3)]
+                    at [Inspect Top(3), Align Top(2), Label Top(1), Evaluate Bottom(2), Adapt Bottom(2)]
                 }
             }
             versus { Compare {
-                    "Compare", "Any two imprints of the touch against each other: side by side, wiped, subtracted, in 3D",
-                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3)]
+                    "Compare", "Any two imprints of the touch against each other: subtracted, side by side, wiped, in 3D",
+                    Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
             } }
             ledger { Ledger {
                 "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
@@ -201,7 +179,7 @@ macro_rules! panes {
             }
             train { Train {
                 "Train the mask model" as "Train", "The mask model trained on corrected masks, and what that is worth",
-                Form, needs [Training], at [Label Right(1)]
+                Form, needs [Training], at [Adapt Top(2)]
             } }
             results { Results {
                 "Results", "The paper's results table of the open data set", Form, needs [],
@@ -209,7 +187,7 @@ macro_rules! panes {
             } }
             adapt { Adapt {
                 "Fit to my pairs" as "Fit", "The generator fitted to the open pairs, and what that is worth", Form, needs [],
-                at [Evaluate Top(1)]
+                at [Adapt Top(1)]
             } }
             dial { Dial {
                 "Dial", "What a threshold, probability, gate, trim or shift does to the poses of all pairs", Form, needs [],
@@ -224,7 +202,7 @@ macro_rules! panes {
             } }
             log { Log {
                 "Log", "What happened", Form, needs [],
-                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1)]
+                at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             settings_pane {
                 Settings { "Preferences", "What is kept between runs: look, runtime, kept predictions", Form, needs [], at [Inspect Right(1)] }
@@ -268,7 +246,7 @@ macro_rules! define {
             /// The kind of what it shows.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Error, Form, Imprint, Map, Scene, Steps, Versus};
+                use Kind::{Color, Form, Imprint, Map, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -309,9 +287,14 @@ impl Pane {
     /// The side that it is about.
     pub fn side(self) -> Option<ImprintSource> {
         match self.kind() {
-            Kind::Imprint(side) | Kind::Scene(side) => Some(side),
+            Kind::Imprint(side) => Some(side),
             _ => None,
         }
+    }
+
+    /// True where it is closed until somebody asks for it: a tab costs everyone who does not need it.
+    pub(crate) fn is_closed_at_first(self) -> bool {
+        matches!(self, Self::Settings | Self::Log)
     }
 
     /// True where it shows something of the selected pair.
@@ -327,19 +310,6 @@ impl Pane {
     pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
         let name = self.title().to_lowercase().replace(' ', "-");
         format!("{name}.{}", if pixels { "png" } else { "svg" })
-    }
-
-    /// The column of a figure that shows the same; `None` for panes that are no pictures.
-    pub(crate) fn in_figure(self) -> Option<FigurePane> {
-        Some(match (self, self.kind()) {
-            (Self::GelDifference, _) => FigurePane::GelSlim,
-            (Self::GelRaw, _) => FigurePane::Raw,
-            (Self::GelReference, _) => FigurePane::Reference,
-            (_, Kind::Imprint(ImprintSource::Measured)) => FigurePane::Measured,
-            (_, Kind::Imprint(ImprintSource::Predicted)) => FigurePane::Predicted,
-            (Self::Error, _) => FigurePane::Error,
-            _ => return None,
-        })
     }
 }
 

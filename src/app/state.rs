@@ -20,7 +20,7 @@ pub mod train;
 pub mod view;
 pub mod workbench;
 
-use super::keys::{PairKey, TouchKey};
+use super::keys::{ImprintSource, PairKey, TouchKey};
 use super::pane::Demand;
 use adapt::AdaptState;
 use dial::DialState;
@@ -131,6 +131,11 @@ impl State {
     /// True where a pane on screen needs something.
     pub(super) fn needs(&self, need: Demand) -> bool {
         self.selection.panes.iter().any(|pane| pane.needs().contains(&need))
+    }
+
+    /// True where a 3D view of a side is on screen.
+    pub(super) fn shows_scene(&self, side: ImprintSource) -> bool {
+        self.needs(Demand::Scene) && self.settings.scene_sides().list().contains(&side)
     }
 
     /// True where a pane on screen shows something of the selected pair.

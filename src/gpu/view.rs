@@ -17,7 +17,10 @@ const DISTANCE: std::ops::RangeInclusive<f64> = 1e-4..=100.0;
 /// x of a point that is not finite; see `is_hidden` in `shaders/common/view.wgsl`.
 pub(super) const HIDDEN: f32 = f32::MAX;
 
-/// The sides from which the lab draws a grasp.
+/// Yaw and pitch from which everything has a side to it, radians.
+const OBLIQUE: (f64, f64) = (0.9, 0.35);
+
+/// The sides from which a grasp is looked at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, strum::EnumIter)]
 pub enum Preset {
     /// From the left finger (negative x) along the closing axis.
@@ -26,14 +29,20 @@ pub enum Preset {
     Right,
     /// Along the lateral axis, with the left finger on the left.
     Front,
+    /// Along the lateral axis, with the left finger on the right.
+    Back,
     /// From the wrist down the tool, with the left finger on the left.
     Top,
+    /// From below up the tool, with the left finger on the left.
+    Bottom,
+    /// From above a corner, as a view begins.
+    Oblique,
 }
 
 impl Preset {
-    /// `Left`, `Right`, `Front`, `Top`: for buttons.
+    /// The name on buttons.
     pub fn name(self) -> &'static str {
-        ["Left", "Right", "Front", "Top"][self as usize]
+        ["Left", "Right", "Front", "Back", "Top", "Bottom", "Oblique"][self as usize]
     }
 
     /// Yaw and pitch, radians.
@@ -42,7 +51,10 @@ impl Preset {
             Self::Left => (PI, 0.0),
             Self::Right => (0.0, 0.0),
             Self::Front => (FRAC_PI_2, 0.0),
+            Self::Back => (-FRAC_PI_2, 0.0),
             Self::Top => (FRAC_PI_2, FRAC_PI_2),
+            Self::Bottom => (FRAC_PI_2, -FRAC_PI_2),
+            Self::Oblique => OBLIQUE,
         }
     }
 }
@@ -113,7 +125,8 @@ pub struct Camera {
 
 impl Default for Camera {
     fn default() -> Self {
-        Self { target: DVec3::ZERO, distance: 0.15, yaw_rad: 0.9, pitch_rad: 0.35, fov_rad: 0.6, orthographic: false }
+        let (yaw_rad, pitch_rad) = OBLIQUE;
+        Self { target: DVec3::ZERO, distance: 0.15, yaw_rad, pitch_rad, fov_rad: 0.6, orthographic: false }
     }
 }
 

@@ -27,7 +27,7 @@ fn strokes(studio: &mut Studio) {
 /// With the pane of the masks on screen: proposals are made while it is looked at.
 fn open(folder: &Path, home: &Path) -> Studio {
     let mut studio = Studio::open(Place::Path(folder.to_owned()), home);
-    let panes = [Pane::Measured, Pane::Masks, Pane::SceneMeasured].into_iter().collect();
+    let panes = [Pane::Measured, Pane::Masks, Pane::Scene].into_iter().collect();
     studio.send(ViewCommand::ShowPanes(panes).into());
     studio
 }

@@ -100,7 +100,7 @@ fn a_finger_that_nobody_looks_at_is_not_generated() {
     assert_eq!(bench.services.generated(), 1);
     // A pane that makes a pose of both wants the other one too, made like the first.
     bench.send(prefer(move |s| s.generate.seed = 5));
-    bench.send(panes(&[Pane::Predicted, Pane::ScenePredicted]));
+    bench.send(panes(&[Pane::Predicted, Pane::Scene]));
     bench.settle();
     let (right, left) =
         (results::chosen(&bench.state, RIGHT).unwrap().clone(), results::chosen(&bench.state, LEFT).unwrap().clone());

@@ -35,7 +35,7 @@ fn send(bench: &mut Bench, command: InspectCommand) {
 
 #[test]
 fn nothing_is_recorded_unless_it_is_looked_at() {
-    let mut bench = bench(&[Pane::SceneMeasured, Pane::ScenePredicted, Pane::Metrics]);
+    let mut bench = bench(&[Pane::Scene, Pane::Metrics]);
     let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
     assert!(bench.state.results.inspections.is_empty() && bench.state.results.basins.is_empty());
@@ -183,7 +183,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
 
 #[test]
 fn a_map_that_is_given_up_is_not_computed_until_asked_for() {
-    let mut bench = bench(&[Pane::SceneMeasured]);
+    let mut bench = bench(&[Pane::Scene]);
     bench.send(panes(&[Pane::BasinMap]));
     let wants_map = |bench: &Bench| demand::demands(&bench.state).iter().any(|r| matches!(r, Request::Basin(_)));
     assert!(wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 1);

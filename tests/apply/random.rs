@@ -51,11 +51,10 @@ fn carry_out(bench: &mut Bench, commands: Vec<(Command, u8)>) -> Result<(), Test
         Pane::Browser,
         Pane::Measured,
         Pane::Predicted,
-        Pane::Error,
+        Pane::Compare,
         Pane::Masks,
         Pane::Metrics,
-        Pane::SceneMeasured,
-        Pane::ScenePredicted,
+        Pane::Scene,
     ]));
     bench.settle();
     for (command, then) in commands {

@@ -116,7 +116,7 @@ fn bench() -> Bench {
     let mut fitted = bench.state.library.bundles[0].clone();
     (fitted.id, fitted.name) = ("fitted".into(), "fitted".into());
     bench.state.library.bundles.push(fitted);
-    bench.send(panes(&[Pane::Predicted, Pane::Error, Pane::Generate]));
+    bench.send(panes(&[Pane::Predicted, Pane::Compare, Pane::Generate]));
     bench.send(LibraryCommand::Select(PairId(1)));
     bench.settle();
     bench

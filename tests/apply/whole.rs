@@ -25,7 +25,7 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 #[test]
 fn the_pose_follows_the_mask() {
     let mut bench = Bench::open_simulated();
-    bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
+    bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();
@@ -71,7 +71,7 @@ fn the_pose_follows_the_mask() {
 #[test]
 fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     let mut bench = Bench::open_simulated();
-    bench.send(panes(&[Pane::SceneMeasured, Pane::Measured]));
+    bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.send(prefer(|s| s.registration = Registration::DistanceField.into()));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
@@ -103,7 +103,7 @@ fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
 #[test]
 fn a_source_without_camera_says_why_there_is_no_pose() {
     let mut bench = Bench::open();
-    bench.send(panes(&[Pane::SceneMeasured, Pane::ScenePredicted, Pane::Measured]));
+    bench.send(panes(&[Pane::Scene, Pane::Measured]));
     bench.settle();
     assert!(matches!(results::cloud(&bench.state, MEASURED), Lookup::Absent(Absent::NoCamera)));
     assert!(bench.state.tasks.is_idle());
@@ -180,7 +180,7 @@ fn threads_give_the_same_and_wake_the_window() {
     let mut runtime = Runtime::threads(services.clone(), wake);
     let mut state = State::default();
     runtime.start(&mut state, Some(Place::Demo));
-    runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Error])]);
+    runtime.tick(&mut state, vec![panes(&[Pane::Measured, Pane::Predicted, Pane::Compare])]);
     let mut asked = false;
     while results::comparison(&state, lab::RIGHT).ready().is_none() {
         if !asked && results::can_generate(&state).is_ok() && results::sample(&state).ready().is_some() {

@@ -72,7 +72,7 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.settle();
     rig.restart(SIZE);
     assert!(large(&rig) > 1000.0, "{}", large(&rig));
-    assert_eq!(state(&rig).selection.panes.iter().copied().collect::<Vec<_>>(), [Pane::SceneMeasured]);
+    assert_eq!(state(&rig).selection.panes.iter().copied().collect::<Vec<_>>(), [Pane::Scene]);
     rig.send(SettingsCommand::ResetSettings);
     rig.restart(SIZE);
     assert_ne!(state(&rig).pair_name(), pair);

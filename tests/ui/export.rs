@@ -118,7 +118,7 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     rig.harness.step();
     let copied = rig.copied().expect("the command is on the clipboard");
     let state = rig.harness.state().state();
-    assert_eq!(Some(&copied), export::equivalent(state, Pane::SceneMeasured, 0.004).as_ref());
+    assert_eq!(Some(&copied), export::equivalent(state, Pane::Scene, 0.004).as_ref());
     assert!(copied.starts_with("touch2touch export ") && copied.contains("--imprint measured"), "{copied}");
     rig.settle();
     // What a mask is made of is said, also of one drawn by hand.

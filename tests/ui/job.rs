@@ -12,7 +12,7 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{Theme, Workspace};
+use touch2touch::app::settings::{GelView, Theme, Workspace};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_work::io::dataset::Dataset;
@@ -100,15 +100,17 @@ fn browse_generate_shift_paint_undo() {
 
     // Another range mapping, by its button.
     let exact = results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
+    rig.click("Range mapping");
     rig.click("Paper shift");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);
     assert_ne!(*results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);
 
     // Another image in the same place.
-    assert!(!state.selection.panes.contains(&Pane::GelRaw));
+    assert_eq!(state.settings.gel, GelView::Difference);
+    rig.click("GelSlim image");
     rig.click("raw");
-    assert!(rig.harness.state().state().selection.panes.contains(&Pane::GelRaw));
+    assert_eq!(rig.harness.state().state().settings.gel, GelView::Raw);
 
     // Paint, see the pose follow, find the file.
     rig.click("Label");

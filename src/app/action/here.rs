@@ -23,6 +23,9 @@ impl Action {
             Workspace::Evaluate => {
                 matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }
+            Workspace::Adapt => {
+                matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)
+            }
         }
     }
 
@@ -38,14 +41,14 @@ impl Action {
                 _ => false,
             },
             Kind::Color => picture,
-            Kind::Imprint(_) | Kind::Error => {
+            Kind::Imprint(_) => {
                 picture
                     || range
                     || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
                     || matches!(self, A::Influence | A::Ghosts | A::Lens)
             }
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
-            Kind::Scene(_) => picture || self.is_of_scene(),
+            Kind::Scene => picture || self.is_of_scene(),
             Kind::Steps => self.is_of_steps(),
             Kind::Map => matches!(self, A::CancelJobs | A::OwnStarts),
         }
@@ -54,7 +57,8 @@ impl Action {
     /// True where it is about the 3D views.
     fn is_of_scene(self) -> bool {
         use Action as A;
-        let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraTop | A::Section)
+        let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
+            || matches!(self, A::CameraBottom | A::CameraOblique | A::Section | A::Distances | A::NextSides)
             || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
             || matches!(self, A::LinkCameras | A::NextLayer | A::AnimateWeakest | A::BothClouds);
         look || self.is_nudge()

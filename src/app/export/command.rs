@@ -11,6 +11,7 @@ use super::super::{adapt, dial, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::figure::FigurePane;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
 use touch2touch_work::sweep::Setting;
@@ -52,8 +53,8 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
     };
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
-        (_, Kind::Color | Kind::Imprint(_) | Kind::Error) => {
-            let shown = pane.in_figure()?;
+        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus) if super::in_figure(state, pane).is_some() => {
+            let shown = super::in_figure(state, pane)?;
             let both = state.selection.both_fingers;
             let range = state.settings.range;
             let words = verb("figure")
@@ -62,12 +63,12 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
                 .option("--finger", if both { "both" } else { &finger })
                 .option("--out", pane.picture_name(true))
                 .option("--range", format!("{}..{}", range.min_m * 1e3, range.max_m * 1e3))
-                .option_if("--error-range-mm", (pane == Pane::Error).then_some(error_m * 1e3))
+                .option_if("--error-range-mm", (shown == FigurePane::Error).then_some(error_m * 1e3))
                 .word_if(state.settings.color_map == ColorMap::Gray, "--gray")
                 .word_if(!state.settings.footprint_visible, "--no-window");
             if shown.is_predicted() { words.then(drawn()) } else { words }
         }
-        (_, Kind::Scene(side)) => posed(of_pair("export")?.option("--out", "exported"), side),
+        (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
         (Pane::TimeMachine, _) => {
             let start = state.inspect.start.map(|start| start_text(start.get()));
             posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")

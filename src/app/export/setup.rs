@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
-use super::super::pane::Pane;
+use super::super::pane::{Kind, Pane};
 use super::super::state::State;
-use super::super::state::settings::Settings;
+use super::super::state::settings::{GelView, Settings};
 use super::super::{recipe, results};
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
@@ -19,7 +19,7 @@ use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigureSetup, FigureTheme, note};
+use touch2touch_work::figure::{FigurePane, FigureSetup, FigureTheme, note};
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
 use touch2touch_work::pose::PoseResult;
@@ -111,12 +111,28 @@ pub(crate) fn figure_setup(state: &State) -> FigureSetup {
     with_note(state, FigureSetup { pairs, fingers, shift: state.settings.shift, look, note: String::new() })
 }
 
+/// The column of a figure that shows the same as a pane; `None` of panes that are no pictures.
+pub(crate) fn in_figure(state: &State, pane: Pane) -> Option<FigurePane> {
+    let settings = &state.settings;
+    Some(match pane.kind() {
+        Kind::Color => match settings.gel {
+            GelView::Difference => FigurePane::GelSlim,
+            GelView::Raw => FigurePane::Raw,
+            GelView::Reference => FigurePane::Reference,
+        },
+        Kind::Imprint(ImprintSource::Measured) => FigurePane::Measured,
+        Kind::Imprint(ImprintSource::Predicted) => FigurePane::Predicted,
+        Kind::Versus if settings.compared().is_error() => FigurePane::Error,
+        _ => return None,
+    })
+}
+
 /// One pane of the selected pair, with the fingers that it shows.
 pub(crate) fn picture_setup(state: &State, pane: Pane, scale: Option<u8>, error_m: f32) -> Option<FigureSetup> {
     let shown = state.fingers();
     let fingers = state.rig().pads().filter(|finger| shown.contains(finger)).collect();
     let scale = f64::from(scale.unwrap_or(1));
-    let look = state.settings.figure_look(vec![pane.in_figure()?], error_m, FigureTheme::Light, scale);
+    let look = state.settings.figure_look(vec![in_figure(state, pane)?], error_m, FigureTheme::Light, scale);
     let pairs = vec![state.selection.pair?];
     Some(with_note(state, FigureSetup { pairs, fingers, shift: state.settings.shift, look, note: String::new() }))
 }

@@ -13,8 +13,8 @@ use touch2touch_work::propose::{CadAt, Takes};
 pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) {
     let other = source.other();
     let layers = state.needs(Demand::Layers) && state.workbench.side == source;
-    let both = state.workbench.both_clouds && state.needs(Demand::Scene(other));
-    let scene = layers || both || state.needs(Demand::Scene(source)) || state.needs(Demand::Poses);
+    let both = state.workbench.both_clouds && state.shows_scene(other);
+    let scene = layers || both || state.shows_scene(source) || state.needs(Demand::Poses);
     let inspected = state.inspect.source == source && (state.needs(Demand::Steps) || state.needs(Demand::Basin));
     let scene = scene || proposes_at_pose(state, source) || shows_influence(state, source);
     (scene, scene || inspected)
@@ -63,14 +63,14 @@ pub(crate) fn seeds_asked(state: &State) -> bool {
 
 /// True where something on screen shows a step of an imprint's registration.
 pub(crate) fn shows_steps(state: &State, source: ImprintSource) -> bool {
-    let lines = state.workbench.layer == Layer::Correspondences && state.needs(Demand::Scene(source));
+    let lines = state.workbench.layer == Layer::Correspondences && state.shows_scene(source);
     state.inspect.source == source && (lines || state.needs(Demand::Steps))
 }
 
 /// True where something on screen shows the layers of an imprint.
 pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
     let bench = &state.workbench;
-    let in_scene = state.needs(Demand::Scene(source))
+    let in_scene = state.shows_scene(source)
         && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
             || bench.picked.is_some_and(|picked| picked.source == source));
     in_scene || (state.needs(Demand::Layers) && bench.side == source)
@@ -78,5 +78,5 @@ pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
 
 /// True where a 3D view shows the distances between an imprint and the model.
 pub(crate) fn shows_deviation(state: &State, source: ImprintSource) -> bool {
-    state.workbench.layer == Layer::Distance && state.needs(Demand::Scene(source))
+    state.workbench.layer == Layer::Distance && state.shows_scene(source)
 }

@@ -12,7 +12,7 @@ use super::super::action::{Action, Bindings};
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
-use scene::SceneLook;
+use scene::{SceneLook, SceneSides};
 use touch2touch_core::colormap;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
@@ -79,6 +79,10 @@ pub struct Settings {
     pub cameras_linked: bool,
     /// The look of the 3D views.
     pub scene: SceneLook,
+    /// The sides that have a 3D view, where a person chose them for a workspace.
+    pub sides: std::collections::BTreeMap<Workspace, SceneSides>,
+    /// The GelSlim image that is shown.
+    pub gel: GelView,
     /// The comparison of each workspace.
     pub versus: std::collections::BTreeMap<Workspace, Versus>,
     /// True where the mask is drawn over imprints.
@@ -144,6 +148,8 @@ impl Default for Settings {
             repeats_percent: (100.0 * repeats::SHARE) as f32,
             cameras_linked: true,
             scene: SceneLook::default(),
+            sides: std::collections::BTreeMap::new(),
+            gel: GelView::default(),
             versus: std::collections::BTreeMap::new(),
             mask_visible: true,
             mask_outline: false,
@@ -216,6 +222,15 @@ impl Settings {
         Some(self.labeler()).filter(|name| !name.is_empty())
     }
 
+    /// The sides that have a 3D view in the workspace in front: where masks are drawn and where scores are read there is
+    /// room for one.
+    pub fn scene_sides(&self) -> SceneSides {
+        self.sides.get(&self.workspace).copied().unwrap_or(match self.workspace {
+            Workspace::Label | Workspace::Evaluate => SceneSides::Measured,
+            Workspace::Inspect | Workspace::Align | Workspace::Adapt => SceneSides::Both,
+        })
+    }
+
     /// The comparison in the workspace in front.
     pub fn compared(&self) -> Versus {
         self.versus.get(&self.workspace).cloned().unwrap_or_default()
@@ -255,6 +270,39 @@ pub enum Theme {
     Dark,
     /// Dark on light.
     Light,
+}
+
+/// A GelSlim image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
+#[serde(rename_all = "snake_case")]
+pub enum GelView {
+    /// Touched minus untouched, around mid gray.
+    #[default]
+    Difference,
+    /// During the touch.
+    Raw,
+    /// Without contact.
+    Reference,
+}
+
+impl GelView {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Difference => "difference",
+            Self::Raw => "raw",
+            Self::Reference => "reference",
+        }
+    }
+
+    /// The tooltip.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Difference => "Touched minus untouched, around mid gray: what the generator sees",
+            Self::Raw => "The image during the touch, rotated to line up with the bubble",
+            Self::Reference => "The image without contact, rotated to line up with the bubble",
+        }
+    }
 }
 
 /// The range of imprint depths that the color map spans, shared by all panes.

@@ -57,8 +57,14 @@ pub enum CameraPreset {
     Right,
     /// Along y.
     Front,
-    /// Along z.
+    /// Against y.
+    Back,
+    /// Along z, from the wrist.
     Top,
+    /// Against z, from below.
+    Bottom,
+    /// From above a corner, as a view begins.
+    Oblique,
 }
 
 /// A request that only the window can fulfil, once. Handed out by the runtime's `tick`.

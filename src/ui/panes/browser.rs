@@ -11,12 +11,11 @@ use crate::app::action::Action;
 use crate::app::command::{Command, LibraryCommand, Pane};
 use crate::app::evaluate::ScoreChoice;
 use crate::app::labels::Review;
-use crate::app::library::{Place, Sort, short_name};
+use crate::app::library::{Sort, short_name};
 use crate::app::results;
 use crate::app::scores::{Grade, SourceScores};
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::theme::{Palette, SMALL, caption};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use crate::ui::parts::widget::empty;
@@ -57,63 +56,23 @@ pub(crate) struct Memory {
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        source_menu(cx, ui);
+        title(cx, ui);
         filter_row(cx, ui, memory);
         ui.add_space(2.0);
         list(cx, ui, memory);
     });
 }
 
-/// Title of what is open, with the menu of sources.
-fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
+/// Title of what is open.
+fn title(cx: &Cx<'_>, ui: &mut Ui) {
     let library = &cx.state.library;
     let title = match (&library.opening, &library.open) {
         (Some(place), _) => format!("Opening {place}…"),
         (None, Some(open)) => open.source.title().to_owned(),
-        (None, None) => "Open…".to_owned(),
+        (None, None) => return,
     };
-    let width = ui.available_width();
-    let button = egui::Button::new(RichText::new(title).color(cx.p.strong)).truncate().min_size(vec2(width, 24.0));
-    let (response, _) = egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| {
-        ui.set_min_width(220.0);
-        if ui.button("Demo").on_hover_text("Simulated touches of 12 tools, made when they are looked at").clicked() {
-            cx.push(LibraryCommand::Open(Place::Demo));
-        }
-        let folder = ui.add(egui::Button::new("Open folder…").shortcut_text(cx.keys().text(Action::OpenFolder)));
-        if folder.on_hover_text("A folder in the lab's layout, or a folder of image pairs").clicked() {
-            cx.act(Action::OpenFolder);
-        }
-        if ui.button("Open path…").on_hover_text("Type or paste a path").clicked() {
-            cx.shared.dialogs.type_path(Purpose::Folder, "");
-        }
-        let reload = ui.add_enabled(
-            cx.state.library.open.is_some(),
-            egui::Button::new("Reload").shortcut_text(cx.keys().text(Action::Reload)),
-        );
-        if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
-            cx.act(Action::Reload);
-        }
-        let following = cx.state.library.follow.is_some();
-        let button =
-            egui::Button::new(Action::Follow.name()).shortcut_text(cx.keys().text(Action::Follow)).selected(following);
-        let follow = ui.add_enabled(Action::Follow.command(cx.state).is_some(), button);
-        if follow.on_hover_text(Action::Follow.tooltip()).clicked() {
-            cx.act(Action::Follow);
-        }
-        let recent: Vec<_> = cx.state.settings.recent.iter().filter(|r| **r != Place::Demo).cloned().collect();
-        if !recent.is_empty() {
-            ui.separator();
-            ui.label(caption("Recent", cx.p));
-            for place in recent {
-                let text = place.to_string();
-                let short = text.rsplit('/').next().unwrap_or(&text).to_owned();
-                if ui.button(short).on_hover_text(text).clicked() {
-                    cx.push(LibraryCommand::Open(place));
-                }
-            }
-        }
-    });
-    response.on_hover_text("What is open. Click to open something else, or drop a folder on the window");
+    let label = egui::Label::new(RichText::new(&title).color(cx.p.strong)).truncate();
+    ui.add(label).on_hover_text(format!("{title}. The menu Open has others; or drop a folder on the window"));
 }
 
 fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
@@ -338,14 +297,13 @@ fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The button that scores all pairs, or how far that is.
+/// The button that scores all pairs, or how far that is; the bar at the bottom of the window stops it.
 pub(crate) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
     ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-        Some((ticket, task)) => {
-            let text = format!("{} of {}", task.progress.done, task.progress.total);
-            let what = (text.as_str(), "Stop; what was scored until then is kept");
-            cx.stoppable(ui, (ticket, task), 260.0, what);
+        Some((_, task)) => {
+            let text = format!("scoring: {} of {}", task.progress.done, task.progress.total);
+            ui.label(RichText::new(text).size(SMALL).color(cx.p.accent));
         }
         None => {
             cx.action_button(ui, Action::PredictAll, "Predict all");

@@ -39,11 +39,23 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
     crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
         ScrollArea::vertical().id_salt("generate").show(ui, |ui| {
-            settings(cx, ui);
-            run(cx, ui);
-            ui.add_space(4.0);
+            let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
+            let spelt_out = cx.state.settings.generate.spelt_out(bundle);
+            let mut new = spelt_out.clone();
+            model(cx, ui, &mut new);
+            presets(cx, ui, &mut new);
             mapping(cx, ui);
-            ui.add_space(4.0);
+            run(cx, ui);
+            let more = egui::CollapsingHeader::new(RichText::new("More").size(SMALL)).id_salt("more of generate");
+            let more = more.show(ui, |ui| numbers(cx, ui, &mut new));
+            more.header_response.on_hover_text("Sampler, steps, seed, previews");
+            if new != spelt_out {
+                // Whoever changes a number has left the preset.
+                if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
+                    new.preset = None;
+                }
+                cx.push(prefer(move |s| s.generate = new.clone()));
+            }
             results(cx, ui);
         });
     });
@@ -79,24 +91,26 @@ fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     }
 }
 
-fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
+/// Choice of the numbers in one word.
+fn presets(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
     let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
-    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
-    let spelt_out = cx.state.settings.generate.spelt_out(bundle);
-    let mut new = spelt_out.clone();
-    model(cx, ui, &mut new);
     row(ui, cx.p.weak, "Preset", |ui| {
         for preset in Preset::iter() {
-            let chosen = spelt_out.preset == Some(preset);
-            let button = ui.add(egui::Button::selectable(chosen, preset_name(preset)));
+            let button = ui.add(egui::Button::selectable(new.preset == Some(preset), preset_name(preset)));
             if button.on_hover_text(preset_help(preset, bundle)).clicked() {
-                new = GenerateSettings { preset: Some(preset), ..spelt_out.clone() };
+                *new = GenerateSettings { preset: Some(preset), ..new.clone() };
             }
         }
-        if spelt_out.preset.is_none() {
+        if new.preset.is_none() {
             ui.label(caption("own numbers", cx.p));
         }
     });
+}
+
+/// The numbers behind the presets, and when previews and predictions are made.
+fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
+    let bundle = recipe::bundle(cx.state, BundleKind::Generator).ok();
+    let guided = bundle.and_then(|bundle| bundle.generator.as_ref()).is_some_and(|g| g.guided);
     row(ui, cx.p.weak, "Sampler", |ui| {
         let combo = egui::ComboBox::from_id_salt("sampler").width(72.0).selected_text(sampler_name(new.sampler));
         let response = combo.show_ui(ui, |ui| {
@@ -160,13 +174,6 @@ fn settings(cx: &mut Cx<'_>, ui: &mut Ui) {
              what earlier predictions took. Default on",
         );
     });
-    if new != spelt_out {
-        // Whoever changes a number has left the preset.
-        if new.preset == spelt_out.preset && !new.same_numbers(&spelt_out) {
-            new.preset = None;
-        }
-        cx.push(prefer(move |s| s.generate = new.clone()));
-    }
 }
 
 /// Tooltip with the default; a double-click resets.
@@ -238,21 +245,24 @@ fn sampler_name(sampler: Sampler) -> &'static str {
     }
 }
 
+/// Choice of the way to meters.
 fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.label(section("Range mapping", cx.p));
     let current = cx.state.settings.shift;
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 6.0;
-        // The refit is there once its statistics are; until then the button brings them.
-        for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
-            let radio = ui.radio(mode == current, mode.label());
-            if radio.on_hover_text(shift_tooltip(mode)).clicked() {
-                cx.push(prefer(move |s| s.shift = mode));
+    row(ui, cx.p.weak, "Range", |ui| {
+        let combo = egui::ComboBox::from_id_salt("mapping").width(ui.available_width() - 8.0);
+        let response = combo.selected_text(current.label()).truncate().show_ui(ui, |ui| {
+            // The refit is there once its statistics are; until then the button brings them.
+            for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
+                if ui.selectable_label(mode == current, mode.label()).on_hover_text(shift_tooltip(mode)).clicked() {
+                    cx.push(prefer(move |s| s.shift = mode));
+                }
             }
-        }
-        if cx.state.settings.refit.is_none() {
-            cx.action_button(ui, Action::Refit, "Refit…");
-        }
+            if cx.state.settings.refit.is_none() {
+                cx.action_button(ui, Action::Refit, "Refit on this data set…");
+            }
+        });
+        let tip = format!("Range mapping: how the decoder's numbers become meters. {}", shift_tooltip(current));
+        response.response.accessible_name("Range mapping").on_hover_text(tip);
     });
 }
 
@@ -260,11 +270,11 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     let Some(touch) = cx.state.touch_key(finger) else { return };
     let keys: Vec<PredictionKey> = cx.state.results.made.get(&touch).cloned().unwrap_or_default();
-    ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
-    if keys.is_empty() {
-        ui.label(caption("None yet for this touch.", cx.p));
+    // One alone is what is shown anyway.
+    if keys.len() < 2 {
         return;
     }
+    ui.label(section(&format!("Results, {} finger", cx.state.finger_name(finger)), cx.p));
     let chosen = results::chosen(cx.state, finger).cloned();
     let shift = cx.state.settings.shift;
     for recipe in keys.iter().rev() {

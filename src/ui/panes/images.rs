@@ -1,4 +1,4 @@
-//! The image panes: GelSlim, measured and predicted imprint, error. Linked pan, zoom and cross-hair.
+//! The image panes: GelSlim, measured and predicted imprint. Linked pan, zoom and cross-hair.
 
 pub(crate) mod bar;
 mod influence;
@@ -8,7 +8,8 @@ mod paint;
 
 use std::sync::Arc;
 
-use eframe::egui::{Align2, Button, Color32, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use eframe::egui::{Align2, Button, Color32, ComboBox, Rect, RichText, Ui, UiBuilder, pos2, vec2};
+use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{Hover, LabelsCommand, LibraryCommand, Pane, TasksCommand, ViewCommand};
@@ -22,7 +23,7 @@ use crate::ui::parts::widget::empty;
 use crate::ui::parts::widget::image_canvas::{CanvasMap, CanvasOutput, ImageCanvas, Primary, shows_squares};
 use crate::ui::parts::widget::texture::{Histogram, Memo, depth_image, picture_image};
 
-use crate::app::settings::{ColorMap as MapChoice, MaskTool};
+use crate::app::settings::{ColorMap as MapChoice, GelView, MaskTool, prefer};
 use crate::app::state::{Absent, Lookup, State};
 use link::Link;
 use touch2touch_core::colormap::{ColorMap, Range};
@@ -102,7 +103,10 @@ fn usual_size(cx: &Cx<'_>, kind: SensorKind) -> [usize; 2] {
 
 /// The pane of one kind of image, for every finger on screen.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
-    let bar = matches!(pane, Pane::Measured | Pane::Predicted | Pane::Error);
+    let bar = pane != Pane::GelSlim;
+    if !bar {
+        choose_gel(cx, ui);
+    }
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
     let bottom = if bar { full.bottom() - colorbar::HEIGHT } else { full.bottom() };
@@ -137,10 +141,8 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
         ui.painter().rect_filled(rect, 0.0, cx.p.panel);
         let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt((pane, "bar")));
-        bar::color_bar(cx, &mut child, pane, histogram.as_ref());
-        if pane != Pane::Error
-            && let Some(histogram) = &histogram
-        {
+        bar::color_bar(cx, &mut child, histogram.as_ref());
+        if let Some(histogram) = &histogram {
             bar::offer_range(cx, ui, area, histogram);
         }
     }
@@ -150,21 +152,17 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
 fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, finger: PadId) -> Option<Histogram> {
     let state = cx.state;
     match pane {
-        Pane::GelRaw | Pane::GelReference | Pane::GelDifference => {
-            let image: Lookup<'_, RgbGrid> = match pane {
-                Pane::GelDifference => {
-                    results::gelslim(state, finger).and_then(Absent::NoGelSlim, |g| Some(&g.difference))
+        Pane::GelSlim => {
+            let gelslim = results::gelslim(state, finger);
+            let image: Lookup<'_, RgbGrid> = match state.settings.gel {
+                GelView::Difference => gelslim.and_then(Absent::NoGelSlim, |g| Some(&g.difference)),
+                GelView::Raw => gelslim.and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw)),
+                GelView::Reference => {
+                    gelslim.and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference))
                 }
-                Pane::GelRaw => results::gelslim(state, finger)
-                    .and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.raw)),
-                _ => results::gelslim(state, finger)
-                    .and_then(Absent::OnlyDifference, |g| g.images.as_ref().map(|i| &i.reference)),
             };
             gel_image(cx, ui, pane, finger, image);
             None
-        }
-        Pane::Measured => {
-            depth_pane(cx, ui, memory, pane, finger, results::imprint(state, ImprintSource::Measured, finger))
         }
         Pane::Predicted => match results::preview(state, finger) {
             Some(preview) => preview_image(cx, ui, finger, preview),
@@ -178,11 +176,26 @@ fn finger_image(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane, f
                 }
             },
         },
-        _ => {
-            let error = results::comparison(state, finger).and_then(Absent::NoPrediction, |c| Some(&c.error));
-            depth_pane(cx, ui, memory, pane, finger, error)
-        }
+        _ => depth_pane(cx, ui, memory, pane, finger, results::imprint(state, ImprintSource::Measured, finger)),
     }
+}
+
+/// Choice of the GelSlim image.
+fn choose_gel(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let now = cx.state.settings.gel;
+    ui.horizontal(|ui| {
+        ui.set_height(24.0);
+        ui.add_space(4.0);
+        let combo = ComboBox::from_id_salt("gel").width(0.0).selected_text(RichText::new(now.name()).size(SMALL));
+        let response = combo.show_ui(ui, |ui| {
+            for view in GelView::iter() {
+                if ui.selectable_label(view == now, view.name()).on_hover_text(view.tooltip()).clicked() {
+                    cx.push(prefer(move |s| s.gel = view));
+                }
+            }
+        });
+        response.response.accessible_name("GelSlim image").on_hover_text(now.tooltip());
+    });
 }
 
 /// Placeholder for a picture: the one before, dimmed, while the next is on its way; else a sentence.
@@ -192,7 +205,7 @@ fn placeholder<T: ?Sized>(cx: &mut Cx<'_>, ui: &mut Ui, slot: (Pane, PadId), loo
             let rect = ui.available_rect_before_wrap();
             ui.painter().rect_filled(rect, 0.0, cx.p.canvas);
             if let Some(picture) = cx.shared.textures.last(slot) {
-                let gel = matches!(slot.0, Pane::GelRaw | Pane::GelReference | Pane::GelDifference);
+                let gel = slot.0 == Pane::GelSlim;
                 let view = if gel { cx.shared.views.gel } else { cx.shared.views.bubble };
                 let turned = gel && cx.state.rig().turned();
                 let map = CanvasMap::new(rect, size, view, turned);
@@ -305,8 +318,9 @@ fn gel_image(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, finger: PadId, lookup: Lo
     cx.shared.views.gel = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
     let recipe = results::chosen(cx.state, finger).filter(|_| pane == Pane::Predicted);
-    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, recipe), squares, || {
-        let picture = if matches!(pane, Pane::GelDifference | Pane::Predicted) {
+    let shown = cx.state.settings.gel;
+    let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), (touch, pane, shown, recipe), squares, || {
+        let picture = if pane == Pane::Predicted || shown == GelView::Difference {
             picture::difference(image)
         } else {
             picture::plain(image)
@@ -385,12 +399,8 @@ fn depth_pane(
     let stale = matches!(lookup, Lookup::Stale(_));
     let source = if pane == Pane::Predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
     // The recipe of what is shown: the picture is made again when it changes, and only then.
-    let recipe = match pane {
-        Pane::Error => results::imprint_key(cx.state, ImprintSource::Predicted, finger).ok()?,
-        _ => results::imprint_key(cx.state, source, finger).ok()?,
-    };
-    let paintable = pane != Pane::Error
-        && cx.state.selection.panes.contains(&Pane::Masks)
+    let recipe = results::imprint_key(cx.state, source, finger).ok()?;
+    let paintable = cx.state.selection.panes.contains(&Pane::Masks)
         && cx.state.settings.mask.tool != MaskTool::Pan
         && cx.state.document.is_editable(cx.state.pair_name());
     let primary = if paintable { Primary::Caller } else { Primary::Pan };
@@ -400,17 +410,14 @@ fn depth_pane(
     let output = canvas.show(ui, &mut view);
     cx.shared.views.bubble = view;
     let squares = shows_squares(&output.map, ui.pixels_per_point());
-    let (map, range) = match pane {
-        Pane::Error => (ColorMap::Diverging, Range::symmetric(cx.shared.views.error_m())),
-        _ => (map_of(cx.state), range_of(cx.state)),
-    };
+    let (map, range) = (map_of(cx.state), range_of(cx.state));
     let key = (&recipe, map, range.lo.to_bits(), range.hi.to_bits());
     let picture = cx.shared.textures.get(ui.ctx(), (pane, finger), key, squares, || {
         (depth_image(depth, map, range), Histogram::of(depth.as_slice()))
     });
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
-    if pane != Pane::Error && !paint::is_bared(ui) {
+    if !paint::is_bared(ui) {
         influence::overlay(cx, ui, &output, source, finger);
         paint::mask(cx, ui, memory, &output, source, finger);
     }
@@ -425,9 +432,7 @@ fn depth_pane(
         output.crosshair(point.at_px, Color32::WHITE);
     }
     // The point that was read in 3D stays marked.
-    if let Some(picked) =
-        cx.state.workbench.picked.filter(|p| p.finger == finger && (p.source == source || pane == Pane::Error))
-    {
+    if let Some(picked) = cx.state.workbench.picked.filter(|p| p.finger == finger && p.source == source) {
         let mark = output.map.to_screen(picked.pixel.map(f32::from));
         output.painter.circle_stroke(mark, 6.0, eframe::egui::Stroke::new(3.0, Color32::from_black_alpha(140)));
         output.painter.circle_stroke(mark, 6.0, eframe::egui::Stroke::new(1.5, cx.p.accent));
@@ -449,7 +454,7 @@ fn depth_pane(
         });
     }
     captions(cx, &output, pane, finger);
-    if pane != Pane::Error && cx.state.selection.lens && !paint::is_bared(ui) {
+    if cx.state.selection.lens && !paint::is_bared(ui) {
         lens::show(cx, memory, &output, texture, (source, finger, paintable));
     }
     histogram
@@ -497,30 +502,13 @@ fn marks(cx: &Cx<'_>, output: &CanvasOutput, finger: PadId) {
 
 fn captions(cx: &Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId) {
     let text = finger_text(cx.state, finger);
-    // The error's own figures stand in the other corner: one line has no room for more than the scale.
-    let note = if pane == Pane::Error { scale_note(cx.state).to_owned() } else { source_note(cx.state) };
-    output.caption(Align2::LEFT_BOTTOM, &note, crate::ui::parts::theme::DARK.caution);
+    output.caption(Align2::LEFT_BOTTOM, &source_note(cx.state), crate::ui::parts::theme::DARK.caution);
     output.caption(Align2::LEFT_TOP, &text, cx.p.strong_on_image());
-    let state = cx.state;
-    let right = match pane {
-        Pane::Error => results::comparison(state, finger)
-            .ready()
-            .map_or(String::new(), |c| format!("mean |error| {}", units::text_mm(c.mae_m))),
-        _ => String::new(),
-    };
-    if let Some(split) =
-        results::comparison(state, finger).ready().and_then(|c| c.split).filter(|_| pane == Pane::Error)
-    {
-        let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
-        let text = format!("seen {} · invented {}", part(split.seen.mae), part(split.invented.mae));
-        output.caption(Align2::RIGHT_BOTTOM, &text, cx.p.strong_on_image());
-    }
     if let Some(warning) =
-        results::ambiguity(state, finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted)
+        results::ambiguity(cx.state, finger).and_then(|a| a.caption()).filter(|_| pane == Pane::Predicted)
     {
         output.caption(Align2::RIGHT_BOTTOM, warning, crate::ui::parts::theme::DARK.caution);
     }
-    output.caption(Align2::RIGHT_TOP, &right, cx.p.strong_on_image());
 }
 
 /// The value under the pointer, in millimeters and in the unit that is stored.

@@ -1,6 +1,6 @@
-//! The mask tools: brush, eraser, automatic sources with live preview, clean-ups, undo, review state.
+//! The mask tools: what draws, what was done, the review state, where masks come from, clean-ups.
 
-mod proposal;
+mod source;
 mod stats;
 
 use crate::app::results;
@@ -13,15 +13,15 @@ use crate::app::action::Action;
 use crate::app::command::{LabelsCommand, Pane, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
-use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskChoice, MaskSettings, MaskSource, MaskTool, ToolRow};
+use crate::app::settings::{BRUSH_RADIUS_PX, CLEAN_MM, MaskSettings, MaskTool, ToolRow};
 use crate::app::state::Lookup;
 use crate::app::workbench::SceneTool;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, section};
+use crate::ui::parts::widget::icon::{self, Icon};
 use touch2touch_core::label::{DrawTool, Layers, Paint};
-use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
-use touch2touch_work::labels::{MAX_NOTE, system_person};
+use touch2touch_work::labels::MAX_NOTE;
 
 /// The note being typed.
 #[derive(Default)]
@@ -44,45 +44,67 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             return;
         }
         ScrollArea::vertical().id_salt("masks").show(ui, |ui| {
-            // What every mask takes comes first, so that it is on screen without scrolling.
+            // What every mask takes comes first, each line in a place of its own: nothing moves under the pointer.
             tools(cx, ui);
-            correct(cx, ui);
+            paints(cx, ui);
+            said(cx, ui);
             review(cx, ui);
-            proposal::show(cx, ui);
-            source(cx, ui);
-            if system_person().is_none() {
-                super::settings_pane::person(cx, ui);
-            }
+            source::show(cx, ui);
+            fold(ui, "Clean up", "Clean up the mask by one click", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            clean_ups(cx, ui);
-            opacity(cx, ui);
+            fold(ui, "More", "What is shown, limits, drawing in 3D, the other imprint's mask", |ui| {
+                overlay(cx, ui);
+                opacity(cx, ui);
+                gate(cx, ui);
+                in_3d(cx, ui);
+                correct(cx, ui);
+            });
             stats::show(cx, ui);
         });
     });
 }
 
+/// A row that unfolds.
+fn fold(ui: &mut Ui, name: &str, tip: &str, add: impl FnOnce(&mut Ui)) {
+    let header = egui::CollapsingHeader::new(RichText::new(name).size(SMALL)).id_salt(name);
+    header.show(ui, add).header_response.on_hover_text(tip);
+}
+
+fn sign(tool: MaskTool) -> Icon {
+    match tool {
+        MaskTool::Brush => Icon::Brush,
+        MaskTool::Eraser => Icon::Eraser,
+        MaskTool::Lasso => Icon::Lasso,
+        MaskTool::Polygon => Icon::Polygon,
+        MaskTool::Rectangle => Icon::Rectangle,
+        MaskTool::Wand => Icon::Wand,
+        MaskTool::Pan => Icon::Hand,
+    }
+}
+
+/// The tools in a row, and below them the number of the one in hand.
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
         for tool in MaskTool::iter() {
             let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
-            let button = egui::Button::selectable(mask.tool == tool, row.name).min_size(vec2(56.0, 24.0));
-            if ui.add(button).on_hover_text(cx.keys().help(row.action)).clicked() {
+            let key = cx.keys().text(row.action);
+            let button = icon::button(ui, sign(tool), &key, row.name, true, mask.tool == tool);
+            let help = format!("{}: {}", row.name, cx.keys().help(row.action));
+            if button.on_hover_text(help).clicked() {
                 cx.act(row.action);
             }
         }
     });
-    let mask = &cx.state.settings.mask;
-    match mask.tool.row(mask) {
-        ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
-        ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
-        // As high as a number: what lies below stays where it is from tool to tool.
-        row => _ = ui.horizontal(|ui| ui.label(caption(row.hint, cx.p))),
-    }
-    paints(cx, ui);
-    in_3d(cx, ui);
-    gate(cx, ui);
-    overlay(cx, ui);
+    ui.horizontal(|ui| {
+        ui.set_height(22.0);
+        let mask = &cx.state.settings.mask;
+        match mask.tool.row(mask) {
+            ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
+            ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
+            row => _ = ui.add(egui::Label::new(caption(row.hint, cx.p)).truncate()),
+        }
+    });
 }
 
 /// Drawing on the points of the 3D views, and what that reaches.
@@ -105,7 +127,7 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Choice of what the tools make of the pixels.
 fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(caption("Paint", cx.p));
         let now = cx.state.settings.mask.paint;
@@ -122,27 +144,55 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.push(prefer(move |s| s.mask.paint = paint));
             }
         }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| undo(cx, ui));
+    });
+}
+
+/// Undo and redo, with what they would take back.
+fn undo(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let (name, shown) = (cx.state.pair_name(), results::mask_places(cx.state));
+    let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
+    let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
+    for (action, text, what) in [(Action::Redo, "Redo", redo), (Action::Undo, "Undo", undo)] {
+        let response = cx.action_button(ui, action, text);
+        if let Some(what) = what {
+            response.on_hover_text(format!("{text} {what}"));
+        }
+    }
+}
+
+/// Room for two lines about what was done last: the proposal where one is shown, else the effect of the last change.
+fn said(cx: &Cx<'_>, ui: &mut Ui) {
+    const LINES: f32 = 30.0;
+    let size = vec2(ui.available_width(), LINES);
+    let (place, _) = ui.allocate_exact_size(size, egui::Sense::hover());
+    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
+        ui.set_clip_rect(place.intersect(ui.clip_rect()));
+        ui.spacing_mut().item_spacing.y = 0.0;
+        if results::proposes(cx.state) {
+            source::said(cx, ui);
+        } else {
+            effect(cx, ui);
+        }
     });
 }
 
 fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal(|ui| {
-        let mut radius = cx.state.settings.mask.radius_px;
-        ui.spacing_mut().slider_width = (ui.available_width() - 148.0).max(40.0);
-        let slider = egui::Slider::new(&mut radius, BRUSH_RADIUS_PX).logarithmic(true).fixed_decimals(1).suffix(" px");
-        let response = ui.add(slider).accessible_name("Brush radius");
-        if response.double_clicked() {
-            radius = MaskSettings::default().radius_px;
-        }
-        if response.changed() || response.double_clicked() {
-            cx.push(prefer(move |s| s.mask.radius_px = radius));
-        }
-        let mm = f64::from(radius) / cx.state.rig().depth_px_per_mm();
-        ui.label(caption(format!("{mm:.2} mm"), cx.p));
-        let tip = "Radius of brush and eraser, image pixels ([[brush_smaller]] and [[brush_larger]], Shift + wheel, \
-                   Alt + move). Double-click resets";
-        response.on_hover_text(cx.keys().fill(tip));
-    });
+    let mut radius = cx.state.settings.mask.radius_px;
+    ui.label(caption("Radius", cx.p));
+    let drag = egui::DragValue::new(&mut radius).speed(0.1).range(BRUSH_RADIUS_PX).fixed_decimals(1).suffix(" px");
+    let response = ui.add(drag).accessible_name("Brush radius");
+    if response.double_clicked() {
+        radius = MaskSettings::default().radius_px;
+    }
+    if response.changed() || response.double_clicked() {
+        cx.push(prefer(move |s| s.mask.radius_px = radius));
+    }
+    let mm = f64::from(radius) / cx.state.rig().depth_px_per_mm();
+    ui.label(caption(format!("{mm:.2} mm"), cx.p));
+    let tip = "Radius of brush and eraser, image pixels: drag or type; [[brush_smaller]] and [[brush_larger]], Shift + wheel \
+               or Alt + move over the image. Double-click resets";
+    response.on_hover_text(cx.keys().fill(tip));
 }
 
 /// A slider over millimeters of a length in meters; whether it changed.
@@ -200,106 +250,6 @@ fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// The automatic source, with its number.
-fn source(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.add_space(2.0);
-    ui.label(section("Automatic source", cx.p));
-    let settings = &cx.state.settings.mask;
-    let finger = cx.state.selection.finger;
-    let combo = egui::ComboBox::from_id_salt("mask source").width(ui.available_width() - 8.0);
-    let response = combo.selected_text(settings.choice.source.name()).show_ui(ui, |ui| {
-        for source in MaskSource::iter() {
-            let option = ui.selectable_label(source == settings.choice.source, source.name());
-            if option.on_hover_text(source.tooltip()).clicked() {
-                cx.out.push(prefer(move |s| s.mask.choice.source = source).into());
-            }
-        }
-    });
-    response.response.accessible_name("Mask source").on_hover_text(settings.choice.source.tooltip());
-    let mut new = settings.clone();
-    ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
-    match settings.choice.source {
-        MaskSource::Threshold => {
-            let mut mm = new.choice.threshold_m * 1e3;
-            let slider = egui::Slider::new(&mut mm, 0.0..=15.0).fixed_decimals(2).suffix(" mm");
-            let response = ui.add(slider).accessible_name("Threshold");
-            if response.double_clicked() {
-                mm = MaskChoice::default().threshold_m * 1e3;
-            }
-            new.choice.threshold_m = mm * 1e-3;
-            response
-                .on_hover_text("Pixels pushed in further than this, millimeters. Default 5.00; double-click resets");
-        }
-        MaskSource::TopPercent => {
-            let slider = egui::Slider::new(&mut new.choice.top_percent, 0.0..=60.0).fixed_decimals(1).suffix(" %");
-            let response = ui.add(slider).accessible_name("Top percent");
-            if response.double_clicked() {
-                new.choice.top_percent = MaskChoice::default().top_percent;
-            }
-            response.on_hover_text("Share of the deepest pixels. Default 15.0; double-click resets");
-        }
-        MaskSource::Cad => {
-            let mut mm = new.choice.cad_distance_m * 1e3;
-            let slider = egui::Slider::new(&mut mm, 0.0..=5.0).fixed_decimals(2).suffix(" mm");
-            let response = ui.add(slider).accessible_name("CAD distance");
-            if response.double_clicked() {
-                mm = MaskChoice::default().cad_distance_m * 1e3;
-            }
-            new.choice.cad_distance_m = mm * 1e-3;
-            response
-                .on_hover_text("Largest distance to the CAD model at the true pose. Default 1.00; double-click resets");
-        }
-        MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
-        MaskSource::Truth => {}
-    }
-    if let Err(absent) = results::mask_recipe(cx.state, finger) {
-        ui.label(RichText::new(absent.text()).size(SMALL).color(cx.p.caution));
-    }
-    if new != *settings {
-        cx.push(prefer(move |s| s.mask = new.clone()));
-    }
-    for finger in cx.state.rig().pads().filter(|f| cx.state.fingers().contains(f)) {
-        let several = results::imprint(cx.state, ImprintSource::Predicted, finger).ready().is_some();
-        for source in ImprintSource::iter() {
-            if several || source == results::worked_on(cx.state, finger) {
-                in_force(cx, ui, source, finger);
-            }
-        }
-    }
-}
-
-/// Origin of the mask of one imprint.
-fn in_force(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, finger: PadId) {
-    let text = match results::mask_in_force(cx.state, source, finger) {
-        Ok(mask) => mask.label,
-        Err(Lookup::Failed(err)) => err.why.clone(),
-        Err(Lookup::Absent(absent)) => absent.text().to_owned(),
-        Err(_) => "…".to_owned(),
-    };
-    let color = if results::drawn_mask(cx.state, source, finger).is_some() { cx.p.strong } else { cx.p.weak };
-    let text = format!("{}, {}: {text}", cx.state.finger_name(finger), source.key());
-    let label = egui::Label::new(RichText::new(&text).size(SMALL).color(color)).truncate();
-    ui.add(label).on_hover_text(format!("The mask in force. {text}"));
-}
-
-/// From which probability on the mask model's pixels are contact.
-fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
-    /// Probability at which somebody starts who chooses it himself.
-    const START: f32 = 0.5;
-    ui.horizontal(|ui| {
-        let mut own = choice.probability.is_some();
-        let tip = "Choose the probability from which a pixel is contact; off, it is as the mask model's bundle says";
-        if ui.checkbox(&mut own, "probability").on_hover_text(tip).changed() {
-            choice.probability = own.then_some(START);
-        }
-        if let Some(least) = &mut choice.probability {
-            ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
-            let slider = egui::Slider::new(least, 0.0..=1.0).fixed_decimals(2);
-            ui.add(slider).accessible_name("Probability").on_hover_text("Least probability of contact, 0 to 1");
-        }
-    });
-}
-
 fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(2.0);
     let finger = cx.state.selection.finger;
@@ -322,21 +272,8 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
         cx.action_button(ui, Action::TakeOver, "Other's mask");
-    });
-    ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::ResetMask, "Remove");
-        let (name, shown) = (cx.state.pair_name(), results::mask_places(cx.state));
-        let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
-        let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
-        for (action, text, what) in [(Action::Undo, "Undo", undo), (Action::Redo, "Redo", redo)] {
-            let response = cx.action_button(ui, action, text);
-            if let Some(what) = what {
-                response.on_hover_text(format!("{text} {what}"));
-            }
-        }
     });
-    effect(cx, ui);
 }
 
 /// Effect of the last change of a mask on the pose, as soon as that is registered again.
@@ -387,8 +324,6 @@ pub(crate) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
 }
 
 fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.add_space(2.0);
-    ui.label(section("Clean up", cx.p));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
         for (action, text) in [
@@ -420,28 +355,26 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
 }
 
+/// The review state, and the way on.
 fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.add_space(2.0);
-    ui.horizontal(|ui| {
-        ui.label(section("Review", cx.p));
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));
-    });
     let current = cx.state.document.review(cx.state.pair_name());
     let editable = cx.state.document.is_editable(cx.state.pair_name());
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(4.0, 4.0);
-        for review in Review::iter() {
-            let on = review == current;
-            let color = if on { review_color(cx.p, review) } else { cx.p.text };
-            let text =
-                RichText::new(review.name()).color(if on && review == Review::Skip { cx.p.strong } else { color });
-            let button = ui.add_enabled(editable, egui::Button::selectable(on, text));
-            let button = button.accessible_name(format!("Review: {}", review.name()));
-            if button.on_hover_text("The review state of this pair").clicked() {
-                cx.push(LabelsCommand::SetReview(review));
-            }
-        }
+    ui.horizontal(|ui| {
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let text = RichText::new(current.name()).color(review_color(cx.p, current));
+        ui.add_enabled_ui(editable, |ui| {
+            let combo = egui::ComboBox::from_id_salt("review").width(84.0).selected_text(text);
+            let response = combo.show_ui(ui, |ui| {
+                for review in Review::iter() {
+                    if ui.selectable_label(review == current, review.name()).clicked() {
+                        cx.push(LabelsCommand::SetReview(review));
+                    }
+                }
+            });
+            response.response.accessible_name("Review state").on_hover_text("The review state of this pair");
+        });
         cx.action_button(ui, Action::DoneAndNext, "Done, next");
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));
     });
 }
 

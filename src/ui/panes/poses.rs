@@ -1,9 +1,11 @@
 //! Prediction against truth as poses: measured and predicted against the true pose and against each other, per finger
 //! and joint.
 
-use eframe::egui::{Align2, Color32, FontId, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use eframe::egui::{Align2, Color32, FontId, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
+use strum::IntoEnumIterator as _;
 
-use crate::app::command::Pane;
+use crate::app::action::Action;
+use crate::app::command::{LabelsCommand, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::state::Lookup;
@@ -11,9 +13,10 @@ use crate::app::workbench::PoseOf;
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::theme::{SMALL, caption, grade_color};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::manual::PoseDifference;
+use touch2touch_core::manual::{ManualPose, PoseDifference};
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
+use touch2touch_work::labels::ImprintOf;
 
 /// Height of a row: two lines of small type.
 const ROW: f32 = 32.0;
@@ -46,8 +49,48 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                 None => "The true pose of this pair is not known: only the distance between the two poses is shown.",
             };
             ui.label(caption(text, cx.p));
+            ui.add_space(6.0);
+            ui.spacing_mut().item_spacing.y = 4.0;
+            for source in ImprintSource::iter() {
+                accept(cx, ui, source);
+            }
         });
     });
+}
+
+/// Takes the registered pose of a side over into the labels, or withdraws the one that is there.
+fn accept(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+    let Some(pose) = results::pose(cx.state, source).shown() else { return };
+    let action = match source {
+        ImprintSource::Measured => Action::AcceptMeasuredPose,
+        ImprintSource::Predicted => Action::AcceptPredictedPose,
+    };
+    let accepted = results::accepted(cx.state, source) == Some(pose.grasp_from_object.into());
+    match results::by_hand(cx.state, source) {
+        Some(hand) => by_hand(cx, ui, source, hand),
+        None if accepted => _ = cx.action_button(ui, action, &format!("{}: accepted (withdraw)", source.name())),
+        None => _ = cx.action_button(ui, action, action.name()),
+    }
+    let elsewhere = results::accepted_elsewhere(cx.state);
+    if source == ImprintSource::Predicted && !elsewhere.is_empty() {
+        let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
+        ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
+    }
+}
+
+/// A pose that a person set, in place of the button that takes the registered one over.
+fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: ManualPose) {
+    let angle = hand.planar.inverse().theta_rad;
+    let mut text = format!("Accepted by hand: {}", units::text_deg(angle));
+    if let Some(truth) = results::truth(cx.state) {
+        text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
+    }
+    ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
+    let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
+    let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
+    if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
+        cx.push(LabelsCommand::AcceptPose(source, false));
+    }
 }
 
 /// Angle and place of one comparison as two lines.

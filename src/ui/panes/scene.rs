@@ -11,9 +11,10 @@ mod measure;
 mod overlay;
 mod section;
 mod steps;
+mod strip;
 mod verdict;
 
-use eframe::egui::{self, Color32, Ui};
+use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
@@ -28,12 +29,15 @@ use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
 use crate::app::results;
-use crate::app::state::Lookup;
+use crate::app::settings::{SceneSides, prefer};
+use crate::app::state::{Lookup, State};
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
 use crate::gpu::view::{Camera, Preset};
 use crate::ui::parts::cx::Cx;
+use crate::ui::parts::made_with;
 use crate::ui::parts::scene_view::{Grip, SceneOutput, SceneView};
+use crate::ui::parts::theme::SMALL;
 use crate::ui::parts::widget::empty;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
@@ -42,10 +46,10 @@ use touch2touch_work::cloud::Clouds;
 pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(crate) use layers::{DISTANCE_MAP, outline};
 pub(crate) use legend::distances;
-pub(crate) use overlay::{angle_text, error_color, pose_details, pose_time};
+pub(crate) use overlay::{error_color, pose_details, pose_time};
 
-/// Width of the column of buttons, points.
-const BUTTONS: f32 = 28.0;
+/// Height of the row above the views, points.
+const HEAD: f32 = 24.0;
 
 /// Distance of the pointer from a point at which it means it, physical pixels.
 const PICK_PX: f64 = 9.0;
@@ -77,6 +81,10 @@ pub(crate) struct Memory {
     moved: Option<(u64, ImprintSource)>,
     /// Counts what was made for the renderer.
     revision: u64,
+    /// The side whose view is under the pointer.
+    pub hovered: Option<ImprintSource>,
+    /// True where the legend is unfolded.
+    legend_open: bool,
 }
 
 impl Memory {
@@ -87,7 +95,10 @@ impl Memory {
                 CameraPreset::Left => Preset::Left,
                 CameraPreset::Right => Preset::Right,
                 CameraPreset::Front => Preset::Front,
+                CameraPreset::Back => Preset::Back,
                 CameraPreset::Top => Preset::Top,
+                CameraPreset::Bottom => Preset::Bottom,
+                CameraPreset::Oblique => Preset::Oblique,
             });
         }
     }
@@ -144,16 +155,79 @@ impl Memory {
     }
 }
 
-/// The pane of one side.
-pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane) {
-    let source = if pane == Pane::SceneMeasured { ImprintSource::Measured } else { ImprintSource::Predicted };
-    let device = match cx.device {
-        Ok(device) => device,
-        Err(why) => {
-            empty::show(ui, "No 3D views on this graphics device", why, None);
-            return;
-        }
+/// The pane: a view of each side that is chosen, and one strip for them.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
+    if let Err(why) = cx.device {
+        empty::show(ui, "No 3D views on this graphics device", why, None);
+        return;
+    }
+    let open = cx.state.library.open.as_ref().map(|open| open.seq);
+    if memory.fitted != open {
+        memory.fitted = open;
+        memory.fit();
+    }
+    for view in &mut memory.views {
+        view.camera.orthographic = cx.state.settings.scene.orthographic;
+    }
+    let full = ui.available_rect_before_wrap();
+    ui.advance_cursor_after_rect(full);
+    let (area, column) = full.split_left_right_at_x((full.right() - strip::WIDTH).max(full.left()));
+    let (head, area) = area.split_top_bottom_at_y((area.top() + HEAD).min(area.bottom()));
+    ui.scope_builder(UiBuilder::new().max_rect(head.shrink2(vec2(4.0, 2.0))), |ui| {
+        ui.horizontal_centered(|ui| {
+            choose_sides(cx, ui);
+            section::bar(cx, ui);
+        });
+    });
+    memory.hovered = None;
+    let sides = sides_shown(cx.state);
+    for (side, place) in sides.iter().zip(beside(area, sides.len())) {
+        let mut child = ui.new_child(UiBuilder::new().max_rect(place).id_salt(("view", *side as usize)));
+        child.set_clip_rect(place.intersect(ui.clip_rect()));
+        one_side(cx, &mut child, memory, *side, sides.first() == Some(side));
+    }
+    strip::show(cx, ui, column);
+}
+
+/// The sides that are chosen, without those that have nothing to show beside one that has.
+fn sides_shown(state: &State) -> Vec<ImprintSource> {
+    let chosen = state.settings.scene_sides().list();
+    let there = |side: &&ImprintSource| !matches!(results::cloud(state, **side), Lookup::Absent(_));
+    let shown: Vec<ImprintSource> = chosen.iter().filter(there).copied().collect();
+    if shown.is_empty() { chosen.first().copied().into_iter().collect() } else { shown }
+}
+
+/// Places of so many views: beside each other where there is the width for it, else one below the other.
+fn beside(area: Rect, count: usize) -> Vec<Rect> {
+    const GAP: f32 = 2.0;
+    let n = count.max(1) as f32;
+    let wide = area.width() >= 0.9 * area.height();
+    let size = match wide {
+        true => vec2((area.width() - GAP * (n - 1.0)) / n, area.height()),
+        false => vec2(area.width(), (area.height() - GAP * (n - 1.0)) / n),
     };
+    let step = if wide { vec2(size.x + GAP, 0.0) } else { vec2(0.0, size.y + GAP) };
+    (0..count).map(|i| Rect::from_min_size(area.min + step * i as f32, size)).collect()
+}
+
+/// Choice of the sides.
+fn choose_sides(cx: &mut Cx<'_>, ui: &mut Ui) {
+    ui.spacing_mut().item_spacing.x = 2.0;
+    let now = cx.state.settings.scene_sides();
+    for sides in SceneSides::iter() {
+        let button =
+            Button::selectable(now == sides, RichText::new(sides.name()).size(SMALL)).min_size(vec2(0.0, 18.0));
+        let tip =
+            "Which sides have a 3D view in this workspace; a side with nothing to show leaves its room to the other";
+        let button = ui.add(button).accessible_name(format!("3D: {}", sides.name().to_lowercase()));
+        if button.on_hover_text(tip).clicked() {
+            cx.push(prefer(move |s| _ = s.sides.insert(s.workspace, sides)));
+        }
+    }
+}
+
+/// The view of one side; the `first` has the legend.
+fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, first: bool) {
     let state = cx.state;
     let lookup = results::cloud(state, source);
     match (lookup, lookup.shown().is_some()) {
@@ -166,37 +240,32 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         }
         _ => {}
     }
+    let Ok(device) = cx.device else { return };
     update(cx, memory, source);
     let label = match source {
         ImprintSource::Measured => "3D view, measured",
         ImprintSource::Predicted => "3D view, predicted",
     };
-    let open = state.library.open.as_ref().map(|open| open.seq);
-    if memory.fitted != open {
-        memory.fitted = open;
-        memory.fit();
-    }
-    for view in &mut memory.views {
-        view.camera.orthographic = state.settings.scene.orthographic;
-    }
     verdict::line(cx, ui, source);
-    section::bar(cx, ui, source);
     let held = match (draw::is_ready(state), memory.drawing == Some(source)) {
         (true, true) => Grip::Stroke,
         (true, false) => Grip::Pen,
         (false, _) if memory.gizmo.holds(source) => Grip::Primary,
         (false, _) => Grip::Nothing,
     };
-    // The buttons and the strip of the pose in hand stand beside the picture, not on it.
+    // The strip of the pose in hand and the line of the prediction stand below the picture, not on it.
     let area = ui.available_rect_before_wrap();
-    let column = area.with_min_x((area.right() - BUTTONS).max(area.left()));
+    let (area, made) = made_with::split(cx, area, source == ImprintSource::Predicted);
     let footer = hands::strip_height(cx.state, source).min(area.height() / 2.0);
-    let picture = egui::Rect::from_min_max(area.min, egui::pos2(column.left(), area.bottom() - footer));
+    let picture = area.with_max_y(area.bottom() - footer);
     let strip = picture.with_min_y(picture.bottom()).with_max_y(area.bottom());
-    let builder = egui::UiBuilder::new().max_rect(picture);
+    let builder = UiBuilder::new().max_rect(picture);
     let output = ui.scope_builder(builder, |ui| memory.views[source as usize].interact(ui, label, held)).inner;
-    if output.pointer.is_some() && state.workbench.side != source && memory.gizmo.is_free() {
-        cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
+    if output.pointer.is_some() {
+        memory.hovered = Some(source);
+        if state.workbench.side != source && memory.gizmo.is_free() {
+            cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
+        }
     }
     let seconds = ui.input(|i| i.time);
     if state.workbench.animate_weakest
@@ -223,16 +292,17 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     if matches!(lookup, Lookup::Stale(_) | Lookup::Waiting) && state.document.stroke.is_none() {
         ui.painter().rect_filled(output.response.rect, 0.0, cx.p.canvas.gamma_multiply(0.45));
     }
+    if let Some(below) = made {
+        made_with::show(cx, ui, label, picture, below);
+    }
     if let Lookup::Ready(clouds) = lookup {
         pick(cx, ui, memory, source, &output, clouds);
         measure::click(cx, memory, source, &output, clouds);
     }
-    overlay::show(cx, ui, memory, source, &output);
+    overlay::show(cx, ui, memory, source, &output, first);
     let rect = output.response.rect;
-    overlay::sides(cx, ui, source, column);
     measure::marks(cx, ui, memory, source, &output);
     gizmo::show(cx, ui, memory, source, &output);
-    hands::tools(cx, ui, source, column);
     hands::strip(cx, ui, source, strip);
     if let Some(clouds) = lookup.shown() {
         draw::show(cx, ui, memory, source, &output, clouds);

@@ -79,12 +79,11 @@ fn flickers(ui: &Ui) -> bool {
 
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let versus = cx.state.settings.compared();
-    let held = egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
-        let held = header(cx, ui, &versus);
+    egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
+        header(cx, ui, &versus);
         figures::show(cx, ui, &versus);
-        held
     });
-    let flipped = held.inner || flickers(ui);
+    let flipped = flickers(ui);
     let full = ui.available_rect_before_wrap();
     ui.advance_cursor_after_rect(full);
     if versus.mode.is_3d() {
@@ -119,40 +118,49 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let rect = Rect::from_min_max(pos2(full.left(), area.bottom()), full.max);
     ui.painter().rect_filled(rect, 0.0, cx.p.panel);
     let mut child = ui.new_child(UiBuilder::new().max_rect(rect.shrink2(vec2(6.0, 0.0))).id_salt("compared bar"));
-    // The error's range is one for all errors.
-    let pane = if versus.mode == VersusMode::Difference { Pane::Error } else { Pane::Compare };
-    bar::color_bar(cx, &mut child, pane, histogram.as_ref());
+    match versus.mode {
+        VersusMode::Difference => bar::error_bar(cx, &mut child, histogram.as_ref()),
+        _ => bar::color_bar(cx, &mut child, histogram.as_ref()),
+    }
 }
 
-/// Choice of what is compared, and how; true while the button is held that shows B in the place of A.
-fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) -> bool {
-    let mut held = false;
+/// Choice of what is compared, and how.
+fn header(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
     ui.spacing_mut().item_spacing = vec2(3.0, 3.0);
     ui.spacing_mut().button_padding = vec2(4.0, 1.0);
     ui.style_mut().override_font_id = Some(egui::FontId::proportional(SMALL));
     let width = ui.available_width();
     ui.horizontal_wrapped(|ui| {
         for letter in [Letter::A, Letter::B] {
-            if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - 54.0) / 2.0) {
+            if let Some(subject) = choose::menu(cx, ui, versus, letter, (width - MODE - 14.0) / 2.0) {
                 cx.push(match letter {
                     Letter::A => prefer(move |s| s.versus_mut().a = subject.clone()),
                     Letter::B => prefer(move |s| s.versus_mut().b = subject.clone()),
                 });
             }
         }
-        cx.action_button(ui, Action::SwapCompared, "Swap");
+        modes(cx, ui, versus);
     });
-    ui.horizontal_wrapped(|ui| {
+}
+
+/// Width of the choice of the way, points.
+const MODE: f32 = 64.0;
+
+/// Choice of the way, with the keys that stand for the rest.
+fn modes(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
+    let combo = egui::ComboBox::from_id_salt("compared by").width(MODE).selected_text(versus.mode.name());
+    let response = combo.show_ui(ui, |ui| {
         for mode in VersusMode::iter() {
-            let tip = cx.keys().fill(&format!("{} ([[compare_mode]]: next)", mode.tooltip()));
-            if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(tip).clicked() {
+            if ui.selectable_label(versus.mode == mode, mode.name()).on_hover_text(mode.tooltip()).clicked() {
                 cx.push(prefer(move |s| s.versus_mut().mode = mode));
             }
         }
-        let button = ui.button("Hold: B").on_hover_text("While F or this is held, B stands in the place of A");
-        held = button.is_pointer_button_down_on();
+        ui.separator();
+        cx.action_button(ui, Action::SwapCompared, "Swap A and B");
     });
-    held
+    let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
+    let tip = cx.keys().fill(&tip.replace("{}", versus.mode.tooltip()));
+    response.response.accessible_name("Way to compare").on_hover_text(tip);
 }
 
 /// The canvas of a picture of `size` pixels, moved together with all bubble images.

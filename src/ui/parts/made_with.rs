@@ -19,34 +19,36 @@ const HEIGHT: f32 = 18.0;
 /// Width of its button.
 const BUTTON: f32 = 64.0;
 
-/// The finger whose prediction a pane shows; `None` of a pane that shows none.
-fn finger_of(cx: &Cx<'_>, pane: Pane) -> Option<PadId> {
-    let predicted = match pane.kind() {
-        Kind::Imprint(source) | Kind::Scene(source) => source == ImprintSource::Predicted,
-        Kind::Error => true,
+/// True where a pane as a whole shows a prediction; a 3D pane has the line below the view that does.
+pub(crate) fn is_predicted(cx: &Cx<'_>, pane: Pane) -> bool {
+    match pane.kind() {
+        Kind::Imprint(source) => source == ImprintSource::Predicted,
         Kind::Steps | Kind::Map => cx.state.inspect.source == ImprintSource::Predicted,
+        Kind::Versus => cx.state.settings.compared().is_error(),
         Kind::Form => pane == Pane::Ledger,
-        Kind::Color | Kind::Versus => false,
-    };
-    let mut fingers =
-        cx.state.fingers().into_iter().filter(|finger| predicted && results::chosen(cx.state, *finger).is_some());
+        Kind::Color | Kind::Scene => false,
+    }
+}
+
+/// The finger whose prediction is shown; `None` where there is none.
+fn finger_shown(cx: &Cx<'_>) -> Option<PadId> {
+    let mut fingers = cx.state.fingers().into_iter().filter(|finger| results::chosen(cx.state, *finger).is_some());
     // One that is out of date is said first.
     fingers.clone().find(|finger| results::outdated(cx.state, *finger).is_some()).or_else(|| fingers.next())
 }
 
-/// A pane's place, and that of the line below it, if it has one.
-pub(crate) fn split(cx: &Cx<'_>, full: Rect, pane: Pane) -> (Rect, Option<Rect>) {
-    if finger_of(cx, pane).is_none() || full.height() < 4.0 * HEIGHT {
+/// The place of what shows a prediction, or does not, and that of the line below it, if it has one.
+pub(crate) fn split(cx: &Cx<'_>, full: Rect, is_predicted: bool) -> (Rect, Option<Rect>) {
+    if !is_predicted || finger_shown(cx).is_none() || full.height() < 4.0 * HEIGHT {
         return (full, None);
     }
     let (place, below) = full.split_top_bottom_at_y(full.bottom() - HEIGHT);
     (place, Some(below))
 }
 
-/// The line; dims the pane above it where its prediction is not the one that is meant.
-pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: Rect) {
-    let Some((finger, recipe)) =
-        finger_of(cx, pane).and_then(|finger| Some((finger, results::chosen(cx.state, finger)?)))
+/// The line; dims what stands above it where its prediction is not the one that is meant. `title` is what shows it.
+pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line: Rect) {
+    let Some((finger, recipe)) = finger_shown(cx).and_then(|finger| Some((finger, results::chosen(cx.state, finger)?)))
     else {
         return;
     };
@@ -84,14 +86,14 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, place: Rect, line: 
     let shown = format!("{lead}{}{settings}", cut_in_the_middle(model, left, width));
     let start = room.left_center() + vec2(6.0, 0.0);
     painter.text(start, Align2::LEFT_CENTER, shown, FontId::proportional(SMALL), color);
-    let response = ui.interact(room, ui.scope_id().with((pane, "made with")), Sense::hover());
+    let response = ui.interact(room, ui.scope_id().with((title, "made with")), Sense::hover());
     response.widget_info(|| eframe::egui::WidgetInfo::labeled(eframe::egui::Role::Label, true, &text));
     response.on_hover_text(format!("{text}. {tip}"));
     if again {
         let place =
             Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
         let button = Button::new(RichText::new("Generate").size(SMALL)).small().min_size(vec2(BUTTON, 16.0));
-        let button = ui.put(place, button).accessible_name(format!("Generate anew, {}", pane.title()));
+        let button = ui.put(place, button).accessible_name(format!("Generate anew, {title}"));
         let tip = cx.keys().behind("Predicts with the settings in force", Action::Generate);
         if button.on_hover_text(tip).clicked() {
             cx.act(Action::Generate);

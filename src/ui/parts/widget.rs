@@ -6,6 +6,7 @@ pub mod curves;
 pub mod cut;
 pub mod empty;
 pub mod help;
+pub mod icon;
 pub mod image_canvas;
 pub mod line;
 pub mod progress;

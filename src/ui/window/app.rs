@@ -324,23 +324,21 @@ impl StudioApp {
             }
             UiRequest::Camera(preset) => {
                 // The view under the pointer turns; linked cameras turn together.
-                let over = self.panes.hovered.filter(|pane| matches!(pane.kind(), Kind::Scene(_)));
-                let only = over.and_then(Pane::side).filter(|_| !self.state.settings.cameras_linked);
+                let over = self.panes.hovered.filter(|pane| pane.kind() == Kind::Scene);
+                let side = over.and(self.panes.memories.scene.hovered);
+                let only = side.filter(|_| !self.state.settings.cameras_linked);
                 self.panes.memories.scene.look_from(only, preset);
             }
             UiRequest::CopyCamera => {
-                let over = self.panes.hovered.and_then(|pane| match pane.kind() {
-                    Kind::Scene(source) => Some(source),
-                    _ => None,
-                });
+                let over = self.panes.memories.scene.hovered;
                 ctx.copy_text(self.panes.memories.scene.camera_text(over.unwrap_or_default()));
             }
             UiRequest::Fit => {
                 let memories = &mut self.panes.memories;
                 match self.panes.hovered.map(Pane::kind) {
-                    Some(Kind::Scene(_)) => memories.scene.fit(),
+                    Some(Kind::Scene) => memories.scene.fit(),
                     Some(Kind::Color) => self.shared.views.fit(Some(SensorKind::Color)),
-                    Some(Kind::Imprint(_) | Kind::Error) => self.shared.views.fit(Some(SensorKind::Depth)),
+                    Some(Kind::Imprint(_) | Kind::Versus) => self.shared.views.fit(Some(SensorKind::Depth)),
                     _ => {
                         self.shared.views.fit(None);
                         memories.scene.fit();

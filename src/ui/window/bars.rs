@@ -32,8 +32,6 @@ pub(crate) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.spacing_mut().item_spacing.x = 4.0;
                 cx.action_button(ui, Action::ShortcutSheet, "?");
-                let dark = cx.state.settings.theme == Theme::Dark;
-                cx.action_button(ui, Action::SwitchTheme, if dark { "Light" } else { "Dark" });
                 edited = view_menu(cx, ui, tree);
                 let width = 190.0;
                 let text = RichText::new("Find anything").color(cx.p.weak);
@@ -66,6 +64,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Path…").on_hover_text("Type or paste a path").clicked() {
             cx.shared.dialogs.type_path(Purpose::Folder, "");
         }
+        recent(cx, ui);
         ui.separator();
         for action in [
             Action::SaveCase,
@@ -92,32 +91,62 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
     response.on_hover_text("Open a data set, export and import masks, train on them");
 }
 
-/// Shows and hides panes of the workspace; whether it did.
+/// The places that were open before.
+fn recent(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let recent: Vec<_> = cx.state.settings.recent.iter().filter(|place| **place != Place::Demo).cloned().collect();
+    if recent.is_empty() {
+        return;
+    }
+    ui.menu_button("Recent", |ui| {
+        for place in recent {
+            let text = place.to_string();
+            let short = text.rsplit('/').next().unwrap_or(&text).to_owned();
+            if ui.button(short).on_hover_text(text).clicked() {
+                cx.push(LibraryCommand::Open(place));
+            }
+        }
+    });
+}
+
+/// Shows and hides panes of the workspace, each once; whether it did.
 fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
     let mut edited = false;
     let (response, _) = egui::containers::menu::MenuButton::new("View").ui(ui, |ui| {
-        ui.set_min_width(200.0);
+        ui.set_min_width(220.0);
         ui.label(caption("Panes of this workspace", cx.p));
         for pane in Pane::of(cx.state.settings.workspace) {
             let Some(id) = tree.tiles.find_pane(&pane) else { continue };
-            let mut shown = tree.is_visible(id);
-            if ui.checkbox(&mut shown, pane.title()).on_hover_text("Show or hide this pane").changed() {
-                tree.set_visible(id, shown);
-                edited = true;
-            }
+            let mut open = tree.is_visible(id);
+            ui.horizontal(|ui| {
+                if ui.checkbox(&mut open, pane.title()).on_hover_text(pane.tip()).changed() {
+                    tree.set_visible(id, open);
+                    if open {
+                        tree.make_active(|tile, _| tile == id);
+                    }
+                    edited = true;
+                }
+                if cx.state.selection.panes.contains(&pane) {
+                    ui.label(caption("on screen", cx.p));
+                }
+            });
         }
         ui.separator();
-        for action in
-            [Action::DepthChain, Action::BothFingers, Action::Footprint, Action::MaskVisible, Action::LinkCameras]
-        {
-            cx.action_button(ui, action, action.name());
+        let (settings, selection) = (&cx.state.settings, &cx.state.selection);
+        let dark = settings.theme == Theme::Dark;
+        for (action, on) in [
+            (Action::BothFingers, selection.both_fingers),
+            (Action::Footprint, settings.footprint_visible),
+            (Action::MaskVisible, settings.mask_visible),
+            (Action::SwitchTheme, dark),
+        ] {
+            cx.action_switch(ui, action, action.name(), on);
         }
         ui.separator();
         for action in [Action::ResetWorkspace, Action::Fullscreen] {
             cx.action_button(ui, action, action.name());
         }
     });
-    response.on_hover_text("What is shown");
+    response.on_hover_text("What is shown: panes, fingers, marks, colors of the window");
     edited
 }
 
@@ -137,6 +166,7 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
         Workspace::Align => Action::AlignWorkspace,
         Workspace::Label => Action::LabelWorkspace,
         Workspace::Evaluate => Action::EvaluateWorkspace,
+        Workspace::Adapt => Action::AdaptWorkspace,
     };
     if response.on_hover_text(tip.tooltip()).clicked() {
         cx.push(prefer(move |s| s.workspace = workspace));

@@ -12,7 +12,7 @@ use crate::app::export;
 use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
 use crate::app::keys::ImprintSource;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{SMALL, caption};
+use crate::ui::parts::theme::caption;
 use touch2touch_work::figure::{FigurePane, FigureTheme};
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
@@ -171,19 +171,9 @@ fn preview(cx: &Cx<'_>, ui: &mut Ui, [columns, rows]: [usize; 2], size: [u32; 2]
     }
 }
 
-/// The button in a pane's title that opens [`menu`].
-pub(crate) fn button(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
-    let text = RichText::new("…").size(SMALL);
-    let button = egui::Button::new(text).frame(false).min_size(vec2(16.0, 16.0));
-    let (response, _) =
-        egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| menu(cx, ui, pane, error_m));
-    response.accessible_name(format!("Export {}", pane.title())).on_hover_text("Save or copy what this pane shows");
-}
-
 /// Menu of the files that a pane offers.
 pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
-    ui.set_min_width(190.0);
-    if pane.in_figure().is_some() {
+    if export::in_figure(cx.state, pane).is_some() {
         ui.label(caption("Picture with bar, unit and scale bar", cx.p));
         ui.horizontal(|ui| {
             for scale in [Some(1), Some(2), Some(4), None] {

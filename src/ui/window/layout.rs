@@ -11,7 +11,7 @@ use egui_tiles::{Container, Linear, LinearDir, Tile, TileId, Tiles, Tree};
 use crate::app::pane::{Dock, Pane, Workspace};
 
 /// Part of the stored text: a layout of another version is not even tried.
-const FORMAT: &str = "touch2touch-layout-2";
+const FORMAT: &str = "touch2touch-layout-3";
 
 /// Shares of the window that the docks of a workspace take; of rows with fewer docks the first shares count.
 struct Shares {
@@ -32,6 +32,7 @@ fn shares(workspace: Workspace) -> Shares {
         Workspace::Align => Shares { columns: [0.13, 0.64, 0.23], middle: [1.15, 0.85], bottom, right: [1.2, 0.8] },
         Workspace::Label => Shares { columns, middle: [1.25, 0.75], bottom: [1.0, 1.4, 1.0], right: [1.5, 0.5] },
         Workspace::Evaluate => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
+        Workspace::Adapt => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
     }
 }
 
@@ -55,7 +56,9 @@ pub(crate) fn default_tree(workspace: Workspace) -> Tree<Pane> {
     let mut docks: BTreeMap<Dock, Vec<TileId>> = BTreeMap::new();
     for pane in Pane::of(workspace) {
         if let Some(dock) = pane.dock(workspace) {
-            docks.entry(dock).or_default().push(tiles.insert_pane(pane));
+            let id = tiles.insert_pane(pane);
+            tiles.set_visible(id, !pane.is_closed_at_first());
+            docks.entry(dock).or_default().push(id);
         }
     }
     let docks: Vec<(Dock, TileId)> =

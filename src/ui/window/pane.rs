@@ -8,6 +8,7 @@ use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles,
 use crate::app::action::Action;
 use crate::app::pane::{Kind, Pane, panes};
 use crate::ui::parts::cx::{Cx, side_color};
+use crate::ui::parts::made_with;
 use crate::ui::parts::theme::{SMALL, medium};
 use crate::ui::parts::widget::help;
 
@@ -52,28 +53,57 @@ fn show(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pane: Pane) {
         panes.hovered = Some(pane);
     }
     // How a prediction was made stands below whatever shows it.
-    let (place, below) = crate::ui::parts::made_with::split(cx, ui.max_rect(), pane);
+    let (place, below) = made_with::split(cx, ui.max_rect(), made_with::is_predicted(cx, pane));
     ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
         ui.set_clip_rect(place.intersect(ui.clip_rect()));
         draw(cx, ui, &mut panes.memories, pane);
     });
     if let Some(below) = below {
-        crate::ui::parts::made_with::show(cx, ui, pane, place, below);
+        made_with::show(cx, ui, pane.title(), place, below);
     }
 }
 
-/// The help mark of a pane, if it has mouse controls of its own.
-fn help_mark(cx: &Cx<'_>, ui: &mut Ui, pane: Pane) {
-    let controls = match pane.kind() {
-        Kind::Form => return,
+/// The mouse controls of a pane; none where it has none of its own.
+fn controls(cx: &Cx<'_>, pane: Pane) -> &'static [(&'static str, &'static str)] {
+    match pane.kind() {
+        Kind::Form => &[],
         Kind::Imprint(_) if cx.state.selection.panes.contains(&Pane::Masks) => help::PAINT,
-        Kind::Color | Kind::Imprint(_) | Kind::Error => help::IMAGE,
+        Kind::Color | Kind::Imprint(_) => help::IMAGE,
         Kind::Versus => help::VERSUS,
-        Kind::Scene(_) => help::SCENE,
+        Kind::Scene => help::SCENE,
         Kind::Steps => help::STEPS,
         Kind::Map => help::BASIN,
-    };
-    help::mark(ui, pane.title(), controls, cx.keys());
+    }
+}
+
+/// The menu in a pane's title: the pane itself, its mouse controls, what can be taken away.
+fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) {
+    ui.set_min_width(190.0);
+    let whole = *maximized == Some(pane);
+    let text = if whole { "Back to all panes" } else { "Fill the window" };
+    let fill = egui::Button::new(text).shortcut_text(cx.keys().text(Action::MaximizePane));
+    let fill = ui.add(fill).accessible_name(format!("{text}: {}", pane.title()));
+    if fill.on_hover_text("Lets this pane fill the window, or shows all again; so does a double-click").clicked() {
+        *maximized = if whole { None } else { Some(pane) };
+        ui.close();
+    }
+    let controls = controls(cx, pane);
+    if !controls.is_empty() {
+        ui.menu_button("Mouse and keys", |ui| help::list(ui, pane.title(), controls, cx.keys()));
+    }
+    ui.separator();
+    super::export::menu(cx, ui, pane, cx.shared.views.error_m());
+}
+
+/// The button in a pane's title that opens its menu.
+fn menu_button(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) {
+    let text = RichText::new("…").size(SMALL);
+    let button = egui::Button::new(text).frame(false).min_size(vec2(16.0, 16.0));
+    let (response, _) =
+        egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| menu(cx, ui, maximized, pane));
+    response
+        .accessible_name(format!("Menu of {}", pane.title()))
+        .on_hover_text("Fill the window, mouse and keys, save or copy what this pane shows");
 }
 
 /// Behavior of the panes in their tree.
@@ -105,8 +135,8 @@ impl Behavior<Pane> for Docking<'_, '_> {
                 if response.double_clicked() {
                     self.panes.maximized = Some(*pane);
                 }
-                let error_m = self.cx.shared.views.error_m();
-                response.context_menu(|ui| super::export::menu(self.cx, ui, *pane, error_m));
+                let (cx, maximized) = (&mut *self.cx, &mut self.panes.maximized);
+                response.context_menu(|ui| menu(cx, ui, maximized, *pane));
                 response.on_hover_text(format!("{}. Drag to move, double-click to maximize", pane.tip()))
             }
             _ => response,
@@ -122,20 +152,8 @@ impl Behavior<Pane> for Docking<'_, '_> {
         _scroll: &mut f32,
     ) {
         let Some(Tile::Pane(pane)) = tabs.active.and_then(|id| tiles.get(id)) else { return };
-        ui.spacing_mut().item_spacing.x = 2.0;
         ui.add_space(4.0);
-        let response = ui
-            .add(egui::Button::new("").frame(false).min_size(vec2(16.0, 16.0)))
-            .accessible_name(format!("Maximize {}", pane.title()));
-        let color = if response.hovered() { self.cx.p.strong } else { self.cx.p.weak };
-        let square = egui::Rect::from_center_size(response.rect.center(), vec2(8.0, 8.0));
-        ui.painter().rect_stroke(square, 1.0, Stroke::new(1.25, color), egui::StrokeKind::Inside);
-        let tip = self.cx.keys().behind("Let this pane fill the window", Action::MaximizePane);
-        if response.on_hover_text(tip).clicked() {
-            self.panes.maximized = Some(*pane);
-        }
-        help_mark(self.cx, ui, *pane);
-        super::export::button(self.cx, ui, *pane, self.cx.shared.views.error_m());
+        menu_button(self.cx, ui, &mut self.panes.maximized, *pane);
     }
 
     fn tab_bar_height(&self, _style: &egui::Style) -> f32 {
@@ -203,8 +221,7 @@ pub(crate) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
                 {
                     panes.maximized = None;
                 }
-                help_mark(cx, ui, pane);
-                super::export::button(cx, ui, pane, cx.shared.views.error_m());
+                menu_button(cx, ui, &mut panes.maximized, pane);
             });
         });
     });

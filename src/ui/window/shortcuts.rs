@@ -82,7 +82,7 @@ pub(crate) fn pressed(
 
 /// True where an action's keys mean it while the pointer is over a pane. Space presses what has the focus elsewhere.
 pub(crate) fn fits_pane(action: Action, over: Option<Pane>) -> bool {
-    action != Action::PlaySteps || over.is_some_and(|pane| matches!(pane.kind(), Kind::Steps | Kind::Scene(_)))
+    action != Action::PlaySteps || over.is_some_and(|pane| matches!(pane.kind(), Kind::Steps | Kind::Scene))
 }
 
 #[cfg(test)]

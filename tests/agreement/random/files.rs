@@ -1,7 +1,7 @@
 //! Files: a pair for other programs, pictures, cases.
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::ExportCommand;
+use touch2touch::app::command::{ExportCommand, WorkbenchCommand};
 use touch2touch::app::export::Output;
 use touch2touch::app::{recipe, results};
 use touch2touch_work::case::{self, Case};
@@ -18,17 +18,19 @@ pub(in crate::agreement) fn a_random_recipe_exports_the_same_files_by_button_and
     let mut counts = Vec::new();
     // Pictures have no points in space.
     for mut both in Both::places(home.path()).take(2) {
-        both.show(&[Pane::Predicted, Pane::SceneMeasured, Pane::ScenePredicted]);
+        both.show(&[Pane::Predicted, Pane::Scene]);
         let mut count = 0;
         for at in 0..2 {
             let recipe = draws.posed();
             both.predict(&recipe, 13 * at);
-            for (pane, source) in [Pane::SceneMeasured, Pane::ScenePredicted].into_iter().zip(ImprintSource::iter()) {
+            for source in ImprintSource::iter() {
+                // A command is about the side under the pointer.
+                both.studio.send(WorkbenchCommand::SetSide(source).into());
                 let what = format!("{} {source:?}, {recipe:?}", both.studio.state.pair_name());
                 let folder = both.home.parent().unwrap().join(format!("exported-{at}-{}", source.key()));
                 let there = results::pose(&both.studio.state, source).ready().is_some();
                 both.studio.send(ExportCommand::Write(Output::Pair(source), folder.clone()).into());
-                let said = both.said(pane);
+                let said = both.said(Pane::Scene);
                 assert_eq!(there, said.is_ok(), "{what}: {said:?}");
                 let Ok(said) = said else { continue };
                 for file in said["files"].as_array().unwrap() {
@@ -50,7 +52,7 @@ pub(in crate::agreement) fn a_random_recipe_draws_the_same_pictures_by_button_an
     let home = tempfile::tempdir().unwrap();
     let mut draws = Draws::new(11);
     let mut counts = Vec::new();
-    let panes = [Pane::GelDifference, Pane::GelRaw, Pane::Measured, Pane::Predicted, Pane::Error];
+    let panes = [Pane::GelSlim, Pane::Measured, Pane::Predicted, Pane::Compare];
     for mut both in Both::places(home.path()) {
         both.show(&panes);
         let mut count = 0;
@@ -112,7 +114,7 @@ pub(in crate::agreement) fn a_case_of_a_random_recipe_is_the_same_by_button_and_
     let mut draws = Draws::new(12);
     let mut counts = Vec::new();
     for mut both in Both::places(home.path()) {
-        both.show(&[Pane::Predicted, Pane::ScenePredicted, Pane::SceneMeasured]);
+        both.show(&[Pane::Predicted, Pane::Scene]);
         let recipe = draws.posed();
         both.predict(&recipe, 44);
         let what = format!("{}, {recipe:?}", both.studio.state.pair_name());

@@ -58,7 +58,7 @@ pub(in crate::agreement) fn random_edits_of_masks_by_hand_are_those_of_the_verb(
     let home = tempfile::tempdir().unwrap();
     let (mut both, twin) = twins(home.path());
     let mut draws = Draws::new(13);
-    both.show(&[Pane::Measured, Pane::Predicted, Pane::Masks, Pane::SceneMeasured, Pane::ScenePredicted]);
+    both.show(&[Pane::Measured, Pane::Predicted, Pane::Masks, Pane::Scene]);
     both.studio.send(prefer(|s| (s.mask.tool, s.mask.radius_px) = (MaskTool::Brush, 3.0)).into());
     let mut counts = Vec::new();
     for pair in 0..2 {

@@ -133,7 +133,7 @@ pub(in crate::agreement) fn what_a_random_angle_hangs_on_is_the_same_over_the_im
     let mut counts = Vec::new();
     for mut both in with_poses(home.path()) {
         let mut count = 0;
-        both.show(&[Pane::Measured, Pane::Predicted, Pane::SceneMeasured, Pane::ScenePredicted]);
+        both.show(&[Pane::Measured, Pane::Predicted, Pane::Scene]);
         both.studio.send(ViewCommand::ShowInfluence(true).into());
         for at in 0..2 {
             let gate = Rejection::gate(draws.one(0.5..2.0f64) / 1e3).unwrap();

@@ -34,7 +34,7 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
     let (mut counts, mut shifted) = (Vec::new(), Vec::new());
     // The demo has 96 pairs, which take minutes.
     for mut both in Both::places(home.path()).skip(1) {
-        both.show(&[Pane::Predicted, Pane::Error, Pane::Metrics]);
+        both.show(&[Pane::Predicted, Pane::Compare, Pane::Metrics]);
         let recipe = draws.posed();
         put(&mut both.studio, &recipe);
         let words = recipe::in_force(&both.studio.state, ImprintSource::Predicted).words(Stage::Prediction).list();

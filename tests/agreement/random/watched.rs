@@ -83,7 +83,7 @@ pub(in crate::agreement) fn what_lies_in_a_folder_is_watched_to_the_numbers_that
     let mut draws = Draws::new(16);
     let mut counts = Vec::new();
     for mut both in Both::places(home.path()).skip(1) {
-        both.show(&[Pane::Predicted, Pane::Masks, Pane::Error, Pane::Metrics, Pane::ScenePredicted]);
+        both.show(&[Pane::Predicted, Pane::Masks, Pane::Compare, Pane::Metrics, Pane::Scene]);
         let recipe = loop {
             let recipe = draws.posed();
             // A new touch has no true pose.
@@ -118,7 +118,7 @@ pub(in crate::agreement) fn what_arrives_is_followed_by_the_studio_to_the_number
     let mut draws = Draws::new(17);
     let folder = lab_folder(home.path());
     let mut both = Both::open(Place::Path(folder.clone()), home.path());
-    both.show(&[Pane::Predicted, Pane::Masks, Pane::Error, Pane::Metrics, Pane::ScenePredicted]);
+    both.show(&[Pane::Predicted, Pane::Masks, Pane::Compare, Pane::Metrics, Pane::Scene]);
     let mut recipe = draws.posed();
     recipe.mask.source = MaskSource::TopPercent;
     put(&mut both.studio, &recipe);

@@ -30,8 +30,8 @@ use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
-    Change, ColorMap, ColorRange, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings, MaskSource,
-    MaskTool, SceneLayer, SceneLook, Settings, Theme, Versus, VersusMode, Workspace,
+    Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
+    MaskSource, MaskTool, SceneLayer, SceneLook, SceneSides, Settings, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
@@ -236,6 +236,8 @@ fn change() -> impl Strategy<Value = Change> {
         1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
         1 => any::<u32>().prop_map(|v| prefer(move |s| s.cache_mib = v)),
         1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
+        1 => any_of::<SceneSides>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
+        1 => any_of::<GelView>().prop_map(|gel| prefer(move |s| s.gel = gel)),
         1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
         1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
         1 => key.prop_map(|(action, place, key)| prefer(move |s| s.keys.bind(action, place, key))),

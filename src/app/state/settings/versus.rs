@@ -10,11 +10,11 @@ use touch2touch_work::subject::Subject;
 #[serde(rename_all = "snake_case")]
 pub enum VersusMode {
     /// A at the left, B at the right.
-    #[default]
     Side,
     /// A at the left of a line that is dragged, B at the right of it.
     Wipe,
     /// A minus B.
+    #[default]
     Difference,
     /// Both clouds in 3D.
     Clouds,
@@ -70,6 +70,11 @@ impl Default for Versus {
 }
 
 impl Versus {
+    /// True where it is the error: what is predicted minus what was measured, as at first.
+    pub fn is_error(&self) -> bool {
+        *self == Self::default()
+    }
+
     /// A in place of B and the other way round.
     #[must_use]
     pub fn swapped(self) -> Self {

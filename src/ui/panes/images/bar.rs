@@ -5,7 +5,7 @@ use eframe::egui::{Button, Rect, RichText, Ui, UiBuilder, pos2, vec2};
 
 use super::{map_of, scale_note};
 use crate::app::action::Action;
-use crate::app::command::{Pane, SettingsCommand};
+use crate::app::command::SettingsCommand;
 use crate::app::settings::ColorRange;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::SMALL;
@@ -41,31 +41,32 @@ const AUTO: &str = "Set the range once from what is shown";
 /// Tooltip of the lock.
 const LOCK: &str = "Locked: colors mean the same in every pair. Unlocked: set from each pair shown";
 
-/// The bar of a pane's pictures: that of errors, else that of depth.
-pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, histogram: Option<&Histogram>) {
-    let note = scale_note(cx.state);
-    if pane == Pane::Error {
-        let bar = Colorbar {
-            label: "Error range",
-            map: ColorMap::Diverging,
-            default: Range::symmetric(4.0),
-            symmetric: true,
-            histogram,
-            locked: None,
-            note,
-            tips: [AUTO.to_owned(), String::new()],
-        };
-        match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
-            Some(ColorbarChange::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
-            Some(ColorbarChange::Auto) => {
-                if let Some(h) = histogram {
-                    cx.shared.views.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
-                }
+/// The bar of differences.
+pub(crate) fn error_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogram>) {
+    let bar = Colorbar {
+        label: "Error range",
+        map: ColorMap::Diverging,
+        default: Range::symmetric(4.0),
+        symmetric: true,
+        histogram,
+        locked: None,
+        note: scale_note(cx.state),
+        tips: [AUTO.to_owned(), String::new()],
+    };
+    match bar.show(ui, Range::symmetric(cx.shared.views.error_mm)) {
+        Some(ColorbarChange::Range(range)) => cx.shared.views.error_mm = range.hi.clamp(0.05, 100.0),
+        Some(ColorbarChange::Auto) => {
+            if let Some(h) = histogram {
+                cx.shared.views.error_mm = (h.span.lo.abs().max(h.span.hi.abs()) * 1e3).clamp(0.05, 100.0);
             }
-            Some(ColorbarChange::Lock(_)) | None => {}
         }
-        return;
+        Some(ColorbarChange::Lock(_)) | None => {}
     }
+}
+
+/// The bar of imprints.
+pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogram>) {
+    let note = scale_note(cx.state);
     let (range, keys) = (cx.state.settings.range, cx.keys());
     let default = ColorRange::default();
     let bar = Colorbar {

@@ -1,57 +1,16 @@
-//! Hands on: the buttons of the tools in a 3D view, and the strip of the pose that a hand holds.
+//! Hands on: the strip of the pose that a hand holds.
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 
-use super::overlay::SIDES;
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::results;
-use crate::app::settings::SceneLayer;
 use crate::app::state::State;
-use crate::app::workbench::{Layer, ManualTry, SceneTool};
+use crate::app::workbench::{ManualTry, SceneTool};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::manual::{ManualCost, ManualPose, PoseDifference};
 use touch2touch_core::units;
-
-/// The tools, below the buttons that turn the view; those that do not fit are left to menu and keys.
-pub(super) fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column: Rect) {
-    let place = column.shrink2(vec2(2.0, 4.0)).with_min_y(column.top() + SIDES);
-    let fit = (place.height() / 26.0).floor().max(0.0) as usize;
-    let builder = UiBuilder::new().max_rect(place).id_salt(("tools", source as usize));
-    ui.scope_builder(builder, |ui| {
-        ui.spacing_mut().item_spacing.y = 2.0;
-        let side = source.name().to_lowercase();
-        let bench = &cx.state.workbench;
-        let scene = &cx.state.settings.scene;
-        let (tool, both, layer) = (bench.tool, bench.both_clouds, bench.layer);
-        for (action, letter, on) in [
-            (Action::PoseTool, "P", tool == SceneTool::Pose),
-            (Action::MeasureDistance, "D", tool == SceneTool::Distance),
-            (Action::MeasureAngle, "A", tool == SceneTool::Angle),
-            (Action::PaintIn3d, "B", tool == SceneTool::Paint),
-            (Action::NextLayer, "V", layer != Layer::None),
-            (Action::BothClouds, "2", both),
-            (Action::Section, "X", cx.state.workbench.section.is_some()),
-            (Action::WindowOnly, "W", scene.only_window),
-            (Action::MembraneSurface, "M", scene.layer(SceneLayer::Surface).shown),
-            (Action::Parallel, "I", scene.orthographic),
-        ]
-        .into_iter()
-        .take(fit)
-        {
-            let color = if on { cx.p.strong } else { cx.p.weak };
-            let text = RichText::new(letter).size(11.0).color(color);
-            let fill = if on { cx.p.selected } else { cx.p.panel };
-            let button = Button::new(text).min_size(vec2(24.0, 18.0)).fill(fill);
-            let response = ui.add_enabled(action.command(cx.state).is_some(), button);
-            let response = response.accessible_name(format!("{}, {side}", action.name()));
-            if response.on_hover_text(cx.keys().help(action)).clicked() {
-                cx.act(action);
-            }
-        }
-    });
-}
 
 /// The pose that a hand holds on a side, or would hold.
 fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {

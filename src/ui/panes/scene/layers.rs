@@ -25,6 +25,9 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::verdict::Grade;
 
+/// Bars of a histogram of distances.
+const BARS: usize = 37;
+
 /// Time of one sway to and fro, seconds.
 const SWAY_S: f64 = 2.0;
 
@@ -37,6 +40,23 @@ pub(super) struct LayerColors {
     fingers: PerPad<PointColors>,
     /// Of distances: the model's painted surface, and the pose that it is of.
     surface: Option<(Arc<TriMesh>, Arc<[f32]>, DAffine3)>,
+}
+
+impl LayerColors {
+    /// Counts of contact points by distance, from one end of the color map to the other; those beyond are in the last
+    /// ones. `None` of what is not painted with distances.
+    pub(super) fn histogram(&self) -> Option<[usize; BARS]> {
+        self.surface.as_ref()?;
+        let mut counts = [0; BARS];
+        for (_, colors) in self.fingers.entries() {
+            let PointColors::Scalar(values) = colors else { continue };
+            for value in values.iter().filter(|value| value.is_finite()) {
+                let share = (value - self.range.lo) / (self.range.hi - self.range.lo);
+                counts[((share * BARS as f32).max(0.0) as usize).min(BARS - 1)] += 1;
+            }
+        }
+        Some(counts)
+    }
 }
 
 /// The colors of distances: blue inside, red outside.

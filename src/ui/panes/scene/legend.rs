@@ -34,31 +34,92 @@ struct Row {
     text: String,
 }
 
-/// The list at the lower left corner, and the bar of the color map at the lower right one.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, rect: Rect) {
+/// The list at the lower left corner of the `first` view, folded to its colors until somebody asks; and the bar of the
+/// color map at the lower right one.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect, first: bool) {
+    if first && memory.legend_open {
+        unfolded(cx, ui, memory, source, rect);
+    } else if first {
+        folded(cx, ui, memory, source, rect);
+    }
+    let painted = memory.layer_colors[source as usize].is_some();
+    match cx.state.workbench.layer {
+        Layer::Residuals if painted => residuals(cx, &ui.painter_at(rect), source, rect),
+        Layer::Distance if painted => {
+            histogram(cx, &ui.painter_at(rect), memory, source, rect);
+            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
+        }
+        Layer::Distance if results::pose(cx.state, source).shown().is_some() => {
+            let font = FontId::proportional(11.0);
+            let at = bar(rect).right_top();
+            ui.painter_at(rect).text(at, Align2::RIGHT_BOTTOM, "distances: computing…", font, cx.p.text);
+        }
+        _ => {}
+    }
+}
+
+/// The colors of what is drawn, in a row; a click unfolds the list.
+fn folded(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
+    const DOT: f32 = 11.0;
+    let shown = |row: &Row| row.layer.is_none_or(|layer| cx.state.settings.scene.layer(layer).shown);
+    let rows: Vec<Row> = rows(cx, memory, source).into_iter().filter(shown).collect();
+    let size = vec2(DOT * rows.len() as f32 + 8.0, 18.0);
+    let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - size.y), size);
+    let response = ui.interact(place, ui.scope_id().with("legend"), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, "Legend"));
+    let fill = if response.hovered() { cx.p.control[1] } else { cx.p.canvas.gamma_multiply(0.6) };
+    ui.painter().rect_filled(place, 9.0, fill);
+    for (i, row) in rows.iter().enumerate() {
+        let center = place.left_center() + vec2(4.0 + DOT * (i as f32 + 0.5), 0.0);
+        ui.painter().circle_filled(center, 3.5, row.color);
+    }
+    let clicked = response.clicked();
+    response.on_hover_ui(|ui| {
+        ui.label(RichText::new("Legend: a click shows switches, colors and sizes").size(SMALL));
+        for row in &rows {
+            ui.label(RichText::new(&row.text).size(SMALL).color(row.color));
+        }
+    });
+    memory.legend_open |= clicked;
+}
+
+/// The whole list, with its switches.
+fn unfolded(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, rect: Rect) {
     let rows = rows(cx, memory, source);
     // A small pane keeps its picture.
     let most = ((rect.height() * 0.6) / ROW).floor().max(1.0) as usize;
-    let height = rows.len().min(most) as f32 * ROW;
+    let height = (rows.len().min(most) + 1) as f32 * ROW;
     let place = Rect::from_min_size(pos2(rect.left() + 6.0, rect.bottom() - 6.0 - height), vec2(WIDTH, height));
     ui.painter().rect_filled(place.expand(2.0), 3.0, cx.p.canvas.gamma_multiply(0.6));
-    let builder = UiBuilder::new().max_rect(place).id_salt(("legend", source as usize));
+    let builder = UiBuilder::new().max_rect(place).id_salt("legend");
     ui.scope_builder(builder, |ui| {
         ui.spacing_mut().item_spacing = vec2(2.0, 0.0);
         ui.spacing_mut().interact_size.y = ROW;
         ui.spacing_mut().button_padding = vec2(2.0, 0.0);
+        let fold = Button::new(RichText::new("Fold").size(SMALL).color(cx.p.weak)).frame(false);
+        if ui.add(fold.min_size(vec2(0.0, ROW))).on_hover_text("Folds the legend to its colors").clicked() {
+            memory.legend_open = false;
+        }
         for row in rows.into_iter().take(most) {
             line(cx, ui, source, &row);
         }
     });
-    match cx.state.workbench.layer {
-        Layer::Residuals if memory.layer_colors[source as usize].is_some() => {
-            residuals(cx, &ui.painter_at(rect), source, rect)
-        }
-        Layer::Distance if memory.layer_colors[source as usize].is_some() => {
-            distances(cx, ui, &source.name().to_lowercase(), "inside ", rect);
-        }
-        _ => {}
+}
+
+/// How many contact points have which distance, above the bar of their colors.
+fn histogram(cx: &Cx<'_>, painter: &Painter, memory: &Memory, source: ImprintSource, rect: Rect) {
+    const HIGH: f32 = 26.0;
+    let Some(counts) = memory.layer_colors[source as usize].as_ref().and_then(|colors| colors.histogram()) else {
+        return;
+    };
+    let (bar, most) = (bar(rect), counts.iter().copied().max().unwrap_or(0).max(1) as f32);
+    let wide = bar.width() / counts.len() as f32;
+    let foot = bar.top() - 22.0;
+    for (i, count) in counts.iter().enumerate() {
+        let left = bar.left() + wide * i as f32;
+        let high = HIGH * *count as f32 / most;
+        let column = Rect::from_min_max(pos2(left, foot - high), pos2(left + wide - 0.5, foot));
+        painter.rect_filled(column, 0.0, cx.p.weak);
     }
 }
 

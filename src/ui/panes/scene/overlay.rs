@@ -1,12 +1,11 @@
-//! Overlay of a 3D picture: scale bar, names of the axes, buttons; and how poses are put in words.
+//! Overlay of a 3D picture: scale bar, names of the axes; and how poses are put in words.
 
-use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2, vec2};
+use eframe::egui::{self, Align2, Color32, FontId, Rect, Stroke, Ui, pos2};
 use glam::DVec3;
 
 use super::Memory;
 use super::build::{AXIS, axes_origin};
 use super::legend;
-use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::settings::SceneLayer;
@@ -22,14 +21,21 @@ use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
 use touch2touch_work::pose::PoseResult;
 
-/// Scale bar, names of the axes, legend, buttons.
-pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &Memory, source: ImprintSource, output: &SceneOutput) {
+/// Scale bar, names of the axes, bar of the colors; in the `first` view the legend.
+pub(super) fn show(
+    cx: &mut Cx<'_>,
+    ui: &mut Ui,
+    memory: &mut Memory,
+    source: ImprintSource,
+    output: &SceneOutput,
+    first: bool,
+) {
     let rect = output.response.rect;
     let camera = memory.views[source as usize].camera;
     if cx.state.settings.scene.layer(SceneLayer::Guides).shown {
         axes_and_scale(cx.p, &ui.painter_at(rect), &camera, output, rect);
     }
-    legend::show(cx, ui, memory, source, rect);
+    legend::show(cx, ui, memory, source, rect, first);
     super::steps::show_legend(cx, ui, memory, source, rect);
 }
 
@@ -57,34 +63,6 @@ pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, C
     Some((text, color, details))
 }
 
-/// Height of the buttons that turn the view, points.
-pub(super) const SIDES: f32 = 138.0;
-
-/// Buttons that turn the view, in the column beside it.
-pub(super) fn sides(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, column: Rect) {
-    let place = column.shrink2(vec2(2.0, 4.0)).with_max_y((column.top() + SIDES).min(column.bottom()));
-    let builder = egui::UiBuilder::new().max_rect(place).id_salt(("sides", source as usize));
-    ui.scope_builder(builder, |ui| {
-        ui.spacing_mut().item_spacing.y = 2.0;
-        let side = if source == ImprintSource::Measured { "measured" } else { "predicted" };
-        for action in [Action::CameraLeft, Action::CameraRight, Action::CameraFront, Action::CameraTop, Action::Fit] {
-            let letter = match action {
-                Action::CameraLeft => "L",
-                Action::CameraRight => "R",
-                Action::CameraFront => "F",
-                Action::CameraTop => "T",
-                _ => "0",
-            };
-            let text = egui::RichText::new(letter).size(11.0).color(cx.p.weak);
-            let button = ui.add(egui::Button::new(text).min_size(vec2(22.0, 18.0)).fill(cx.p.panel));
-            let button = button.accessible_name(format!("{}, {side}", action.name()));
-            if button.on_hover_text(cx.keys().help(action)).clicked() {
-                cx.act(action);
-            }
-        }
-    });
-}
-
 /// `Measured and predicted 1.2° and 0.85 mm apart`.
 pub(super) fn difference(what: &str, how: &str, d: PoseDifference) -> String {
     format!("{what} {} and {} {how}", units::text_deg(d.angle_rad), units::text_mm(d.position_m))
@@ -94,17 +72,6 @@ pub(super) fn lower_first(absent: Absent) -> String {
     let text = absent.text().trim_end_matches('.');
     let mut chars = text.chars();
     chars.next().map_or(String::new(), |c| c.to_lowercase().chain(chars).collect())
-}
-
-/// `11.9° ± 0.3° (true 12.3°, error 0.4°)`.
-pub(crate) fn angle_text(pose: &PoseResult) -> String {
-    let angle = pose.angle_text();
-    match (pose.truth_rad, pose.error_rad) {
-        (Some(truth), Some(error)) => {
-            format!("{angle} (true {}, error {})", units::text_deg(truth), units::text_deg(error))
-        }
-        _ => angle,
-    }
 }
 
 /// The color of an angle error.

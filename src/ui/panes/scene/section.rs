@@ -5,21 +5,19 @@ use eframe::egui::{Button, RichText, Slider, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::command::Command;
-use crate::app::keys::ImprintSource;
 use crate::app::workbench::{SECTION_REACH_M, Section, SectionAxis, WorkbenchCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::units;
 
-/// The bar above the picture, while a plane cuts or only the window is shown.
-pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
+/// What cuts all views, while a plane does or only the window is shown.
+pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui) {
     let only_window = cx.state.settings.scene.only_window;
     let section = cx.state.workbench.section;
     if section.is_none() && !only_window {
         return;
     }
-    let side = source.name().to_lowercase();
-    ui.horizontal_wrapped(|ui| {
+    ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.add_space(4.0);
         if let Some(section) = section {
@@ -28,7 +26,7 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             for axis in SectionAxis::iter() {
                 let name = &axis.name()[..1];
                 let button = Button::selectable(axis == section.axis, RichText::new(name).size(SMALL));
-                let button = ui.add(button).accessible_name(format!("Cut across {}, {side}", axis.name()));
+                let button = ui.add(button).accessible_name(format!("Cut across {}", axis.name()));
                 if button.on_hover_text(axis.name()).clicked() {
                     new = Section { axis, at_m: 0.0, ..section };
                 }
@@ -39,7 +37,7 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             let mut place_mm = units::mm(section.at_m);
             ui.spacing_mut().slider_width = (ui.available_width() - others).clamp(24.0, 220.0);
             let slider = ui.add(Slider::new(&mut place_mm, -reach..=reach).fixed_decimals(1).suffix(" mm"));
-            let slider = slider.accessible_name(format!("Place of the cut, {side}"));
+            let slider = slider.accessible_name("Place of the cut");
             // A notch of the wheel over the slider is half a millimeter.
             let notches = if slider.hovered() { ui.input(|i| i.smooth_scroll_delta().y / 40.0) } else { 0.0 };
             if slider.changed() || notches != 0.0 {

@@ -1,4 +1,4 @@
-//! The help mark of a pane: its mouse controls.
+//! The mouse controls of panes.
 
 use eframe::egui::{self, RichText, Ui};
 
@@ -44,9 +44,9 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
-    ("[[next_layer]]", "next layer"),
+    ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other paints"),
     ("[[section]], [[window_only]], [[parallel]]", "cut open, GelSlim's window only, parallel lines"),
-    ("Click in the list", "show or hide; the dots: color, size, opacity"),
+    ("Click on the colored dots", "legend: show or hide, color, size, opacity"),
 ];
 
 /// Controls of the time machine.
@@ -66,20 +66,13 @@ pub(crate) const BASIN: &[(&str, &str)] = &[
     ("[[cancel_jobs]]", "give up what is being computed"),
 ];
 
-/// A question mark that lists `controls` under the pointer, with the keys in force.
-pub fn mark(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
-    let p = Palette::of(ui);
-    let text = RichText::new("?").size(SMALL).color(p.weak);
-    let button = ui.add(egui::Button::new(text).frame(false).min_size(egui::vec2(16.0, 16.0)));
-    button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Mouse controls of {pane}")));
-    button.on_hover_ui(|ui| {
-        ui.label(RichText::new(format!("{pane}: mouse controls")).strong());
-        egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
-            for (control, effect) in controls {
-                ui.label(caption(keys.fill(control), Palette::of(ui)));
-                ui.label(RichText::new(keys.fill(effect)).size(SMALL));
-                ui.end_row();
-            }
-        });
+/// The list of `controls`, with the keys in force.
+pub fn list(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
+    egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
+        for (control, effect) in controls {
+            ui.label(caption(keys.fill(control), Palette::of(ui)));
+            ui.label(RichText::new(keys.fill(effect)).size(SMALL));
+            ui.end_row();
+        }
     });
 }

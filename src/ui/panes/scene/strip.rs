@@ -1,0 +1,128 @@
+//! The strip beside the 3D views: views, what is shown, what is measured.
+
+use eframe::egui::{self, Button, Popup, PopupCloseBehavior, Rect, Ui, UiBuilder, vec2};
+use strum::IntoEnumIterator as _;
+
+use crate::app::action::Action;
+use crate::app::command::{Command, Pane};
+use crate::app::settings::SceneLayer;
+use crate::app::workbench::{Layer, SceneTool, WorkbenchCommand};
+use crate::ui::parts::cx::Cx;
+use crate::ui::parts::theme::caption;
+use crate::ui::parts::widget::icon::{self, Icon};
+
+/// Width of the strip, points.
+pub(super) const WIDTH: f32 = 34.0;
+
+/// Ways to look at a scene, in the menu of views.
+const VIEWS: [Action; 8] = [
+    Action::Fit,
+    Action::CameraLeft,
+    Action::CameraRight,
+    Action::CameraFront,
+    Action::CameraBack,
+    Action::CameraTop,
+    Action::CameraBottom,
+    Action::CameraOblique,
+];
+
+/// The strip; what does not fit is left to menu, palette and keys.
+pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
+    ui.painter().rect_filled(column, 0.0, cx.p.panel);
+    let builder = UiBuilder::new().max_rect(column.shrink2(vec2(2.0, 4.0))).id_salt("strip");
+    ui.scope_builder(builder, |ui| {
+        ui.set_clip_rect(column.intersect(ui.clip_rect()));
+        ui.spacing_mut().item_spacing.y = 2.0;
+        views(cx, ui);
+        line(cx, ui);
+        let (tool, layer) = (cx.state.workbench.tool, cx.state.workbench.layer);
+        let cut = cx.state.workbench.section.is_some();
+        switch(cx, ui, Icon::Distance, Action::Distances, layer == Layer::Distance);
+        switch(cx, ui, Icon::Cut, Action::Section, cut);
+        shown(cx, ui);
+        line(cx, ui);
+        switch(cx, ui, Icon::Ruler, Action::MeasureDistance, tool == SceneTool::Distance);
+        switch(cx, ui, Icon::Angle, Action::MeasureAngle, tool == SceneTool::Angle);
+        switch(cx, ui, Icon::Hand, Action::PoseTool, tool == SceneTool::Pose);
+        if cx.state.selection.panes.contains(&Pane::Masks) {
+            switch(cx, ui, Icon::BrushIn3d, Action::PaintIn3d, tool == SceneTool::Paint);
+        }
+    });
+}
+
+fn line(cx: &Cx<'_>, ui: &mut Ui) {
+    let (rect, _) = ui.allocate_exact_size(vec2(ui.available_width(), 5.0), egui::Sense::hover());
+    ui.painter().hline(rect.x_range().shrink(3.0), rect.center().y, (1.0, cx.p.line));
+}
+
+fn switch(cx: &mut Cx<'_>, ui: &mut Ui, icon: Icon, action: Action, on: bool) {
+    let key = cx.keys().text(action);
+    let enabled = action.command(cx.state).is_some();
+    let button = icon::button(ui, icon, &key, action.name(), enabled, on);
+    let help = format!("{}. {}", action.name(), cx.keys().help(action));
+    if button.on_hover_text(help).clicked() {
+        cx.act(action);
+    }
+}
+
+/// A row of a menu for an action, with its key; `on` marks what is in force.
+fn row(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, on: bool) {
+    let button = Button::new(action.name()).shortcut_text(cx.keys().text(action)).selected(on);
+    let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
+    if response.on_hover_text(action.tooltip()).clicked() {
+        cx.act(action);
+    }
+}
+
+/// Where to look from.
+fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let button = icon::button(ui, Icon::Views, "", "Views", true, false);
+    let button = button.on_hover_text("Seven cameras, fit, parallel or in perspective");
+    Popup::menu(&button).show(|ui| {
+        ui.set_min_width(190.0);
+        for action in VIEWS {
+            row(cx, ui, action, false);
+        }
+        ui.separator();
+        row(cx, ui, Action::Parallel, cx.state.settings.scene.orthographic);
+        row(cx, ui, Action::LinkCameras, cx.state.settings.cameras_linked);
+        row(cx, ui, Action::CopyCamera, false);
+    });
+}
+
+/// What is drawn, and what else the contact points can be painted with.
+fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let painted = cx.state.workbench.layer;
+    let on = !matches!(painted, Layer::None | Layer::Distance);
+    let button = icon::button(ui, Icon::Layers, "", "What is shown", true, on);
+    let button = button.on_hover_text("What the contact points are painted with, and what is drawn around them");
+    Popup::menu(&button).close_behavior(PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
+        ui.set_min_width(210.0);
+        ui.label(caption("Contact points painted with", cx.p));
+        for layer in Layer::iter() {
+            let text = match layer {
+                Layer::None => "one color",
+                Layer::Residuals => "residuals, mm",
+                Layer::Reasons => "why one was left out",
+                Layer::Distance => "signed distance, mm",
+                Layer::Correspondences => "lines to the model",
+            };
+            if ui.radio(layer == painted, text).on_hover_text(layer.tooltip()).clicked() {
+                cx.push(Command::Workbench(WorkbenchCommand::SetLayer(layer)));
+            }
+        }
+        ui.separator();
+        let scene = &cx.state.settings.scene;
+        let (window, surface, edl) = (scene.only_window, scene.layer(SceneLayer::Surface).shown, scene.eye_dome);
+        let both = cx.state.workbench.both_clouds;
+        for (action, on) in [
+            (Action::WindowOnly, window),
+            (Action::BothClouds, both),
+            (Action::MembraneSurface, surface),
+            (Action::EyeDome, edl),
+            (Action::AnimateWeakest, cx.state.workbench.animate_weakest),
+        ] {
+            row(cx, ui, action, on);
+        }
+    });
+}
