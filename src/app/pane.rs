@@ -292,9 +292,14 @@ impl Pane {
         }
     }
 
-    /// True where it is closed until somebody asks for it: a tab costs everyone who does not need it.
-    pub(crate) fn is_closed_at_first(self) -> bool {
-        matches!(self, Self::Settings | Self::Log)
+    /// True where it is closed in a workspace until somebody asks for it: a tab costs everyone who does not need it.
+    pub(crate) fn is_closed_at_first(self, workspace: Workspace) -> bool {
+        match self {
+            Self::Settings | Self::Log => true,
+            Self::Generate => workspace != Workspace::Inspect,
+            Self::Ledger => workspace == Workspace::Evaluate,
+            _ => false,
+        }
     }
 
     /// True where it shows something of the selected pair.

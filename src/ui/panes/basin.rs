@@ -1,8 +1,8 @@
 //! The basin map: where starts lead. A click loads that run into the time machine.
 
 use eframe::egui::{
-    self, Align2, Color32, FontId, Mesh, Painter, Pos2, Rect, Response, RichText, Role, Sense, Shape, Stroke, Ui,
-    UiBuilder, WidgetInfo, pos2, vec2,
+    self, Align2, Color32, ComboBox, FontId, Mesh, Painter, Pos2, Rect, Response, RichText, Role, Sense, Shape, Stroke,
+    Ui, UiBuilder, WidgetInfo, pos2, vec2,
 };
 use strum::IntoEnumIterator as _;
 
@@ -85,31 +85,40 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 fn controls(cx: &mut Cx<'_>, ui: &mut Ui) {
     let inspect = cx.state.inspect.clone();
     ui.horizontal(|ui| {
-        for (plane, name) in [(Plane::AngleY, "angle × y"), (Plane::AngleZ, "angle × z"), (Plane::YZ, "y × z")] {
-            let button = ui.add(egui::Button::selectable(inspect.plane == plane, RichText::new(name).size(12.0)));
-            let tip =
-                "What of the start is varied; the third coordinate stays 0, the middle of what the gripper can hold";
-            if button.on_hover_text(tip).clicked() {
-                cx.push(Command::Inspect(InspectCommand::Plane(plane)));
+        ui.spacing_mut().item_spacing.x = 4.0;
+        let planes = [(Plane::AngleY, "angle × y"), (Plane::AngleZ, "angle × z"), (Plane::YZ, "y × z")];
+        let now = planes.iter().find(|(plane, _)| *plane == inspect.plane).map_or("", |(_, name)| name);
+        let combo = ComboBox::from_id_salt("plane").width(84.0).selected_text(RichText::new(now).size(12.0));
+        let response = combo.show_ui(ui, |ui| {
+            for (plane, name) in planes {
+                if ui.selectable_label(inspect.plane == plane, name).clicked() {
+                    cx.push(Command::Inspect(InspectCommand::Plane(plane)));
+                }
             }
-        }
-    });
-    ui.horizontal(|ui| {
-        for color in BasinColor::iter() {
-            let text = RichText::new(color.name()).size(12.0);
-            let possible = color != BasinColor::Error || results::truth(cx.state).is_some();
-            let button = ui.add_enabled(possible, egui::Button::selectable(inspect.color == color, text));
-            let button = button.accessible_name(format!("Color by {}", color.name().to_lowercase()));
-            let tip = match color {
-                BasinColor::Cost => "Root of the cost per point where the run ended",
-                BasinColor::Error => "Angle between where the run ended and the truth",
-                BasinColor::Winner => "Which place the run ended at: ends within 1° and 1 mm are one place",
-            };
-            let button = button.on_hover_text(tip).on_disabled_hover_text("The true pose of this pair is not known");
-            if button.clicked() {
-                cx.push(Command::Inspect(InspectCommand::Color(color)));
+        });
+        let tip = "What of the start is varied; the third coordinate stays 0, the middle of what the gripper can hold";
+        response.response.accessible_name("Varied coordinates").on_hover_text(tip);
+        ui.label(caption("colored by", cx.p));
+        let name = RichText::new(inspect.color.name().to_lowercase()).size(12.0);
+        let combo = ComboBox::from_id_salt("basin color").width(84.0).selected_text(name);
+        let response = combo.show_ui(ui, |ui| {
+            for color in BasinColor::iter() {
+                let possible = color != BasinColor::Error || results::truth(cx.state).is_some();
+                let name = color.name().to_lowercase();
+                let option = ui.add_enabled(possible, egui::Button::selectable(inspect.color == color, name));
+                let tip = match color {
+                    BasinColor::Cost => "Root of the cost per point where the run ended",
+                    BasinColor::Error => "Angle between where the run ended and the truth",
+                    BasinColor::Winner => "Which place the run ended at: ends within 1° and 1 mm are one place",
+                };
+                let option =
+                    option.on_hover_text(tip).on_disabled_hover_text("The true pose of this pair is not known");
+                if option.clicked() {
+                    cx.push(Command::Inspect(InspectCommand::Color(color)));
+                }
             }
-        }
+        });
+        response.response.accessible_name("Colors of the map").on_hover_text("What the colors of the map mean");
     });
 }
 

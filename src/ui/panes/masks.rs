@@ -86,6 +86,7 @@ fn sign(tool: MaskTool) -> Icon {
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 2.0;
+        ui.spacing_mut().interact_size.y = icon::SIZE.y;
         for tool in MaskTool::iter() {
             let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
             let key = cx.keys().text(row.action);

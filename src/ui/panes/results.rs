@@ -102,8 +102,10 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.stoppable(ui, (ticket, task), f32::INFINITY, (&text, tip));
             }
             None => {
-                cx.action_button(ui, Action::EvaluateDataset, "Evaluate");
-                cx.action_button(ui, Action::ExportTable, "Export…");
+                // The empty table offers it large; an export is in the pane's menu.
+                if cx.state.table.result.is_some() {
+                    cx.action_button(ui, Action::EvaluateDataset, "Evaluate");
+                }
             }
         }
     });

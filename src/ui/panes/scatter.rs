@@ -9,7 +9,6 @@ use eframe::egui::{
 };
 use strum::{EnumIter, IntoEnumIterator as _};
 
-use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane};
 use crate::app::scores::{ScoreTable, SourceScores};
 use crate::ui::parts::cx::Cx;
@@ -82,11 +81,8 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
         ui.set_min_size(ui.available_size());
         let scores = cx.state.table.scores.clone();
         let Some(axes) = axes(&scores, memory) else {
-            let action = Action::PredictAll.command(cx.state);
-            let action = action.map(|_| ("Predict all", Action::PredictAll.tooltip()));
-            if empty::show(ui, "No scores yet", "A point for each pair that was scored", action) {
-                cx.act(Action::PredictAll);
-            }
+            let how = "A point for each pair that was scored: Predict all, above the list of pairs";
+            empty::show(ui, "No scores yet", how, None);
             return;
         };
         let axes = controls(cx, ui, memory, &scores, axes);

@@ -81,7 +81,10 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let versus = cx.state.settings.compared();
     egui::Frame::new().inner_margin(egui::Margin::symmetric(6, 3)).show(ui, |ui| {
         header(cx, ui, &versus);
-        figures::show(cx, ui, &versus);
+        // The error's figures stand in the metrics, and in its corner.
+        if !versus.is_error() {
+            figures::show(cx, ui, &versus);
+        }
     });
     let flipped = flickers(ui);
     let full = ui.available_rect_before_wrap();
@@ -308,7 +311,11 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     let light = Color32::from_gray(235);
     output.caption(Align2::LEFT_TOP, &format!("{} minus {}", versus.a.label(), versus.b.label()), light);
     output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), light);
-    output.caption(Align2::RIGHT_BOTTOM, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
+    let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
+    let split = compared.split.map(|s| format!(": seen {}, invented {}", part(s.seen.mae), part(s.invented.mae)));
+    let text = format!("mean |A - B| {}{}", units::text_mm(compared.mae_m), split.unwrap_or_default());
+    output.caption(Align2::RIGHT_BOTTOM, &text, light);
     histogram
 }
 

@@ -515,9 +515,11 @@ impl eframe::App for StudioApp {
             egui::CentralPanel::default().frame(frame).show(ui, |ui| match self.panes.maximized {
                 Some(p) => pane::show_maximized(&mut cx, ui, &mut self.panes, p),
                 None => {
+                    let hidden = layout::collapse(&mut tree, self.panes.idle(&self.state));
                     let mut docking = Docking { cx: &mut cx, panes: &mut self.panes, edited: false };
                     tree.ui(&mut docking, ui);
                     edited |= docking.edited;
+                    layout::restore_collapsed(&mut tree, hidden);
                 }
             });
             bars::hint(&mut cx, &ctx);

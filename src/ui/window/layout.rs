@@ -19,20 +19,29 @@ struct Shares {
     columns: [f32; 3],
     /// Upper and lower row of the middle.
     middle: [f32; 2],
-    /// The docks of the lower row; those of the upper one are equally wide.
+    /// The docks of the upper row.
+    top: [f32; 3],
+    /// The docks of the lower row.
     bottom: [f32; 3],
     /// The docks of the right column.
     right: [f32; 2],
 }
 
 fn shares(workspace: Workspace) -> Shares {
-    let (columns, bottom) = ([0.165, 0.625, 0.21], [1.0, 1.0, 1.0]);
+    let alike = [1.0; 3];
+    let shares =
+        Shares { columns: [0.165, 0.625, 0.21], middle: [1.2, 0.9], top: alike, bottom: alike, right: [1.0, 1.0] };
     match workspace {
-        Workspace::Inspect => Shares { columns, middle: [0.86, 1.14], bottom, right: [1.0, 1.0] },
-        Workspace::Align => Shares { columns: [0.13, 0.64, 0.23], middle: [1.15, 0.85], bottom, right: [1.2, 0.8] },
-        Workspace::Label => Shares { columns, middle: [1.25, 0.75], bottom: [1.0, 1.4, 1.0], right: [1.5, 0.5] },
-        Workspace::Evaluate => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
-        Workspace::Adapt => Shares { columns, middle: [1.2, 0.9], bottom, right: [1.0, 1.0] },
+        Workspace::Inspect => Shares { middle: [0.8, 1.2], bottom: [0.8, 1.2, 1.0], right: [0.8, 1.2], ..shares },
+        Workspace::Align => Shares {
+            columns: [0.13, 0.64, 0.23],
+            middle: [1.2, 0.8],
+            top: [1.7, 1.0, 1.0],
+            right: [1.2, 0.8],
+            ..shares
+        },
+        Workspace::Label => Shares { middle: [1.2, 0.8], bottom: [1.0, 1.4, 1.0], right: [1.4, 0.6], ..shares },
+        Workspace::Evaluate | Workspace::Adapt => shares,
     }
 }
 
@@ -57,7 +66,7 @@ pub(crate) fn default_tree(workspace: Workspace) -> Tree<Pane> {
     for pane in Pane::of(workspace) {
         if let Some(dock) = pane.dock(workspace) {
             let id = tiles.insert_pane(pane);
-            tiles.set_visible(id, !pane.is_closed_at_first());
+            tiles.set_visible(id, !pane.is_closed_at_first(workspace));
             docks.entry(dock).or_default().push(id);
         }
     }
@@ -66,7 +75,7 @@ pub(crate) fn default_tree(workspace: Workspace) -> Tree<Pane> {
     let of = |part: fn(Dock) -> bool| docks.iter().filter(move |(dock, _)| part(*dock)).map(|(_, id)| *id);
     let shares = shares(workspace);
     let left = line(&mut tiles, Vertical, of(|dock| dock == Dock::Left), &[]);
-    let top = line(&mut tiles, Horizontal, of(|dock| matches!(dock, Dock::Top(_))), &[1.0; 3]);
+    let top = line(&mut tiles, Horizontal, of(|dock| matches!(dock, Dock::Top(_))), &shares.top);
     let bottom = line(&mut tiles, Horizontal, of(|dock| matches!(dock, Dock::Bottom(_))), &shares.bottom);
     let right = line(&mut tiles, Vertical, of(|dock| matches!(dock, Dock::Right(_))), &shares.right);
     let middle = line(&mut tiles, Vertical, [top, bottom], &shares.middle);
@@ -99,6 +108,23 @@ pub(crate) fn is_valid(tree: &Tree<Pane>, workspace: Workspace) -> bool {
     seen.len() == tree.tiles.len()
         && counts.len() == panes.len()
         && panes.iter().all(|pane| counts.get(pane) == Some(&1))
+}
+
+/// Hides panes that have nothing to show on the open data, so that the others have their room; those that it hid.
+pub(crate) fn collapse(tree: &mut Tree<Pane>, panes: &[Pane]) -> Vec<TileId> {
+    let there = panes.iter().filter_map(|pane| tree.tiles.find_pane(pane));
+    let hidden: Vec<TileId> = there.filter(|id| tree.is_visible(*id)).collect();
+    for id in &hidden {
+        tree.set_visible(*id, false);
+    }
+    hidden
+}
+
+/// Takes [`collapse`] back: what is stored is what a person arranged.
+pub(crate) fn restore_collapsed(tree: &mut Tree<Pane>, hidden: Vec<TileId>) {
+    for id in hidden {
+        tree.set_visible(id, true);
+    }
 }
 
 /// The tree as text for the settings.

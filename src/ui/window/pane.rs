@@ -6,7 +6,10 @@ use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
 use crate::app::action::Action;
-use crate::app::pane::{Kind, Pane, panes};
+use crate::app::keys::ImprintSource;
+use crate::app::pane::{Kind, Pane, Workspace, panes};
+use crate::app::results;
+use crate::app::state::{Absent, Lookup, State};
 use crate::ui::parts::cx::{Cx, side_color};
 use crate::ui::parts::made_with;
 use crate::ui::parts::theme::{SMALL, medium};
@@ -43,6 +46,23 @@ pub(crate) struct Panes {
     pub drawn: BTreeSet<Pane>,
     /// Rectangle of each pane when it was drawn last, points.
     pub places: BTreeMap<Pane, egui::Rect>,
+    /// True where the pair shown last has no depth camera.
+    flat: bool,
+}
+
+impl Panes {
+    /// The panes that have nothing to show on this data, in workspaces where others want their room: without a depth
+    /// camera there is no 3D.
+    pub(crate) fn idle(&mut self, state: &State) -> &'static [Pane] {
+        match results::cloud(state, ImprintSource::Measured) {
+            Lookup::Absent(Absent::NoCamera) => self.flat = true,
+            Lookup::Ready(_) => self.flat = false,
+            // While the next pair is read nothing jumps.
+            _ => {}
+        }
+        let room = matches!(state.settings.workspace, Workspace::Inspect | Workspace::Label);
+        if self.flat && room { &[Pane::Scene] } else { &[] }
+    }
 }
 
 /// Draws a pane.

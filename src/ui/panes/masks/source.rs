@@ -41,7 +41,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings.mask;
     let (source, proposal) = (settings.choice.source, settings.proposal);
     let automatic = proposal == ProposalSource::Automatic;
-    let text = if automatic { source.name() } else { proposal.name() };
+    let text = format!("Source: {}", if automatic { source.name() } else { proposal.name() });
     let tip = if automatic { source.tooltip() } else { proposal.tooltip() };
     let combo = egui::ComboBox::from_id_salt("mask source").width(ui.available_width() - 8.0).selected_text(text);
     let response = combo.height(420.0).show_ui(ui, |ui| {

@@ -32,7 +32,11 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
     let builder = UiBuilder::new().max_rect(column.shrink2(vec2(2.0, 4.0))).id_salt("strip");
     ui.scope_builder(builder, |ui| {
         ui.set_clip_rect(column.intersect(ui.clip_rect()));
+        // In a low pane the buttons are lower, so that all are there.
+        const BUTTONS: f32 = 9.0;
+        let high = ((column.height() - 18.0) / BUTTONS - 2.0).clamp(18.0, icon::SIZE.y);
         ui.spacing_mut().item_spacing.y = 2.0;
+        ui.spacing_mut().interact_size.y = high;
         views(cx, ui);
         line(cx, ui);
         let (tool, layer) = (cx.state.workbench.tool, cx.state.workbench.layer);

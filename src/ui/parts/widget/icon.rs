@@ -129,13 +129,16 @@ impl Icon {
     }
 }
 
-/// A button with a sign, its key below it in small letters; `name` is what a screen reader says.
+/// Size of a button with room for its key, points.
+pub const SIZE: Vec2 = vec2(30.0, 28.0);
+
+/// A button with a sign, as high as controls are, its key below it in small letters where there is the room; `name` is
+/// what a screen reader says.
 pub fn button(ui: &mut Ui, icon: Icon, key: &str, name: &str, enabled: bool, on: bool) -> Response {
-    const SIZE: Vec2 = vec2(30.0, 28.0);
     const KEY: f32 = 8.5;
     let p = Palette::of(ui);
     let sense = if enabled { Sense::click() } else { Sense::hover() };
-    let (rect, response) = ui.allocate_exact_size(SIZE, sense);
+    let (rect, response) = ui.allocate_exact_size(vec2(SIZE.x, ui.spacing().interact_size.y), sense);
     response.widget_info(|| WidgetInfo::selected(Role::Button, enabled, on, name));
     let fill = match (on, response.hovered() && enabled) {
         (true, _) => p.selected,
@@ -148,6 +151,7 @@ pub fn button(ui: &mut Ui, icon: Icon, key: &str, name: &str, enabled: bool, on:
         (true, true) => p.strong,
         (true, false) => p.text,
     };
+    let key = if rect.height() < SIZE.y - 4.0 { "" } else { key };
     let up = if key.is_empty() { 0.0 } else { 4.0 };
     icon.paint(ui.painter(), rect.center() - vec2(0.0, up), color);
     let foot = Rect::from_min_max(egui::pos2(rect.left(), rect.bottom() - 10.0), rect.max);
