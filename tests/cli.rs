@@ -20,8 +20,10 @@ use crate::support::{self, run};
 #[cfg(feature = "onnx")]
 mod documented;
 mod hostile;
+mod links;
 #[cfg(feature = "onnx")]
 mod outputs;
+mod pages;
 mod queue;
 mod read_as;
 mod refused;

@@ -114,6 +114,14 @@ fn with(at: &str, value: &Value) -> Vec<u8> {
 }
 
 #[test]
+fn the_rig_that_the_page_shows_is_one() {
+    let page = include_str!("../docs/data.md");
+    let shown = page.split("```json\n").nth(1).unwrap().split("```").next().unwrap();
+    let rig = Rig::parse(shown.as_bytes()).unwrap();
+    assert_eq!((&*rig.name, rig.sensors.len(), rig.pads.len(), rig.windows.len()), ("Two fingers", 2, 2, 1));
+}
+
+#[test]
 fn a_rig_with_one_spoilt_field_is_refused_and_says_what_to_do() {
     let dir = tempfile::tempdir().unwrap();
     let services = LiveServices::with_config_folder(None);

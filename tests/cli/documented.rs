@@ -1,5 +1,6 @@
-//! Every command that README.md and docs show, run as it stands there: a text that no longer fits the program fails.
+//! Every command that the pages show, run as it stands there: a text that no longer fits the program fails.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use touch2touch::headless::check_command;
@@ -8,47 +9,13 @@ use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
 
+use super::pages::{self, fenced, repository};
 use super::{error_text, run};
 use crate::cli_generate::full_size_bundle;
 
-fn repository() -> &'static Path {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-}
-
-/// The texts whose commands are run.
-fn texts() -> Vec<(String, String)> {
-    let mut files: Vec<PathBuf> = std::fs::read_dir(repository().join("docs"))
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
-        .filter(|path| path.extension().is_some_and(|e| e == "md"))
-        .collect();
-    files.push(repository().join("README.md"));
-    files.sort();
-    let read = |path: PathBuf| {
-        let name = path.strip_prefix(repository()).unwrap().display().to_string();
-        (name, std::fs::read_to_string(&path).unwrap())
-    };
-    files.into_iter().map(read).collect()
-}
-
-/// The lines of the code fences (not of drawings), without what follows ` # `, and the rest of the text.
-fn fenced(text: &str) -> (Vec<String>, String) {
-    let (mut lines, mut rest, mut inside, mut drawn) = (Vec::new(), String::new(), false, false);
-    for line in text.lines() {
-        if let Some(kind) = line.trim_start().strip_prefix("```") {
-            inside = !inside;
-            drawn = kind == "text";
-        } else if inside && drawn {
-            // A drawing in letters has no commands.
-        } else if inside {
-            let command = line.split(" #").next().unwrap().trim();
-            lines.extend((!command.is_empty()).then(|| command.to_owned()));
-        } else {
-            rest += line;
-            rest.push('\n');
-        }
-    }
-    (lines, rest)
+/// The texts whose commands are run; those of the training are Python's.
+fn texts() -> impl Iterator<Item = (String, String)> {
+    pages::all().into_iter().filter(|(page, _)| !page.starts_with("training"))
 }
 
 /// What is done with a command.
@@ -254,8 +221,7 @@ fn every_command_of_the_texts_does_what_they_say() {
 #[test]
 fn commands_within_sentences_are_spelled_right() {
     let mut seen = 0;
-    let training = std::fs::read_to_string(repository().join("training/README.md")).unwrap();
-    for (file, text) in texts().into_iter().chain([("training/README.md".to_owned(), training)]) {
+    for (file, text) in pages::all() {
         let rest = fenced(&text).1;
         for span in rest.split('`').skip(1).step_by(2) {
             let words: Vec<&str> = span.split_whitespace().collect();
@@ -268,4 +234,51 @@ fn commands_within_sentences_are_spelled_right() {
         }
     }
     assert!(seen >= 5, "{seen} commands: were the sentences read?");
+}
+
+/// Options of the benchmarks that a page names on their own.
+const OF_BENCHMARKS: &[&str] = &["--masks"];
+
+/// The help of a verb, or of the program.
+fn help(verb: &[&str], home: &Path) -> String {
+    let done = run(&[verb, &["--help"]].concat(), home);
+    String::from_utf8(done.stdout).unwrap()
+}
+
+/// The verbs that a help lists.
+fn verbs_in(help: &str) -> Vec<String> {
+    let listed = help.lines().skip_while(|line| !line.starts_with("Commands:")).skip(1);
+    let listed = listed.take_while(|line| line.starts_with("  "));
+    let names = listed.filter_map(|line| line[2..].split_once(' ').map(|(name, _)| name.to_owned()));
+    names.filter(|name| !name.is_empty() && name != "help").collect()
+}
+
+fn is_of_a_name(c: char) -> bool {
+    c.is_ascii_alphanumeric() || c == '-'
+}
+
+/// An option that a sentence names is one of some verb.
+#[test]
+fn options_within_sentences_are_there() {
+    let dir = tempfile::tempdir().unwrap();
+    let home = dir.path();
+    let mut helps = vec![help(&[], home)];
+    for verb in verbs_in(&helps[0]) {
+        let of_verb = help(&[verb.as_str()], home);
+        for below in verbs_in(&of_verb) {
+            helps.push(help(&[verb.as_str(), below.as_str()], home));
+        }
+        helps.push(of_verb);
+    }
+    let options: BTreeSet<&str> = helps.iter().flat_map(|text| text.split(|c: char| !is_of_a_name(c))).collect();
+    let mut seen = 0;
+    for (file, text) in texts() {
+        let rest = fenced(&text).1;
+        for span in rest.split('`').skip(1).step_by(2).filter(|span| span.starts_with("--")) {
+            let option = span.split(|c: char| !is_of_a_name(c)).next().unwrap();
+            assert!(options.contains(option) || OF_BENCHMARKS.contains(&option), "{file}: no verb has `{option}`");
+            seen += 1;
+        }
+    }
+    assert!(seen >= 20, "{seen} options: were the sentences read?");
 }

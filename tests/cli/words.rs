@@ -1,23 +1,16 @@
 //! One word for a thing: what docs/glossary.md has replaced is said nowhere.
 
-use std::path::Path;
-
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::pane::Pane;
 
+use super::pages::{self, prose};
 use crate::support::run;
 
 /// A word that is not said any more, and the one that is.
 const REPLACED: &[(&str, &str)] = &[("dataset", "data set"), ("datasets", "data sets")];
 /// The same for the studio, whose texts are of nothing else.
 const ON_SCREEN: &[(&str, &str)] = &[("sample", "pair"), ("samples", "pairs"), ("settings", "preferences")];
-
-/// The prose of a page: no code, no links' addresses, no paths.
-fn prose(text: &str) -> String {
-    let outside = |text: &str, mark: &str| text.split(mark).step_by(2).collect::<Vec<_>>().join(" ");
-    outside(&outside(text, "```"), "`")
-}
 
 fn check(place: &str, text: &str, replaced: &[(&str, &str)]) {
     let words = text.split(|c: char| !(c.is_alphanumeric() || "_-/.<>=".contains(c)));
@@ -30,11 +23,10 @@ fn check(place: &str, text: &str, replaced: &[(&str, &str)]) {
 
 #[test]
 fn replaced_words_are_said_nowhere() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    for page in ["README.md", "docs/workbench.md", "docs/generator.md", "docs/benchmarks.md", "docs/glossary.md"] {
-        let text = prose(&std::fs::read_to_string(root.join(page)).unwrap());
+    for (page, text) in pages::all() {
+        let text = prose(&text);
         assert!(text.split_whitespace().count() > 100, "{page}");
-        check(page, &text, REPLACED);
+        check(&page, &text, REPLACED);
     }
     for action in Action::iter() {
         let text = format!("{}. {}", action.name(), action.tooltip());

@@ -93,8 +93,10 @@ fn the_other_benchmarks_run() {
 fn what_pages_say_of_a_benchmark_it_has() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let mut said = 0;
-    for page in ["README.md", "docs/benchmarks.md", "docs/generator.md", "docs/labeling.md"] {
-        let text = std::fs::read_to_string(root.join(page)).unwrap();
+    let docs = std::fs::read_dir(root.join("docs")).unwrap().map(|entry| entry.unwrap().path());
+    let pages = docs.filter(|path| path.extension().is_some_and(|e| e == "md"));
+    for page in pages.chain([root.join("README.md")]) {
+        let text = std::fs::read_to_string(&page).unwrap();
         for command in text.split("touch2touch-bench").skip(1) {
             let command = command.split(['\n', '`', '#']).next().unwrap_or_default().trim_start_matches(" --");
             let mut words = command.split_whitespace();
@@ -102,7 +104,7 @@ fn what_pages_say_of_a_benchmark_it_has() {
             let help = String::from_utf8(run(&[name, "--help"]).stdout).unwrap();
             for option in words.filter(|word| word.starts_with("--")) {
                 let option = option.split('=').next().unwrap_or_default();
-                assert!(help.contains(option), "{page}: {name} has no {option}\n{help}");
+                assert!(help.contains(option), "{}: {name} has no {option}\n{help}", page.display());
                 said += 1;
             }
         }
