@@ -38,7 +38,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(PredictCommand::Generate);
     rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
-    rig.take("Maximize Error");
+    rig.fill("Compare");
     assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Ledger));
     let chains = rig.chains();
     rig.send(prefer(|s| s.shift = ShiftMode::Raw));
@@ -61,7 +61,7 @@ fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
     assert!(rig.harness.query_all_by_label_contains(&what).next().is_some(), "{what}");
     rig.shoot("test-depth-chain-raw");
     // A reading is taken by a click; the flag goes.
-    rig.take("Maximize Depth chain");
+    rig.fill("Depth chain");
     rig.take("Reading Exact inverse");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::ExactInverse);
@@ -133,7 +133,7 @@ fn pictures_of_the_depth_chain() {
             rig.send(prefer(move |s| s.theme = theme));
             rig.send(prefer(|s| s.shift = ShiftMode::ExactInverse));
             rig.shoot(&format!("{name}-chain-{theme:?}").to_lowercase());
-            rig.take("Maximize Depth chain");
+            rig.fill("Depth chain");
             rig.send(prefer(|s| s.shift = ShiftMode::Raw));
             rig.shoot(&format!("{name}-chain-full-{theme:?}").to_lowercase());
             rig.take("Back to all panes");

@@ -54,6 +54,7 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
     // Behind its tab nothing is made of what is wished there.
+    click(&mut rig, "Chain");
     set(&mut rig, "prediction:seed=7", "measured", VersusMode::Side);
     let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
     assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
@@ -74,7 +75,7 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     assert!(results::subject_pose(state(&rig), &a).is_some() && results::subject_pose(state(&rig), &b).is_some());
     rig.shoot("compare-side");
 
-    // The prediction on screen against the measurement is what the error pane says.
+    // The prediction on screen against the measurement is what the metrics say.
     set(&mut rig, "prediction", "measured", VersusMode::Difference);
     let state_now = state(&rig);
     let versus = results::subjects_compared(state_now, &Subject::shown(), &b, lab::RIGHT).ready().unwrap();
@@ -96,7 +97,7 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
-    click(&mut rig, "Compare");
+    set(&mut rig, "prediction", "measured", VersusMode::Side);
     let place = rig.harness.get_by_label("Compare A right").rect();
     let middle = Rect::from_center_size(place.center(), place.size() * 0.5);
     let other = rig.harness.get_by_label("Compare B right").rect();
@@ -158,7 +159,6 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
-    click(&mut rig, "Compare");
     set(&mut rig, "mean:seeds=2", "measured", VersusMode::Clouds);
     assert!(rig.harness.query_by_label("3D view, A and B").is_some());
     let (mean, measured) = (subject("mean:seeds=2"), Subject::Measured);
@@ -186,7 +186,6 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     assert_eq!(state(&rig).settings.compared().a, mean, "kept in the preferences");
     assert!(Action::SwapCompared.command(state(&rig)).is_some());
     // What is not there says so.
-    click(&mut rig, "Compare");
     set(&mut rig, "stored", "prediction:bundle=gone", VersusMode::Side);
     assert!(rig.harness.query_all_by_label_contains("not there any more").next().is_some());
 }

@@ -87,7 +87,7 @@ fn a_pane_is_drawn_as_a_picture_from_its_own_menu() {
     rig.send(prefer(|s| s.theme = Theme::Light));
     for (text, name) in [("Save picture 4x", "error.png"), ("Save picture SVG", "error.svg")] {
         let file = rig.data.join(name);
-        let mut actions = rig.clicks(&["Export Error"]);
+        let mut actions = rig.clicks(&["Menu of Compare"]);
         rig.shoot("pane-menu");
         actions += rig.clicks(&[text]) + rig.take_to(&file);
         assert!(actions <= 4 && file.is_file(), "{actions}");
@@ -104,7 +104,7 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     rig.predicted();
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     let folder = rig.data.join("taken");
-    rig.clicks(&["Export 3D measured"]);
+    rig.clicks(&["Menu of 3D"]);
     rig.shoot("scene-menu");
     rig.clicks(&["Export the measured pair…"]);
     rig.take_to(&folder);
@@ -113,7 +113,7 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     names.sort();
     assert_eq!(names.len(), 3, "{names:?}");
     assert!(names.iter().zip(["cloud.ply", "mesh.stl", "pose.json"]).all(|(name, end)| name.ends_with(end)));
-    rig.clicks(&["Export 3D measured"]);
+    rig.clicks(&["Menu of 3D"]);
     rig.harness.get_by_label("Copy the command").click();
     rig.harness.step();
     let copied = rig.copied().expect("the command is on the clipboard");

@@ -157,9 +157,7 @@ fn a_click_on_the_map_loads_that_run() {
     rig.settle();
     assert_eq!(results::inspection(rig.harness.state().state()).ready().unwrap().num_runs(), own);
     // Out of sight the map is not computed, even when what it is made from changes.
-    rig.harness.get_by_label("Maximize Time machine").click();
-    rig.harness.step();
-    rig.settle();
+    rig.fill("Time machine");
     let maps = rig.harness.state().state().results.basins.len();
     rig.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     rig.send(Command::Inspect(InspectCommand::Color(touch2touch::app::inspect::BasinColor::Winner)));

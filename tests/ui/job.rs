@@ -236,8 +236,7 @@ fn no_pane_asks_for_what_it_does_not_show() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     // One pane alone: its panes are all that is computed for.
     rig.send(prefer(|s| s.workspace = Workspace::Label));
-    rig.harness.get_by_label("Maximize Mask").click();
-    rig.settle();
+    rig.fill("Mask");
     let state = rig.harness.state().state();
     assert_eq!(state.selection.panes.iter().copied().collect::<Vec<_>>(), vec![Pane::Masks]);
     rig.key(Modifiers::NONE, Key::Backtick);

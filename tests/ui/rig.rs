@@ -366,6 +366,15 @@ impl Rig {
         self.settle();
     }
 
+    /// Lets a pane fill the window, by the menu in its title.
+    pub(super) fn fill(&mut self, title: &str) {
+        for label in [format!("Menu of {title}"), format!("Fill the window: {title}")] {
+            self.harness.get_by_label(&label).click();
+            self.harness.step();
+            self.settle();
+        }
+    }
+
     /// Writes what is on screen, where a person asked for pictures (`TOUCH2TOUCH_SCREENSHOTS`).
     pub(super) fn shoot(&mut self, name: &str) {
         if let Some(folder) = std::env::var_os("TOUCH2TOUCH_SCREENSHOTS") {
