@@ -24,7 +24,7 @@ use touch2touch::app::command::{
     PredictCommand, ViewCommand,
 };
 use touch2touch::app::dial::DialPairs;
-use touch2touch::app::export::{FigureForm, Output};
+use touch2touch::app::export::{FigureForm, FigureRows, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
@@ -131,6 +131,7 @@ fn how(action: Action) -> How {
         A::Distances | A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
+        A::TickPair => Options(&["figure", "demo", "--pairs", "a,b", "--out", "a.png"]),
         A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
         A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
             "label",
@@ -467,7 +468,7 @@ fn figures_and_pictures_are_the_same_files_in_both() {
         let names = library.order.iter().take(2).filter_map(|pair| library.entry(*pair));
         names.map(|entry| entry.name.clone()).collect()
     };
-    let form = FigureForm { first: Some(2), scale: 1, ..FigureForm::default() };
+    let form = FigureForm { rows: FigureRows::First(2), scale: 1, ..FigureForm::default() };
     studio.send(ExportCommand::SetForm(form).into());
     studio.send(ExportCommand::Write(Output::Figure, at("studio.png")).into());
     let picture = Output::Picture { pane: Pane::Predicted, scale: None, error_m: 0.004 };

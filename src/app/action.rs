@@ -98,6 +98,8 @@ macro_rules! actions {
             state => listed(state, LibraryCommand::NextWorst).filter(|_| state.table.by().is_some());
         NextUncertain, Navigate, "Next uncertain", "Shows the most uncertain pair that is neither done nor skipped, then the next; ranks the pairs first where they are not", [alt(K::N)],
             state => listed(state, LibraryCommand::NextUncertain).filter(|_| state.table.scores.queue.known() > 0 || can_rank(state));
+        TickPair, Navigate, "Tick the pair", "Ticks the pair on screen for figures, or no longer; Ctrl+click in the list does the same", [ctrl(K::T)],
+            state => state.selection.pair.and_then(|pair| does(LibraryCommand::Tick(pair)));
         OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)],
             state => does(ViewCommand::SelectFinger(state.other_finger()));
         BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)],

@@ -4,7 +4,7 @@ mod command;
 mod setup;
 
 pub use super::keys::ImportForm;
-pub use super::state::export::{FigureForm, Output};
+pub use super::state::export::{FigureForm, FigureRows, Output};
 pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 pub use command::{equivalent, equivalent_words};
 pub(crate) use setup::{CaseView, can_draw, case_setup, figure_recipes, figure_setup, in_figure, picture_setup};

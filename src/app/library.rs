@@ -15,6 +15,7 @@ use super::services::Opened;
 use super::source::DataSource;
 use super::state::State;
 use super::state::evaluate::ScoreChoice;
+use super::state::export::FigureRows;
 use super::state::labels::{Document, Review};
 use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
@@ -60,6 +61,10 @@ pub enum LibraryCommand {
     SetUncertainBy(QueueBy),
     /// Shows only these pairs, or all.
     Brush(Option<Arc<BTreeSet<PairId>>>),
+    /// Ticks a pair for figures, or no longer.
+    Tick(PairId),
+    /// Takes all ticks away.
+    Untick,
     /// The rows of the list that are on screen.
     ShowRows(Range<usize>),
     /// Shows a pair.
@@ -123,6 +128,17 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::Brush(brush) => {
             state.library.brush = brush;
             state.reorder();
+        }
+        LibraryCommand::Tick(pair) => {
+            if !state.library.ticked.remove(&pair) {
+                state.library.ticked.insert(pair);
+            }
+            let any = !state.library.ticked.is_empty();
+            state.export.form.rows = if any { FigureRows::Ticked } else { FigureRows::Selected };
+        }
+        LibraryCommand::Untick => {
+            state.library.ticked.clear();
+            state.export.form.rows = FigureRows::Selected;
         }
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,
         LibraryCommand::Select(pair) => select(state, pair, effects),
@@ -369,6 +385,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.result = None;
     state.table.scores = Arc::default();
     state.library.brush = None;
+    state.library.ticked.clear();
     state.dial = DialState { result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     state.train = TrainState { form: state.train.form, ..TrainState::default() };

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Condvar, Mutex};
 
 use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, Opened};
 use touch2touch::app::library::Place;
 use touch2touch::app::results;

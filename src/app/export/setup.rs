@@ -9,6 +9,7 @@ use strum::IntoEnumIterator as _;
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
 use super::super::pane::{Kind, Pane};
 use super::super::state::State;
+use super::super::state::export::FigureRows;
 use super::super::state::settings::{GelView, Settings};
 use super::super::{recipe, results};
 use touch2touch_core::contact::MaskBasis;
@@ -102,9 +103,11 @@ pub fn case_lacks(state: &State) -> Vec<String> {
 /// The setup of the figure that the form describes, before anything is drawn.
 pub(crate) fn figure_setup(state: &State) -> FigureSetup {
     let form = &state.export.form;
-    let pairs = match form.first {
-        Some(n) => state.library.order.iter().copied().take(n).collect(),
-        None => state.selection.pair.into_iter().collect(),
+    let library = &state.library;
+    let pairs = match form.rows {
+        FigureRows::First(n) => library.order.iter().copied().take(n).collect(),
+        FigureRows::Ticked => library.ticked_pairs(),
+        FigureRows::Selected => state.selection.pair.into_iter().collect(),
     };
     let fingers = if form.both_fingers { state.rig().pad_list() } else { vec![state.selection.finger] };
     let look = state.settings.figure_look(form.panes.clone(), form.error_m, form.theme, f64::from(form.scale));

@@ -11,11 +11,22 @@ pub(crate) const MOST_PAIRS: usize = 50;
 /// Scales that are offered.
 pub(crate) const SCALES: [u8; 4] = [1, 2, 4, 8];
 
+/// The pairs of a figure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FigureRows {
+    /// The selected pair alone.
+    Selected,
+    /// The pairs ticked in the list, in its order.
+    Ticked,
+    /// So many pairs of the list, from the first.
+    First(usize),
+}
+
 /// The choices of a person about the next figure. Not kept between runs of the program.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FigureForm {
-    /// The number of pairs of the list, from the first; `None` = the selected pair alone.
-    pub first: Option<usize>,
+    /// The pairs, a row each.
+    pub rows: FigureRows,
     /// True where all fingers get a row; else only the active one.
     pub both_fingers: bool,
     /// The columns.
@@ -32,7 +43,7 @@ impl Default for FigureForm {
     fn default() -> Self {
         let look = FigureLook::default();
         Self {
-            first: Some(4),
+            rows: FigureRows::First(4),
             both_fingers: false,
             panes: look.panes,
             scale: 2,
@@ -46,7 +57,9 @@ impl FigureForm {
     /// Numbers brought into range.
     #[must_use]
     pub fn validated(mut self) -> Self {
-        self.first = self.first.map(|n| n.clamp(1, MOST_PAIRS));
+        if let FigureRows::First(n) = &mut self.rows {
+            *n = (*n).clamp(1, MOST_PAIRS);
+        }
         self.scale = self.scale.clamp(SCALES[0], SCALES[3]);
         self.error_m = touch2touch_core::units::clamp_or(self.error_m, 5e-5, 0.1, FigureLook::default().error_m);
         self.panes.sort_unstable();

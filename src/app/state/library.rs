@@ -130,6 +130,8 @@ pub struct Library {
     pub filter: String,
     /// Shows only these pairs: those brushed in a picture of the scores.
     pub brush: Option<Arc<BTreeSet<PairId>>>,
+    /// The pairs that a person ticked, for figures.
+    pub ticked: BTreeSet<PairId>,
     /// Shows only this tool.
     pub tool: Option<String>,
     /// The order.
@@ -165,6 +167,13 @@ impl Library {
     /// The row of `pair` in the list, if it passes the filter.
     pub(crate) fn row_of(&self, pair: PairId) -> Option<usize> {
         self.order.iter().position(|p| *p == pair)
+    }
+
+    /// The ticked pairs in the order of the list, then those that the filter hides.
+    pub(crate) fn ticked_pairs(&self) -> Vec<PairId> {
+        let listed: Vec<PairId> = self.order.iter().copied().filter(|pair| self.ticked.contains(pair)).collect();
+        let hidden: Vec<PairId> = self.ticked.iter().copied().filter(|pair| !listed.contains(pair)).collect();
+        listed.into_iter().chain(hidden).collect()
     }
 
     /// The bundle with this identity.

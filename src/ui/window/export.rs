@@ -9,7 +9,7 @@ use strum::IntoEnumIterator as _;
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
 use crate::app::export;
-use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
+use crate::app::export::{FigureForm, FigureRows, MOST_PAIRS, Output, SCALES};
 use crate::app::keys::ImprintSource;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
@@ -73,19 +73,31 @@ fn rows(cx: &Cx<'_>, ui: &mut Ui, form: &mut FigureForm) {
     let listed = cx.state.library.order.len();
     ui.horizontal(|ui| {
         ui.label(caption("Rows", cx.p));
-        if ui.radio(form.first.is_none(), "this pair").on_hover_text("The pair on screen alone").clicked() {
-            form.first = None;
+        let one = form.rows == FigureRows::Selected;
+        if ui.radio(one, "this pair").on_hover_text("The pair on screen alone").clicked() {
+            form.rows = FigureRows::Selected;
+        }
+        let ticked = cx.state.library.ticked.len();
+        let radio = egui::RadioButton::new(form.rows == FigureRows::Ticked, format!("the {ticked} ticked"));
+        let tip = cx.keys().fill("Pairs ticked in the list: Ctrl+click, or [[tick_pair]] for the one on screen");
+        if ui.add_enabled(ticked > 0, radio).on_hover_text(&tip).on_disabled_hover_text(&tip).clicked() {
+            form.rows = FigureRows::Ticked;
         }
         let tip = "From the top of the list as it is filtered and sorted now";
-        if ui.radio(form.first.is_some(), "the first").on_hover_text(tip).clicked() && form.first.is_none() {
-            form.first = FigureForm::default().first;
+        let mut first = match form.rows {
+            FigureRows::First(n) => Some(n),
+            FigureRows::Selected | FigureRows::Ticked => None,
+        };
+        if ui.radio(first.is_some(), "the first").on_hover_text(tip).clicked() && first.is_none() {
+            first = Some(4);
         }
-        let mut first = form.first.unwrap_or(4);
-        let drag = DragValue::new(&mut first).range(1..=MOST_PAIRS);
-        let drag = ui.add_enabled(form.first.is_some(), drag).accessible_name("Pairs of the figure");
+        let mut count = first.unwrap_or(4);
+        let drag = DragValue::new(&mut count).range(1..=MOST_PAIRS);
+        let drag = ui.add_enabled(first.is_some(), drag).accessible_name("Pairs of the figure");
         if drag.on_hover_text(tip).changed() {
-            form.first = Some(first);
+            first = Some(count);
         }
+        form.rows = first.map_or(form.rows, FigureRows::First);
         ui.label(caption(format!("of {listed} listed"), cx.p));
     });
     ui.horizontal(|ui| {

@@ -18,7 +18,7 @@ use touch2touch::app::command::{
 use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
-use touch2touch::app::export::{FigureForm, Output};
+use touch2touch::app::export::{FigureForm, FigureRows, Output};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
@@ -273,8 +273,15 @@ fn shortcut() -> impl Strategy<Value = Shortcut> {
 
 fn form() -> impl Strategy<Value = FigureForm> {
     let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
-    (proptest::option::of(any::<usize>()), panes, any::<u8>(), number())
-        .prop_map(|(first, panes, scale, error_m)| FigureForm { first, panes, scale, error_m, ..FigureForm::default() })
+    let rows =
+        prop_oneof![Just(FigureRows::Selected), Just(FigureRows::Ticked), any::<usize>().prop_map(FigureRows::First)];
+    (rows, panes, any::<u8>(), number()).prop_map(|(rows, panes, scale, error_m)| FigureForm {
+        rows,
+        panes,
+        scale,
+        error_m,
+        ..FigureForm::default()
+    })
 }
 
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
@@ -417,6 +424,8 @@ draws! {
             best_first,
             ..ScoreChoice::default()
         })),
+        1 Tick(pair()),
+        1 Untick,
         1 Brush(proptest::option::of(pair().prop_map(|pair| Arc::new([pair].into())))),
         1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
         4 Select(pair()),
