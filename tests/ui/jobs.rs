@@ -76,9 +76,7 @@ fn two_models_are_compared_on_the_pair_on_screen() {
 fn the_distance_between_the_model_and_the_tip_is_read() {
     let Some(rig) = Rig::aligned() else { return };
     let mut person = Person::at(rig);
-    for _ in 0..3 {
-        person.press(Key::V);
-    }
+    person.press(Key::V);
     let state = person.state();
     let source = ImprintSource::Measured;
     let found = results::deviation(state, source).ready().expect("the distances are shown");

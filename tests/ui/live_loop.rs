@@ -81,6 +81,9 @@ fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
     assert_eq!(ghost.pose.unwrap().angle_rad, first_angle);
     assert!(ghost.clouds.is_some());
     // The list of the 3D view says what was dropped and added, and where the model was.
+    rig.harness.get_by_label("Legend").click();
+    rig.harness.step();
+    rig.settle();
     rig.shoot("label-ghost");
     assert!(rig.harness.query_all_by_label_contains("added: ").next().is_some());
     assert!(rig.harness.query_all_by_label_contains("CAD, before").next().is_some());

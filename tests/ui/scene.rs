@@ -70,6 +70,8 @@ fn distances_are_those_of_the_contact_points_and_colors_show_them() {
 #[test]
 fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     let Some(mut rig) = Rig::aligned() else { return };
+    let legend = rig.harness.get_by_label("Legend").rect().center();
+    rig.click_at(legend);
     let before = colors(&mut rig);
     let at = rig.harness.get_by_label("Show membrane, points, measured").rect().center();
     rig.click_at(at);
@@ -101,7 +103,7 @@ fn a_plane_cuts_by_key_and_bar_and_says_where() {
     let section = state(&rig).workbench.section.expect("a plane");
     assert_eq!((section.axis, section.at_m), (SectionAxis::Closing, 0.0));
     assert_ne!(colors(&mut rig), whole);
-    let across = rig.harness.get_by_label("Cut across z, along the tool, measured").rect().center();
+    let across = rig.harness.get_by_label("Cut across z, along the tool").rect().center();
     rig.click_at(across);
     assert_eq!(state(&rig).workbench.section.unwrap().axis, SectionAxis::Tool);
     rig.shoot("test-section");

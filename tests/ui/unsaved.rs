@@ -14,9 +14,17 @@ use touch2touch_work::labels::{Labels, recover};
 use super::rig::Rig;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
-const REVIEW: &str = "Review: flagged";
 
 impl Rig {
+    /// Flags the pair by hand.
+    fn flag(&mut self) {
+        for label in ["Review state", "flagged"] {
+            self.harness.get_by_label(label).click();
+            self.harness.step();
+            self.settle();
+        }
+    }
+
     /// Asks the window to close as the system does, and goes on; what the studio answered the system.
     fn ask_to_close(&mut self) -> Vec<ViewportCommand> {
         let root = self.harness.input_mut().viewports.entry(ViewportId::ROOT).or_default();
@@ -44,8 +52,7 @@ fn stick(rig: &mut Rig) {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     std::fs::write(rig.data.join(FOLDER), "in the way").unwrap();
-    rig.harness.get_by_label(REVIEW).click();
-    rig.settle();
+    rig.flag();
     rig.harness.get_by_label("not saved");
 }
 
@@ -123,8 +130,7 @@ fn a_data_set_that_is_renamed_under_the_studio_is_asked_about_and_nothing_is_mad
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     let renamed = rig.data.with_file_name("renamed");
     std::fs::rename(&rig.data, &renamed).unwrap();
-    rig.harness.get_by_label(REVIEW).click();
-    rig.settle();
+    rig.flag();
     assert_eq!(rig.question(), Some(Question::Lost));
     assert!(!rig.data.exists());
     rig.harness.get_by_label_contains("The data set is gone");

@@ -270,9 +270,14 @@ fn a_clicked_point_says_all_about_itself() {
 fn layers_go_round_and_their_numbers_add_up() {
     let Some(mut rig) = Rig::aligned() else { return };
     for layer in [Layer::Residuals, Layer::Reasons, Layer::Distance, Layer::Correspondences, Layer::None] {
-        rig.press(Modifiers::NONE, Key::V);
+        rig.press(Modifiers::SHIFT, Key::V);
         assert_eq!(rig.model().workbench.layer, layer);
         rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());
+    }
+    // The distance is on or off.
+    for layer in [Layer::Distance, Layer::None] {
+        rig.press(Modifiers::NONE, Key::V);
+        assert_eq!(rig.model().workbench.layer, layer);
     }
     let layers = results::layers(rig.model(), MEASURED).ready().expect("the pane shows them");
     for finger in lab::PADS {

@@ -82,29 +82,40 @@ fn sign(tool: MaskTool) -> Icon {
     }
 }
 
-/// The tools in a row, and below them the number of the one in hand.
+/// The tools in a row; below them the number of the one in hand, and the way back.
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
+    const GAP: f32 = 2.0;
+    let count = MaskTool::iter().count() as f32;
+    // In a narrow window they are narrower.
+    let wide = ((ui.available_width() - 4.0) / count - GAP).clamp(18.0, icon::SIZE.x);
     ui.horizontal(|ui| {
-        ui.spacing_mut().item_spacing.x = 2.0;
-        ui.spacing_mut().interact_size.y = icon::SIZE.y;
+        ui.spacing_mut().item_spacing.x = GAP;
         for tool in MaskTool::iter() {
             let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
             let key = cx.keys().text(row.action);
-            let button = icon::button(ui, sign(tool), &key, row.name, true, mask.tool == tool);
+            let button =
+                icon::Button { icon: sign(tool), key: &key, name: row.name, enabled: true, on: mask.tool == tool };
             let help = format!("{}: {}", row.name, cx.keys().help(row.action));
-            if button.on_hover_text(help).clicked() {
+            if button.show(ui, vec2(wide, icon::SIZE.y)).on_hover_text(help).clicked() {
                 cx.act(row.action);
             }
         }
     });
     ui.horizontal(|ui| {
         ui.set_height(22.0);
-        let mask = &cx.state.settings.mask;
-        match mask.tool.row(mask) {
-            ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
-            ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
-            row => _ = ui.add(egui::Label::new(caption(row.hint, cx.p)).truncate()),
-        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.spacing_mut().item_spacing.x = GAP;
+            undo(cx, ui);
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                ui.spacing_mut().item_spacing.x = 4.0;
+                let mask = &cx.state.settings.mask;
+                match mask.tool.row(mask) {
+                    ToolRow { draws: Some(DrawTool::Brush { .. }), .. } => radius(cx, ui),
+                    ToolRow { draws: Some(DrawTool::Wand { .. }), .. } => wand(cx, ui),
+                    row => _ = ui.add(egui::Label::new(caption(row.hint, cx.p)).truncate()),
+                }
+            });
+        });
     });
 }
 
@@ -130,7 +141,6 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(caption("Paint", cx.p));
         let now = cx.state.settings.mask.paint;
         for (paint, text, tip, color) in [
             (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
@@ -145,19 +155,21 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.push(prefer(move |s| s.mask.paint = paint));
             }
         }
-        ui.with_layout(Layout::right_to_left(Align::Center), |ui| undo(cx, ui));
     });
 }
 
-/// Undo and redo, with what they would take back.
+/// Redo and undo, with what they would take back.
 fn undo(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (name, shown) = (cx.state.pair_name(), results::mask_places(cx.state));
     let undo = cx.state.history.next_undo(name, &shown).map(|g| g.name.clone());
     let redo = cx.state.history.next_redo(name, &shown).map(|g| g.name.clone());
-    for (action, text, what) in [(Action::Redo, "Redo", redo), (Action::Undo, "Undo", undo)] {
-        let response = cx.action_button(ui, action, text);
-        if let Some(what) = what {
-            response.on_hover_text(format!("{text} {what}"));
+    for (action, icon, what) in [(Action::Redo, Icon::Redo, redo), (Action::Undo, Icon::Undo, undo)] {
+        let enabled = action.command(cx.state).is_some();
+        let button = icon::Button { icon, key: "", name: action.name(), enabled, on: false };
+        let what = what.map_or(String::new(), |what| format!(" {what}"));
+        let tip = cx.keys().behind(&format!("{}{what}", action.name()), action);
+        if button.show(ui, vec2(24.0, 22.0)).on_hover_text(tip).clicked() {
+            cx.act(action);
         }
     }
 }
@@ -180,8 +192,8 @@ fn said(cx: &Cx<'_>, ui: &mut Ui) {
 
 fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut radius = cx.state.settings.mask.radius_px;
-    ui.label(caption("Radius", cx.p));
-    let drag = egui::DragValue::new(&mut radius).speed(0.1).range(BRUSH_RADIUS_PX).fixed_decimals(1).suffix(" px");
+    let drag = egui::DragValue::new(&mut radius).speed(0.1).range(BRUSH_RADIUS_PX).fixed_decimals(1);
+    let drag = drag.prefix("radius ").suffix(" px");
     let response = ui.add(drag).accessible_name("Brush radius");
     if response.double_clicked() {
         radius = MaskSettings::default().radius_px;
@@ -209,7 +221,7 @@ fn slider_mm(ui: &mut Ui, name: &str, meters: &mut f32, range: std::ops::RangeIn
 
 fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut new = cx.state.settings.mask.clone();
-    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
+    ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(30.0);
     let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
                halves it";
     if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {

@@ -3,8 +3,7 @@
 use crate::app::results;
 use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Sense, Ui};
 
-use super::images;
-use super::scene;
+use super::{images, poses, scene};
 use crate::app::action::Action;
 use crate::app::command::Pane;
 use crate::app::keys::ImprintSource;
@@ -142,8 +141,8 @@ fn verdict(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
 fn place(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
     let p = pose.grasp_from_object;
     let mut text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
-    if results::by_hand(cx.state, source).is_some() {
-        text += "   by hand";
+    if let Some(hand) = results::by_hand(cx.state, source) {
+        ui.label(RichText::new(poses::by_hand_text(cx, hand)).size(SMALL).color(cx.p.good));
     } else if results::accepted(cx.state, source) == Some(p.into()) {
         text += "   accepted";
     }

@@ -78,14 +78,18 @@ fn accept(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
 }
 
-/// A pose that a person set, in place of the button that takes the registered one over.
-fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: ManualPose) {
-    let angle = hand.planar.inverse().theta_rad;
-    let mut text = format!("Accepted by hand: {}", units::text_deg(angle));
+/// `Accepted by hand: 3.0° (error 0.2°)`.
+pub(crate) fn by_hand_text(cx: &Cx<'_>, hand: ManualPose) -> String {
+    let mut text = format!("Accepted by hand: {}", units::text_deg(hand.planar.inverse().theta_rad));
     if let Some(truth) = results::truth(cx.state) {
         text += &format!(" (error {})", units::text_deg(PoseDifference::between(hand.planar, truth).angle_rad));
     }
-    ui.label(RichText::new(text).size(SMALL).color(cx.p.good));
+    text
+}
+
+/// A pose that a person set, in place of the button that takes the registered one over.
+fn by_hand(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, hand: ManualPose) {
+    ui.label(RichText::new(by_hand_text(cx, hand)).size(SMALL).color(cx.p.good));
     let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
     let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
     if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {

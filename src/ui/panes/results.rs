@@ -42,7 +42,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
                 ),
             };
             let action = Action::EvaluateDataset.command(cx.state);
-            let action = action.map(|_| ("Evaluate", Action::EvaluateDataset.tooltip()));
+            let action = action.map(|_| (Action::EvaluateDataset.name(), Action::EvaluateDataset.tooltip()));
             if empty::show(ui, what, why, action) {
                 cx.act(Action::EvaluateDataset);
             }

@@ -91,8 +91,8 @@ fn number(ui: &mut Ui, new: &mut MaskSettings) {
             let distance = &mut new.choice.cad_distance_m;
             resets(ui, "CAD distance", tip, distance, default.cad_distance_m, (1e3, 5.0, 2, " mm"));
         }
-        MaskSource::Auto | MaskSource::Unet => probability(ui, &mut new.choice),
-        MaskSource::Truth => {}
+        MaskSource::Unet => probability(ui, &mut new.choice),
+        MaskSource::Auto | MaskSource::Truth => {}
     }
 }
 

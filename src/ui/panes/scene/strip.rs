@@ -34,9 +34,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
         ui.set_clip_rect(column.intersect(ui.clip_rect()));
         // In a low pane the buttons are lower, so that all are there.
         const BUTTONS: f32 = 9.0;
-        let high = ((column.height() - 18.0) / BUTTONS - 2.0).clamp(18.0, icon::SIZE.y);
         ui.spacing_mut().item_spacing.y = 2.0;
-        ui.spacing_mut().interact_size.y = high;
+        ui.spacing_mut().interact_size.y = ((column.height() - 18.0) / BUTTONS - 2.0).clamp(18.0, icon::SIZE.y);
         views(cx, ui);
         line(cx, ui);
         let (tool, layer) = (cx.state.workbench.tool, cx.state.workbench.layer);
@@ -59,10 +58,16 @@ fn line(cx: &Cx<'_>, ui: &mut Ui) {
     ui.painter().hline(rect.x_range().shrink(3.0), rect.center().y, (1.0, cx.p.line));
 }
 
+/// A button of the strip, as high as there is room.
+fn sign(ui: &mut Ui, button: icon::Button<'_>) -> egui::Response {
+    let high = ui.spacing().interact_size.y;
+    button.show(ui, vec2(icon::SIZE.x, high))
+}
+
 fn switch(cx: &mut Cx<'_>, ui: &mut Ui, icon: Icon, action: Action, on: bool) {
     let key = cx.keys().text(action);
     let enabled = action.command(cx.state).is_some();
-    let button = icon::button(ui, icon, &key, action.name(), enabled, on);
+    let button = sign(ui, icon::Button { icon, key: &key, name: action.name(), enabled, on });
     let help = format!("{}. {}", action.name(), cx.keys().help(action));
     if button.on_hover_text(help).clicked() {
         cx.act(action);
@@ -80,7 +85,7 @@ fn row(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, on: bool) {
 
 /// Where to look from.
 fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let button = icon::button(ui, Icon::Views, "", "Views", true, false);
+    let button = sign(ui, icon::Button { icon: Icon::Views, key: "", name: "Views", enabled: true, on: false });
     let button = button.on_hover_text("Seven cameras, fit, parallel or in perspective");
     Popup::menu(&button).show(|ui| {
         ui.set_min_width(190.0);
@@ -98,7 +103,7 @@ fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
     let painted = cx.state.workbench.layer;
     let on = !matches!(painted, Layer::None | Layer::Distance);
-    let button = icon::button(ui, Icon::Layers, "", "What is shown", true, on);
+    let button = sign(ui, icon::Button { icon: Icon::Layers, key: "", name: "What is shown", enabled: true, on });
     let button = button.on_hover_text("What the contact points are painted with, and what is drawn around them");
     Popup::menu(&button).close_behavior(PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
         ui.set_min_width(210.0);

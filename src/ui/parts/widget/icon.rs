@@ -2,9 +2,7 @@
 
 use std::f32::consts::TAU;
 
-use eframe::egui::{
-    self, Align2, Color32, FontId, Pos2, Rect, Response, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, vec2,
-};
+use eframe::egui::{self, Align2, Color32, FontId, Pos2, Response, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, vec2};
 
 use crate::ui::parts::theme::Palette;
 
@@ -39,6 +37,10 @@ pub enum Icon {
     Wand,
     /// A brush on a cube.
     BrushIn3d,
+    /// An arrow back.
+    Undo,
+    /// An arrow forward.
+    Redo,
 }
 
 /// Size of the sign, points.
@@ -111,6 +113,8 @@ impl Icon {
                 vec![[7.4, 3.9], [9.5, 3.9]],
                 vec![[11.5, 3.9], [13.6, 3.9]],
             ],
+            Self::Undo => vec![circle(7.0, 8.0, 4.5, 0.55, 1.2), vec![[1.0, 3.0], [2.5, 7.0], [6.5, 5.5]]],
+            Self::Redo => vec![circle(7.0, 8.0, 4.5, 0.3, 0.95), vec![[13.0, 3.0], [11.5, 7.0], [7.5, 5.5]]],
             Self::BrushIn3d => vec![
                 vec![[1.0, 6.0], [5.0, 4.0], [9.0, 6.0], [9.0, 11.0], [5.0, 13.0], [1.0, 11.0], [1.0, 6.0]],
                 vec![[1.0, 6.0], [5.0, 8.0], [9.0, 6.0]],
@@ -132,29 +136,46 @@ impl Icon {
 /// Size of a button with room for its key, points.
 pub const SIZE: Vec2 = vec2(30.0, 28.0);
 
-/// A button with a sign, as high as controls are, its key below it in small letters where there is the room; `name` is
-/// what a screen reader says.
-pub fn button(ui: &mut Ui, icon: Icon, key: &str, name: &str, enabled: bool, on: bool) -> Response {
-    const KEY: f32 = 8.5;
-    let p = Palette::of(ui);
-    let sense = if enabled { Sense::click() } else { Sense::hover() };
-    let (rect, response) = ui.allocate_exact_size(vec2(SIZE.x, ui.spacing().interact_size.y), sense);
-    response.widget_info(|| WidgetInfo::selected(Role::Button, enabled, on, name));
-    let fill = match (on, response.hovered() && enabled) {
-        (true, _) => p.selected,
-        (false, true) => p.control[1],
-        (false, false) => Color32::TRANSPARENT,
-    };
-    ui.painter().rect_filled(rect, 4.0, fill);
-    let color = match (enabled, on || response.hovered()) {
-        (false, _) => p.line,
-        (true, true) => p.strong,
-        (true, false) => p.text,
-    };
-    let key = if rect.height() < SIZE.y - 4.0 { "" } else { key };
-    let up = if key.is_empty() { 0.0 } else { 4.0 };
-    icon.paint(ui.painter(), rect.center() - vec2(0.0, up), color);
-    let foot = Rect::from_min_max(egui::pos2(rect.left(), rect.bottom() - 10.0), rect.max);
-    ui.painter().text(foot.center(), Align2::CENTER_CENTER, key, FontId::proportional(KEY), p.weak);
-    response
+/// A button with a sign, its key below it in small letters where there is the room.
+#[derive(Clone, Copy, Debug)]
+pub struct Button<'a> {
+    /// The sign.
+    pub icon: Icon,
+    /// The key; empty without one.
+    pub key: &'a str,
+    /// What a screen reader says.
+    pub name: &'a str,
+    /// True where it can be pressed.
+    pub enabled: bool,
+    /// True where it stands for what is in force.
+    pub on: bool,
+}
+
+impl Button<'_> {
+    /// Draws it.
+    pub fn show(self, ui: &mut Ui, size: Vec2) -> Response {
+        const KEY: f32 = 8.5;
+        let p = Palette::of(ui);
+        let sense = if self.enabled { Sense::click() } else { Sense::hover() };
+        let (rect, response) = ui.allocate_exact_size(size, sense);
+        response.widget_info(|| WidgetInfo::selected(Role::Button, self.enabled, self.on, self.name));
+        let hovered = response.hovered() && self.enabled;
+        let fill = match (self.on, hovered) {
+            (true, _) => p.selected,
+            (false, true) => p.control[1],
+            (false, false) => Color32::TRANSPARENT,
+        };
+        ui.painter().rect_filled(rect, 4.0, fill);
+        let color = match (self.enabled, self.on || hovered) {
+            (false, _) => p.line,
+            (true, true) => p.strong,
+            (true, false) => p.text,
+        };
+        let key = if rect.height() < SIZE.y - 4.0 { "" } else { self.key };
+        let up = if key.is_empty() { 0.0 } else { 4.0 };
+        self.icon.paint(ui.painter(), rect.center() - vec2(0.0, up), color);
+        let foot = egui::pos2(rect.center().x, rect.bottom() - 5.0);
+        ui.painter().text(foot, Align2::CENTER_CENTER, key, FontId::proportional(KEY), p.weak);
+        response
+    }
 }
