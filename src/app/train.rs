@@ -111,6 +111,7 @@ pub(crate) fn setup(state: &State) -> Option<TrainSetup> {
         start: recipe::bundle(state, BundleKind::Mask).ok()?.clone(),
         generators: generators.cloned().collect(),
         engine: state.settings.runtime,
+        registration: state.settings.registration,
         choice: state.train.form.choice,
         tuning: state.train.form.tuning(),
         unfinished: None,

@@ -63,7 +63,7 @@ use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
 use touch2touch_work::sweep::{Dial, Setting};
 use touch2touch_work::tool::UnitSet;
-use touch2touch_work::train::TrainChoice;
+use touch2touch_work::train::{MasksFrom, TrainChoice};
 
 use super::super::answered::{adapted, swept, trained};
 use super::super::double::Double;
@@ -554,7 +554,7 @@ draws! {
     }
     train: TrainCommand {
         1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
-            TrainForm { choice: TrainChoice { held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
+            TrainForm { choice: TrainChoice { from: if by_steps { MasksFrom::Cad } else { MasksFrom::Drawn }, held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
         })),
         1 Start,
         1 Use,
