@@ -8,6 +8,7 @@ mod layout;
 mod look;
 mod rig;
 
+mod about;
 mod adapt;
 mod chain;
 mod compare;

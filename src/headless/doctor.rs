@@ -2,7 +2,6 @@
 //! lists what is wrong, and tries on a handful of pairs which other reading would explain them better.
 
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -10,17 +9,15 @@ use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
-use touch2touch_core::doubt::Doubt;
-use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
-use touch2touch_work::about::{self, Cure, Fact, Worth, WorthSetup};
+use touch2touch_work::about::{self, Cure, Examined, Fact, Worth, WorthSetup};
 use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::doubts::{self, examine_reading};
+use touch2touch_work::doubts;
 use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::{Dataset, OpenError};
-use touch2touch_work::io::doctor::{self, DoctorReport};
-use touch2touch_work::job::JobCx;
+use touch2touch_work::io::doctor::DoctorReport;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::predict::Generating;
@@ -74,7 +71,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
             about = about::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
             worth = tried_models(args, &dataset, &output)?;
             about.extend(worth.iter().flat_map(Worth::facts));
-            let (report, read_as) = examined(args, &dataset, &output);
+            let Examined { report, read_as } = examined(args, &dataset, &output)?;
             (dataset.title, report, read_as, true)
         }
         Err(err @ OpenError::Rig { .. }) => {
@@ -82,7 +79,8 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         }
         Err(err) => anyhow::bail!("{err}; {}", err.hint()),
     };
-    let said = Report { about: &about, worth: worth.as_ref(), pairs: report.pairs, problems: &report.problems, read_as };
+    let said =
+        Report { about: &about, worth: worth.as_ref(), pairs: report.pairs, problems: &report.problems, read_as };
     output.finish(&said, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
@@ -134,31 +132,18 @@ fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow
     Ok(about::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
 }
 
-/// Faults of single files, and before them faults of all of them, with the readings that would mend those.
-fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> (DoctorReport, Option<String>) {
-    let mut report = doctor::examine(dataset, &mut |done, total| {
-        output.set(done, total);
-        ControlFlow::Continue(())
-    });
-    let doubts = tried(args, dataset);
-    let mut found = Findings::default();
-    found.extend(doubts::problems(dataset, &doubts));
-    report.problems.splice(0..0, found.into_list());
-    (report, doubts::remedy(dataset, &doubts))
-}
-
-/// Doubts that are found by trying; predictions are compared where a generator for these sensors is there.
-fn tried(args: &DoctorArgs, dataset: &Dataset) -> Vec<Doubt> {
-    let cx = JobCx::unwatched();
+/// Every pair examined; predictions are compared where a generator for these sensors is there.
+fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Examined> {
+    let cx = output.job();
     let bundle = (!args.no_predictions && args.tried > 0)
         .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
         .flatten();
     let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return examine_reading(dataset, args.tried, None, &cx);
+        return Ok(about::examined(dataset, args.tried, None, &cx)?);
     };
     let models = Models::new(super::cache::store());
     let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    examine_reading(dataset, args.tried, Some((&models, generating)), &cx)
+    Ok(about::examined(dataset, args.tried, Some((&models, generating)), &cx)?)
 }
 
 /// The other examples, by the names of their files.

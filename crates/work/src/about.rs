@@ -3,6 +3,7 @@
 //! the same lines.
 
 mod cure;
+mod examined;
 mod facts;
 mod worth;
 
@@ -10,6 +11,7 @@ use serde::Serialize;
 use strum::IntoStaticStr;
 
 pub use cure::Cure;
+pub use examined::{Examined, examined};
 pub use facts::facts;
 pub use worth::{SAMPLE, Worth, WorthSetup, worth};
 

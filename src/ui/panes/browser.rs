@@ -93,6 +93,11 @@ fn source_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if reload.on_hover_text(Action::Reload.tooltip()).clicked() {
             cx.act(Action::Reload);
         }
+        let about = Action::AboutData;
+        let button = ui.add_enabled(about.command(cx.state).is_some(), egui::Button::new(about.name()));
+        if button.on_hover_text(about.tooltip()).clicked() {
+            cx.act(about);
+        }
         let following = cx.state.library.follow.is_some();
         let button =
             egui::Button::new(Action::Follow.name()).shortcut_text(cx.keys().text(Action::Follow)).selected(following);

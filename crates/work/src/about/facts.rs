@@ -25,13 +25,14 @@ const MOST_NAMED: usize = 3;
 const MOST_MODELS: usize = 64;
 /// Share of the pixels that are left out of the range on each side: single flying pixels are no depth of the imprint.
 const FLYING: f64 = 0.005;
+/// Less is the noise of a membrane at rest, millimeters.
+const ASIDE_MM: f64 = 1.0;
 /// Every so many pixels of an imprint count for the range.
 const STRIDE: usize = 7;
 
 /// Lines about a data set and what people said about it. Pairs and CAD models that cannot be read are in the lines.
 pub fn facts(dataset: &Dataset, masks: &DrawnMasks<'_>) -> Vec<Fact> {
-    let ids: Vec<PairId> =
-        spread(dataset.index.pairs.len(), Some(LOOKED_AT)).map(|at| PairId(at as u32)).collect();
+    let ids: Vec<PairId> = spread(dataset.index.pairs.len(), Some(LOOKED_AT)).map(|at| PairId(at as u32)).collect();
     let looked_at: Vec<Sample> = ids.par_iter().filter_map(|id| dataset.load(*id).ok()).collect();
     let models = models(dataset);
     let posed = looked_at.iter().filter(|sample| sample.grasp_from_object.is_some()).count();
@@ -99,7 +100,12 @@ fn pairs(dataset: &Dataset, looked_at: &[Sample], asked: usize) -> Fact {
 
 fn tools(dataset: &Dataset) -> Fact {
     let mut of: BTreeMap<&str, usize> = BTreeMap::new();
-    dataset.index.pairs.iter().filter_map(|pair| pair.tool.as_deref()).for_each(|tool| *of.entry(tool).or_default() += 1);
+    dataset
+        .index
+        .pairs
+        .iter()
+        .filter_map(|pair| pair.tool.as_deref())
+        .for_each(|tool| *of.entry(tool).or_default() += 1);
     if of.is_empty() {
         return Fact::plain(Topic::Tools, "no pair says which tool it is of: no CAD model, no pose");
     }
@@ -204,13 +210,16 @@ fn range(looked_at: &[Sample]) -> Option<Fact> {
     let mut at = |index: usize| f64::from(*values.select_nth_unstable_by(index, f32::total_cmp).1);
     let (lo, hi) = (at(cut), at(last));
     let (lo, hi) = ((mm(lo) * 10.0).floor() / 10.0, (mm(hi) * 10.0).ceil() / 10.0);
-    // A membrane at rest is not exactly flat: colors begin where nothing touches.
-    let lo = if (-1.0..0.0).contains(&lo) { 0.0 } else { lo };
-    if hi <= lo {
+    // Colors begin where nothing touches: what lies below is the membrane that gives way beside the tool.
+    let from = lo.max(0.0);
+    if hi <= from {
         return Some(Fact::plain(Topic::Range, "all measured imprints are flat").graded(Grade::Caution));
     }
-    let text = format!("imprints go from {} to {} mm", fixed(lo, 1), fixed(hi, 1));
-    let cure = Cure::FitRange { min_m: (lo * 1e-3) as f32, max_m: (hi * 1e-3) as f32 };
+    let mut text = format!("{} to {} mm", fixed(from, 1), fixed(hi, 1));
+    if lo < -ASIDE_MM {
+        text += &format!("; beside the tool down to {} mm", fixed(lo, 1));
+    }
+    let cure = Cure::FitRange { min_m: (from * 1e-3) as f32, max_m: (hi * 1e-3) as f32 };
     Some(Fact::plain(Topic::Range, text).with_cure(cure))
 }
 

@@ -61,12 +61,7 @@ pub struct Worth {
 ///
 /// # Errors
 /// If the job was told to stop. That a model cannot be tried is part of the answer.
-pub fn worth(
-    dataset: &Dataset,
-    setup: &WorthSetup,
-    models: &Models,
-    cx: &JobCx,
-) -> Result<Option<Worth>, TaskError> {
+pub fn worth(dataset: &Dataset, setup: &WorthSetup, models: &Models, cx: &JobCx) -> Result<Option<Worth>, TaskError> {
     if dataset.kind == SourceKind::Demo && dataset.read_as().is_empty() {
         return Ok(None);
     }

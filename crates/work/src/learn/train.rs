@@ -252,7 +252,11 @@ impl TrainPlan {
                 None,
             )
         } else {
-            ("no mask was corrected or accepted".into(), "Look at pairs, correct what is wrong, and mark them \"done\".", None)
+            (
+                "no mask was corrected or accepted".into(),
+                "Look at pairs, correct what is wrong, and mark them \"done\".",
+                None,
+            )
         };
         let cure = cure.or((self.by_cad > 0).then_some(TrainCure::FromCad));
         let mut hint = hint.to_owned();
@@ -462,11 +466,11 @@ fn poses(
     let held: Vec<PairId> = held.into_iter().collect();
     let pairs = spread(held.len(), Some(MOST_POSED)).map(|at| held[at]).collect();
     let after = crate::bundles::open(WHAT, trained.bundle.as_path())?;
-    let worth = |model: &BundleInfo| match mask_worth(dataset, &pairs, (model, setup.engine, setup.registration), models, cx)
-    {
-        Err(err) if err.is_cancelled() => Ok(None),
-        worth => worth,
-    };
+    let worth =
+        |model: &BundleInfo| match mask_worth(dataset, &pairs, (model, setup.engine, setup.registration), models, cx) {
+            Err(err) if err.is_cancelled() => Ok(None),
+            worth => worth,
+        };
     Ok(match worth(&setup.start)? {
         Some(before) => worth(&after)?.map(|after| [before, after]),
         None => None,

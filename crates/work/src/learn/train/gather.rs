@@ -122,7 +122,11 @@ pub(super) fn gather(
             for place in &entry.places {
                 let Some(hand) = labels.masks.get(place) else { continue };
                 gathered.persons.extend(hand.marks.layers().into_iter().filter_map(|(layer, px)| match layer {
-                    Provenance::Hand { person } if px > 0 && !person.is_empty() => Some(person.clone()),
+                    Provenance::Hand { person } | Provenance::Accepted { person, .. }
+                        if px > 0 && !person.is_empty() =>
+                    {
+                        Some(person.clone())
+                    }
                     _ => None,
                 }));
                 let imprint = match imprint(&sample, place, setup, models, cx) {
