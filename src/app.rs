@@ -16,6 +16,7 @@
 //!   from it; [`act`] turns its rows into commands.
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
+pub mod about;
 pub mod act;
 pub mod action;
 pub mod adapt;

@@ -20,8 +20,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
-    PredictCommand, ViewCommand,
+    AboutCommand, AdaptCommand, Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand,
+    Pane, PredictCommand, ViewCommand,
 };
 use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, FigureRows, Output};
@@ -40,6 +40,7 @@ use touch2touch_core::label::CleanKind;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
+use touch2touch_work::about::{Cure, Fact};
 use touch2touch_work::export::{ExportChoice, Which};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::Dataset;
@@ -73,6 +74,7 @@ fn how(action: Action) -> How {
     use How::{Options, Shell, Verb, Window};
     match action {
         A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
+        A::AboutData => Verb(&["doctor", "demo", "--sample", "8"]),
         A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
@@ -165,6 +167,37 @@ fn how(action: Action) -> How {
 }
 
 #[test]
+pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb() {
+    let home = tempfile::tempdir().unwrap();
+    let folder = lab_folder(home.path());
+    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
+    for command in [AboutCommand::Show(true), AboutCommand::Try, AboutCommand::Cure(Cure::Examine { pairs: 0 })] {
+        studio.send(command.into());
+    }
+    let state = &studio.state;
+    let (_, facts) = state.results.abouts.iter().next().expect("the panel is open");
+    let worth = state.about.worth.as_ref().expect("the models were tried");
+    let lines: Vec<Fact> = facts.iter().cloned().chain(worth.facts()).collect();
+    let said = json(&["doctor", folder.to_str().unwrap()], home.path());
+    assert!(lines.len() >= 10, "{lines:?}");
+    // The time that a fit takes is the machine's.
+    let timeless = |value: &Value| value.as_str().unwrap().split("; fit to").next().unwrap().to_owned();
+    for (line, said) in lines.iter().zip(said["about"].as_array().unwrap()) {
+        let line: Value = serde_json::from_str(&serde_json::to_string(line).unwrap()).unwrap();
+        assert_eq!(timeless(&line["text"]), timeless(&said["text"]));
+        assert_eq!((&line["topic"], &line["grade"], &line["cures"]), (&said["topic"], &said["grade"], &said["cures"]));
+    }
+    assert_eq!(said["about"].as_array().unwrap().len(), lines.len());
+    let examined = state.about.examined.as_ref().expect("every pair was examined");
+    assert_eq!(said["problems"], serde_json::to_value(&examined.report.problems).unwrap());
+    // Every cure of a verb is one that the program knows.
+    for cure in lines.iter().flat_map(|line| &line.cures) {
+        let Some(verb) = cure.verb() else { continue };
+        touch2touch::headless::check_command(verb.split(' ')).unwrap_or_else(|err| panic!("{verb}: {err}"));
+    }
+}
+
+#[test]
 fn every_action_that_computes_or_writes_has_its_verb() {
     let (mut verbs, mut all) = (0, 0);
     for action in Action::iter() {
@@ -190,6 +223,7 @@ impl Studio {
         let services = LiveServices::with_config_folder(Some(home.to_owned()));
         let mut settings = services.load_settings().0;
         settings.generate.by_itself = false;
+        settings.about_own_data = false;
         services.save_settings(&settings).unwrap();
         let runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
         let mut studio = Self { state: State::default(), runtime };

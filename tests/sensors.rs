@@ -46,6 +46,7 @@ fn studio(place: Place, named: &str, home: &Path, mut done: impl FnMut(&State) -
     let mut settings = Settings { bundle_folders: vec![bundle("")], ..Settings::default() };
     settings.generate.bundle = Some(named.to_owned());
     settings.generate.by_itself = false;
+    settings.about_own_data = false;
     services.save_settings(&settings).unwrap();
     let mut runtime = Runtime::threads(Arc::new(services), Arc::new(|| {}));
     let mut state = State::default();

@@ -64,6 +64,7 @@ fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainS
         start: found.take(BundleKind::Mask, None, &dataset.rig).unwrap(),
         generators: found.bundles.into_iter().filter(|bundle| bundle.kind == BundleKind::Generator).collect(),
         engine: EngineChoice::Rten,
+        registration: Default::default(),
         choice: TrainChoice { held_out_percent: 30, ..TrainChoice::default() },
         tuning: Tuning::Steps(3),
         unfinished,

@@ -8,6 +8,7 @@ mod layout;
 mod look;
 mod rig;
 
+mod about;
 mod adapt;
 mod calm;
 mod chain;

@@ -4,9 +4,9 @@ use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
 use super::command::{
-    AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
-    UiRequest, ViewCommand, WorkbenchCommand,
+    AboutCommand, AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
+    TrainCommand, UiRequest, ViewCommand, WorkbenchCommand,
 };
 use super::keys::{ImprintSource, ShiftMode};
 use super::pane::Workspace;
@@ -21,7 +21,7 @@ use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool, Section};
 use super::state::{Absent, State};
-use super::{adapt, dial, export, labels, results, train};
+use super::{about, adapt, dial, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 
@@ -154,6 +154,8 @@ fn cancel(state: &State) -> Option<Command> {
         does(ViewCommand::Propose(false))
     } else if let Some(command) = escape(state) {
         does(command)
+    } else if state.about.shown {
+        does(AboutCommand::Show(false))
     } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
         does(InspectCommand::StopBasin)
     } else if state.library.brush.is_some() && state.tasks.running.is_empty() {

@@ -63,6 +63,8 @@ macro_rules! actions {
             state => follow(state);
         Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
             state => opened(state, LibraryCommand::Reload);
+        AboutData, File, "About this data", "Says what the open data set is, what the models are worth on it, and what would better that", [],
+            state => about::toggle(state);
         Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
         Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],
@@ -428,6 +430,7 @@ impl Action {
             Self::OpenDemo => "example sample simulated simulator",
             Self::Follow => "live watch camera stream",
             Self::Reload => "refresh again",
+            Self::AboutData => "doctor facts summary info problems what is own",
             Self::ExportMasks => "unet training labels npy coco png save",
             Self::ImportMasks => "unet labels npy coco png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",

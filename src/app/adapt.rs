@@ -12,7 +12,7 @@ use super::source::DataSource;
 use super::state::State;
 use super::state::adapt::FOLDS;
 use super::state::tasks::{Level, TaskKind};
-use super::{recipe, tasks};
+use super::{predict, recipe, results, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_work::adapt::{self, AdaptSetup, Adapted, HeldBack};
 use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
@@ -36,20 +36,22 @@ pub enum AdaptCommand {
     Start,
     /// Keeps the fit that was refused, in the place of whatever is there.
     Keep,
-    /// Predicts with the fitted model from now on.
+    /// Predicts with the fitted model from now on, what is on screen at once.
     Use,
 }
 
 pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<Effect>) {
     match command {
-        AdaptCommand::Choose(pairs) => state.adapt.pairs = pairs,
-        AdaptCommand::Tune(tune) => state.adapt.tune = tune,
+        AdaptCommand::Choose(pairs) => (state.adapt.pairs, state.adapt.stopped) = (pairs, None),
+        AdaptCommand::Tune(tune) => (state.adapt.tune, state.adapt.stopped) = (tune, None),
         AdaptCommand::Steps(steps) => {
+            state.adapt.stopped = None;
             state.adapt.steps = steps.clamp(*TUNING_STEPS.start(), *TUNING_STEPS.end());
         }
         AdaptCommand::Start => {
             let (Some(setup), Some(open)) = (setup(state), &state.library.open) else { return };
             let source = open.source.clone();
+            state.adapt.stopped = None;
             tasks::start(
                 state,
                 format!("Fit to {}", source.title()),
@@ -64,6 +66,10 @@ pub(super) fn step(state: &mut State, command: AdaptCommand, effects: &mut Vec<E
         AdaptCommand::Use => {
             let Some(name) = fitted(state).map(|bundle| bundle.name.clone()) else { return };
             settings::step(state, prefer(move |s| s.generate.bundle = Some(name.clone())), effects);
+            // What is on screen is of the model before.
+            if results::can_generate(state).is_ok() {
+                predict::same_seed(state, effects);
+            }
         }
     }
 }
@@ -123,6 +129,7 @@ impl Errand for Fit {
             state.log.push(Level::Warning, "The fit was not kept".to_owned(), Some(reason.to_owned()), None);
         }
         state.adapt.result = Some(adapted.clone());
+        state.adapt.stopped = None;
     }
 }
 
@@ -141,7 +148,7 @@ pub(crate) fn pairs(state: &State) -> Box<dyn Iterator<Item = PairId> + '_> {
 }
 
 /// The generator that is fitted: the chosen one, or the one that it was fitted from.
-fn to_be_fitted(state: &State) -> Option<&BundleInfo> {
+pub(super) fn to_be_fitted(state: &State) -> Option<&BundleInfo> {
     let chosen = recipe::bundle(state, BundleKind::Generator).ok()?;
     match chosen.fit() {
         Some(fit) => state.library.bundle(&fit.from_sha256),

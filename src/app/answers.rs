@@ -164,6 +164,15 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         // What was scored before it stopped is kept.
         state.table.round += 1;
     }
+    if err.is_cancelled() && !task.outdated {
+        // Before anything was said nothing was done.
+        let kept = Some(task.progress.text).filter(|text| !text.is_empty());
+        match task.kind {
+            TaskKind::Train => state.train.stopped = kept,
+            TaskKind::Fit if state.adapt.tune => state.adapt.stopped = kept,
+            _ => {}
+        }
+    }
     state.log.error(err);
 }
 

@@ -1,5 +1,6 @@
 //! [`Command`]: everything that can happen to the state, as data, by room.
 
+pub use super::about::AboutCommand;
 pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
 pub use super::dial::DialCommand;
@@ -46,6 +47,8 @@ macro_rules! rooms {
             Dial(DialCommand) in dial,
             /// To figures and other things that are taken away.
             Export(ExportCommand) in export,
+            /// To the panel about the open data set.
+            About(AboutCommand) in about,
             /// The fit to one's own pairs.
             Adapt(AdaptCommand) in adapt,
             /// The training of the mask model.

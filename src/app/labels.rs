@@ -442,7 +442,28 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     if state.document.review(&pair) == review || !check_editable(state, "Review state") {
         return;
     }
-    change(state, &pair, LabelEdit::Review(review), None, effects);
+    if review == Review::Done {
+        let (automatic, by) = (right_as_they_are(state), state.settings.labeler());
+        let revision = (!automatic.is_empty()).then(|| state.document.next_revision());
+        change(state, &pair, LabelEdit::Done { automatic, by }, revision, effects);
+    } else {
+        change(state, &pair, LabelEdit::Review(review), None, effects);
+    }
+}
+
+/// The automatic masks of the measured imprints on screen that nobody corrected: whoever marks the pair done has found them right.
+fn right_as_they_are(state: &State) -> Vec<TakenUp> {
+    let of = |finger: PadId| {
+        let source = ImprintSource::Measured;
+        if results::drawn_mask(state, source, finger).is_some() {
+            return None;
+        }
+        let mask = results::automatic_mask(state, source, finger).ready()?;
+        let recipe = results::mask_recipe(state, finger).ok()?;
+        let from = results::automatic_provenance(state, source, finger, &recipe);
+        Some(TakenUp { place: results::mask_place(state, source, finger)?, mask: DrawnMask::new(mask.clone(), from) })
+    };
+    state.fingers().into_iter().filter_map(of).collect()
 }
 
 fn set_note(state: &mut State, pair: &str, text: &str, effects: &mut Vec<Effect>) {

@@ -14,6 +14,7 @@ use super::keys::DatasetSeq;
 use super::services::Opened;
 use super::source::DataSource;
 use super::state::State;
+use super::state::about::AboutState;
 use super::state::evaluate::ScoreChoice;
 use super::state::export::FigureRows;
 use super::state::labels::{Document, Review};
@@ -388,6 +389,10 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.library.ticked.clear();
     state.dial = DialState { result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
+    // Somebody's own folder is said what it is, unless it was open when the window was closed.
+    let own = opened.source.root().is_some() && opened.source.case().is_none() && !resumed;
+    let shown = if same_place { state.about.shown } else { own && state.settings.about_own_data };
+    state.about = AboutState { shown, ..AboutState::default() };
     state.train = TrainState { form: state.train.form, ..TrainState::default() };
     state.history.clear();
     state.tasks.failed.clear();

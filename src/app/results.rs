@@ -12,6 +12,7 @@ use super::state::State;
 use super::state::results::{Cached, Computed, Request, table};
 use touch2touch_work::error::TaskError;
 
+pub(crate) mod about;
 pub(crate) mod ambiguity;
 pub(crate) mod basin;
 pub(crate) mod cloud;
@@ -48,6 +49,7 @@ pub(crate) mod tool;
 pub(crate) mod train_plan;
 pub(crate) mod versus;
 
+pub(crate) use about::want_about;
 pub use ambiguity::ambiguity;
 pub(crate) use ambiguity::want_ambiguity;
 pub use basin::basin;

@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+pub mod about;
 pub mod adapt;
 pub mod cache;
 pub mod dial;
@@ -22,6 +23,7 @@ pub mod workbench;
 
 use super::keys::{ImprintSource, PairKey, TouchKey};
 use super::pane::Demand;
+use about::AboutState;
 use adapt::AdaptState;
 use dial::DialState;
 use evaluate::TableState;
@@ -62,6 +64,8 @@ pub struct State {
     pub export: ExportState,
     /// The dial that is turned over pairs.
     pub dial: DialState,
+    /// The panel about the open data set.
+    pub about: AboutState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
     /// The training of the mask model.

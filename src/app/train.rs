@@ -34,11 +34,17 @@ pub enum TrainCommand {
 
 pub(super) fn step(state: &mut State, command: TrainCommand, effects: &mut Vec<Effect>) {
     match command {
-        TrainCommand::SetForm(form) => state.train.form = form.validated(),
+        TrainCommand::SetForm(form) => {
+            state.train.form = form.validated();
+            // What is kept is of what was asked for then.
+            state.train.stopped = None;
+        }
         TrainCommand::Start => {
             let (Some(setup), Some(open)) = (setup(state), &state.library.open) else { return };
             let errand = Train { source: open.source.clone(), changed: state.document.labels.clone(), setup };
-            tasks::start(state, TaskKind::Train.name(), errand, effects);
+            if tasks::start(state, TaskKind::Train.name(), errand, effects).is_some() {
+                state.train.stopped = None;
+            }
         }
         TrainCommand::Use => take_up(state, effects),
     }
@@ -111,6 +117,7 @@ pub(crate) fn setup(state: &State) -> Option<TrainSetup> {
         start: recipe::bundle(state, BundleKind::Mask).ok()?.clone(),
         generators: generators.cloned().collect(),
         engine: state.settings.runtime,
+        registration: state.settings.registration,
         choice: state.train.form.choice,
         tuning: state.train.form.tuning(),
         unfinished: None,

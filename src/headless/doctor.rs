@@ -1,7 +1,7 @@
-//! `touch2touch doctor PATH`: opens a data set, loads every pair and lists what is wrong, then tries on a handful of pairs
-//! which other reading would explain them better.
+//! `touch2touch doctor PATH`: says what a data set is and what the models are worth on a sample of it, loads every pair and
+//! lists what is wrong, and tries on a handful of pairs which other reading would explain them better.
 
-use std::ops::ControlFlow;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -9,17 +9,19 @@ use serde::Serialize;
 
 use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
-use touch2touch_core::doubt::Doubt;
-use touch2touch_core::findings::{Finding, Findings};
+use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
+use touch2touch_work::about::{self, Cure, Examined, Fact, Worth, WorthSetup};
 use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::doubts::{self, examine_reading};
+use touch2touch_work::doubts;
+use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::{Dataset, OpenError};
-use touch2touch_work::io::doctor::{self, DoctorReport};
-use touch2touch_work::job::JobCx;
+use touch2touch_work::io::doctor::DoctorReport;
+use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::predict::Generating;
+use touch2touch_work::recipe::Recipe;
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
@@ -31,7 +33,11 @@ pub(super) struct DoctorArgs {
     /// ...), spread over the tools. 0 tries nothing.
     #[arg(long, value_name = "N", default_value_t = doubts::PAIRS)]
     tried: usize,
-    /// Compare no predictions with what was measured: faster, but swapped GelSlims are not seen.
+    /// Pairs on which the models are tried, spread over the data set: the generator's score, what a fit would make of it,
+    /// and the mask model's poses where the true ones are known. 0 tries nothing.
+    #[arg(long, value_name = "N", default_value_t = about::SAMPLE)]
+    sample: usize,
+    /// Compare no predictions with what was measured and try no models: faster, but swapped GelSlims are not seen.
     #[arg(long)]
     no_predictions: bool,
     /// The generator's bundle (default: the shipped one).
@@ -42,9 +48,13 @@ pub(super) struct DoctorArgs {
 }
 
 /// `problems` has an entry for each kind of problem: `file`, `what` and `hint` are of the first of its kind; `count` says
-/// how many there are that differ only in file, finger or numbers, and `examples` names some of their files.
+/// how many there are that differ only in file, finger or numbers, and `examples` names some of their files. `about` are
+/// the lines of the studio's panel *About this data*, each with its cures.
 #[derive(Serialize)]
 struct Report<'a> {
+    about: &'a [Fact],
+    /// Worth of the models on the sample; `null` where none was tried.
+    worth: Option<&'a Worth>,
     pairs: usize,
     problems: &'a [Finding],
     /// The readings that would set it right, for `--read-as`; `null` where there is none.
@@ -54,10 +64,14 @@ struct Report<'a> {
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     let output = Output::new(args.common, "examining", 0);
+    let (mut about, mut worth) = (Vec::new(), None);
     // Without knowing the sensors, none of its pairs can be examined.
     let (title, report, read_as, opened) = match args.dataset.open_unsaid() {
         Ok(dataset) => {
-            let (report, read_as) = examined(args, &dataset, &output);
+            about = about::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
+            worth = tried_models(args, &dataset, &output)?;
+            about.extend(worth.iter().flat_map(Worth::facts));
+            let Examined { report, read_as } = examined(args, &dataset, &output)?;
             (dataset.title, report, read_as, true)
         }
         Err(err @ OpenError::Rig { .. }) => {
@@ -65,13 +79,16 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         }
         Err(err) => anyhow::bail!("{err}; {}", err.hint()),
     };
-    output.finish(&Report { pairs: report.pairs, problems: &report.problems, read_as }, || {
+    let said =
+        Report { about: &about, worth: worth.as_ref(), pairs: report.pairs, problems: &report.problems, read_as };
+    output.finish(&said, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
         let mut text = format!("{title}: {}, {}{kinds}\n", counted(report.pairs, "pair"), counted(all, "problem"));
+        about.iter().for_each(|fact| text += &line(fact));
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
             if p.count > 1 {
@@ -84,31 +101,49 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     Ok(opened)
 }
 
-/// Faults of single files, and before them faults of all of them, with the readings that would mend those.
-fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> (DoctorReport, Option<String>) {
-    let mut report = doctor::examine(dataset, &mut |done, total| {
-        output.set(done, total);
-        ControlFlow::Continue(())
-    });
-    let doubts = tried(args, dataset);
-    let mut found = Findings::default();
-    found.extend(doubts::problems(dataset, &doubts));
-    report.problems.splice(0..0, found.into_list());
-    (report, doubts::remedy(dataset, &doubts))
+/// A line of the panel, with the verbs that cure it. What every pair says stands below.
+fn line(fact: &Fact) -> String {
+    let mut text = format!("{:<11} {}\n", fact.topic.name(), fact.text);
+    for cure in fact.cures.iter().filter(|cure| !matches!(cure, Cure::Examine { .. })) {
+        if let Some(verb) = cure.verb() {
+            text += &format!("{:<11} {}: {verb}\n", "", cure.name());
+        }
+    }
+    text
 }
 
-/// Doubts that are found by trying; predictions are compared where a generator for these sensors is there.
-fn tried(args: &DoctorArgs, dataset: &Dataset) -> Vec<Doubt> {
-    let cx = JobCx::unwatched();
+/// The worth of the shipped models, or of the generator that is named; none where none is to be tried.
+fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Option<Worth>> {
+    if args.no_predictions || args.sample == 0 {
+        return Ok(None);
+    }
+    let found = bundles::find(&[]);
+    let take = |kind, named| found.take(kind, named, &dataset.rig).ok();
+    let generator = take(BundleKind::Generator, args.bundle.as_deref())
+        .and_then(|bundle| Some((bundle.generator.as_ref()?.defaults, bundle)))
+        .map(|(defaults, bundle)| (bundle.into(), defaults));
+    let recipe = Recipe {
+        imprint: ImprintSource::Predicted,
+        generator,
+        mask_model: take(BundleKind::Mask, None).map(Into::into),
+        ..Recipe::default()
+    };
+    let models = Models::new(super::cache::store());
+    Ok(about::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
+}
+
+/// Every pair examined; predictions are compared where a generator for these sensors is there.
+fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Examined> {
+    let cx = output.job();
     let bundle = (!args.no_predictions && args.tried > 0)
         .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
         .flatten();
     let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return examine_reading(dataset, args.tried, None, &cx);
+        return Ok(about::examined(dataset, args.tried, None, &cx)?);
     };
     let models = Models::new(super::cache::store());
     let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    examine_reading(dataset, args.tried, Some((&models, generating)), &cx)
+    Ok(about::examined(dataset, args.tried, Some((&models, generating)), &cx)?)
 }
 
 /// The other examples, by the names of their files.

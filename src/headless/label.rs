@@ -246,6 +246,22 @@ impl Changes {
     }
 }
 
+/// The automatic masks of measured imprints that nobody corrected: whoever marks the pair done has found them right. None of what cannot be
+/// made.
+fn right_as_they_are(
+    args: &LabelArgs,
+    dataset: &Dataset,
+    id: PairId,
+    maker: Option<Maker<'_>>,
+    labels: &PairLabels,
+) -> anyhow::Result<Vec<TakenUp>> {
+    let Some(maker) = maker.or_else(|| Maker::load(args, dataset, id).ok()) else { return Ok(Vec::new()) };
+    let Ok(felt) = maker.contact(ImprintSource::Measured, true, labels) else { return Ok(Vec::new()) };
+    let by_hand = |pad: &PadId| felt.contact().masks[*pad].as_ref().is_some_and(|mask| mask.basis == MaskBasis::Hand);
+    let pads = args.finger.fingers(&dataset.rig)?.into_iter().filter(|pad| !by_hand(pad));
+    Ok(pads.filter_map(|pad| taken_up(&felt, pad, labels)).collect())
+}
+
 /// Makes the changes that the arguments name, masks first: an accepted pose is then of the new ones. The pair itself is
 /// only read where something is made from it.
 fn change(args: &LabelArgs, dataset: &Dataset, all: &Labels, id: PairId, labels: &mut Changes) -> anyhow::Result<()> {
@@ -281,8 +297,14 @@ fn change(args: &LabelArgs, dataset: &Dataset, all: &Labels, id: PairId, labels:
         };
         labels.make(LabelEdit::AcceptPose(of, pose))?;
     }
-    if let Some(review) = args.review {
-        labels.make(LabelEdit::Review(review))?;
+    match args.review {
+        Some(Review::Done) => {
+            let by = args.person.clone().or_else(system_person).unwrap_or_default();
+            let automatic = right_as_they_are(args, dataset, id, maker, &labels.now)?;
+            labels.make(LabelEdit::Done { automatic, by })?;
+        }
+        Some(review) => drop(labels.make(LabelEdit::Review(review))?),
+        None => {}
     }
     if let Some(text) = &args.note {
         labels.make(LabelEdit::Note(text))?;

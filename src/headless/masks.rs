@@ -46,7 +46,8 @@ pub(super) enum MasksVerb {
     Stats(stats::StatsArgs),
     /// List the pairs, the most uncertain masks first.
     Queue(Box<queue::QueueArgs>),
-    /// Train a mask model on the masks of pairs marked "done", and score it on pairs that were left out.
+    /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
+    /// pairs that were left out.
     Train(train::TrainArgs),
 }
 

@@ -7,7 +7,8 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, Readings, parse_readings};
 use super::{Common, Output, VerbResult};
-use touch2touch_work::io::dataset::{READ_AS_FILE, write_read_as};
+use touch2touch_work::doubts::read_otherwise;
+use touch2touch_work::io::dataset::READ_AS_FILE;
 
 /// Arguments of `read-as`.
 #[derive(Debug, Args)]
@@ -39,10 +40,7 @@ pub(super) fn run(args: &ReadAsArgs) -> VerbResult {
     let mut dataset = args.dataset.open()?;
     let said = args.set.as_ref().map(|set| set.0.clone()).or_else(|| args.clear.then(Vec::new));
     if let Some(read_as) = said {
-        let root = dataset.root.clone();
-        let root = root.ok_or_else(|| anyhow::anyhow!("a built-in data set has no folder for {READ_AS_FILE}"))?;
-        write_read_as(&root, &read_as)
-            .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", root.join(READ_AS_FILE).display()))?;
+        read_otherwise(&dataset, &read_as)?;
         dataset = dataset.reading(read_as);
     }
     let file = dataset.root.as_ref().map(|root| root.join(READ_AS_FILE)).filter(|file| file.is_file());

@@ -1,5 +1,6 @@
 //! The window around the panes: a frame, bars, the arrangement, keys, and what covers the panes.
 
+pub(crate) mod about;
 pub mod app;
 pub(crate) mod bars;
 pub(crate) mod export;

@@ -87,7 +87,7 @@ fn held(verb: &str) -> Option<Held> {
         "masks compare" => Not("the studio compares one person with oneself only (masks stats)"),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "training-data" => Not("only the training in Python reads it"),
-        "doctor" => Not("it says of all pairs at once what the studio says of each when it is opened"),
+        "doctor" => By(&[super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb]),
         "unit" => By(&[files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb]),
         "read-as" => Not("the studio offers no such button; what it writes every reader reads"),
         "bundle check" => Not("it looks at one model's files and computes nothing of a touch"),

@@ -59,6 +59,7 @@ pub(super) fn trained() -> Trained {
         unusable: Vec::new(),
         before: None,
         after: None,
+        poses: None,
         held_out: Vec::new(),
         steps: 1,
         curves: Vec::new(),

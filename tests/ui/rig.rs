@@ -181,6 +181,7 @@ impl Services for QuickGenerator {
         // Predictions are asked for: a test that is about the others switches them on.
         let (mut settings, problem) = self.live.load_settings();
         settings.generate.by_itself = false;
+        settings.about_own_data = false;
         (settings, problem)
     }
 
@@ -267,6 +268,7 @@ impl Rig {
         let mut settings = Settings { bundle_folders: vec![folder], ..Settings::default() };
         settings.generate.bundle = Some(name.to_owned());
         settings.generate.by_itself = false;
+        settings.about_own_data = false;
         services.save_settings(&settings).unwrap();
         rig.harness = Self::build(size, Arc::new(services), Some(rig.data.clone()), true);
         rig.settle();
@@ -286,11 +288,16 @@ impl Rig {
 
     /// A studio with the shipped models on a place. `None` as for [`Rig::new`].
     pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
+        Self::greeting(size, place, false)
+    }
+
+    /// As [`Rig::live`]; with `about`, the panel about the data opens as it does for a person.
+    pub(super) fn greeting(size: [f32; 2], place: Place, about: bool) -> Option<Self> {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
         let services = Arc::new(LiveServices::with_config_folder(Some(config.clone())));
-        let mut settings = Settings::default();
+        let mut settings = Settings { about_own_data: about, ..Settings::default() };
         settings.generate.by_itself = false;
         services.save_settings(&settings).unwrap();
         let open = match place {
@@ -300,6 +307,21 @@ impl Rig {
         let harness = Self::build(size, services, open, true);
         let mut rig = Self { harness, data, config, _folder: folder };
         rig.settle();
+        Some(rig)
+    }
+
+    /// As [`Rig::live`] with lanes of its own: jobs go on while frames do.
+    pub(super) fn at_work(size: [f32; 2], data: &Path) -> Option<Self> {
+        crate::support::gpu()?;
+        let folder = tempfile::tempdir().unwrap();
+        let config = folder.path().join("config");
+        let services = LiveServices::with_config_folder(Some(config.clone()));
+        let mut settings = Settings { about_own_data: false, hint_dismissed: true, ..Settings::default() };
+        settings.generate.by_itself = false;
+        services.save_settings(&settings).unwrap();
+        let harness = Self::build(size, Arc::new(services), Some(data.to_owned()), false);
+        let mut rig = Self { harness, data: data.to_owned(), config, _folder: folder };
+        rig.until("the data set", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
         Some(rig)
     }
 

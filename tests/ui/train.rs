@@ -1,14 +1,23 @@
 //! The training of the mask model in the studio: by clicks, to the same bundle as by the verb, in use without a restart.
 
+use std::path::Path;
+
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Pane, TrainCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, TrainCommand, UiRequest, ViewCommand};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
+use touch2touch::app::state::State;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::train::TrainForm;
 use touch2touch::app::{recipe, train};
+use touch2touch_core::catalog;
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::sim;
 use touch2touch_work::bundles::BundleKind;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_work::labels::{Labels, Review};
 use touch2touch_work::train::TrainChoice;
 
 use super::rig::Rig;
@@ -68,4 +77,109 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     let made = run(&verb, folder.path());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     assert!(bytes(&out) == bytes(&found.bundle));
+}
+
+/// Nine pairs marked done, all of a folder that is kept for tests: the true reason, and the tick that cures it.
+#[test]
+fn nothing_to_learn_from_has_its_reason_and_its_tick() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    for_tests(&data, 2);
+    let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
+    // Nobody looked at anything: masks can come from CAD all the same.
+    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
+    rig.harness.get_by_label_contains("no mask was corrected or accepted");
+    rig.harness.get_by_label("Take masks from CAD");
+    rig.shoot("train-nothing");
+    // Done on a right automatic mask accepts it.
+    for pair in 0..2 {
+        rig.send(LibraryCommand::Select(PairId(pair)));
+        rig.send(LibraryCommand::DoneAndNext);
+    }
+    let labels = Labels::of(&Dataset::open(&data).unwrap());
+    let state = rig.harness.state().state();
+    let names: Vec<String> = state.library.pairs().iter().map(|entry| entry.name.clone()).collect();
+    for name in &names {
+        let stored = labels.load(name).unwrap();
+        assert_eq!((stored.review, stored.masks.len()), (Review::Done, 2), "{name}");
+        assert!(stored.masks.values().all(|mask| mask.base().starts_with("Accepted")), "{name}");
+    }
+    rig.harness.get_by_label_contains(
+        "all pairs with masks to learn from are kept for tests by the data set (2 pairs, 4 masks)",
+    );
+    rig.harness.get_by_label("Train on pairs kept for tests").click();
+    rig.harness.step();
+    rig.settle();
+    assert!(rig.harness.state().state().train.form.choice.test_in_train);
+    rig.harness.get_by_label_contains("to learn from: 2 masks of 1 pair");
+    rig.shoot("train-cured");
+    // One undo takes mark and masks back.
+    rig.send(LibraryCommand::Select(PairId(0)));
+    rig.send(LabelsCommand::Undo);
+    let stored = labels.load(&names[0]).unwrap();
+    assert!(stored.masks.is_empty() && stored.review == Review::Todo, "{stored:?}");
+
+    // The verb accepts the same masks.
+    let path = data.to_str().unwrap();
+    let by_studio = labels.load(&names[1]).unwrap();
+    let home = folder.path();
+    for review in ["todo", "done"] {
+        assert!(run(&["label", path, "--pair", &names[1], "--remove-mask", "--review", review], home).status.success());
+        let words = ["label", path, "--pair", &names[1], "--review", review];
+        assert!(run(&words, home).status.success());
+    }
+    let by_verb = Labels::of(&Dataset::open(&data).unwrap()).load(&names[1]).unwrap();
+    assert_eq!(by_verb.masks.len(), 2);
+    for (place, mask) in &by_studio.masks {
+        assert!(by_verb.masks[place].is_same(mask), "{place:?}");
+    }
+}
+
+/// Cancel keeps the run, says so, and the same goes on from there.
+#[test]
+fn a_training_that_is_stopped_is_kept_and_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let data = folder.path().join("grasps");
+    corrected(&data, 2);
+    let Some(mut rig) = Rig::at_work([1280.0, 800.0], &data) else { return };
+    rig.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
+    rig.harness.state_mut().push(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
+    let form = TrainForm { by_steps: true, steps: 60, ..TrainForm::default() };
+    rig.harness.state_mut().push(TrainCommand::SetForm(form));
+    rig.harness.step();
+    let step = |state: &State| {
+        let text = state.tasks.of_kind(TaskKind::Train).map(|(_, task)| task.progress.text.clone())?;
+        text.split_once("step ")?.1.split(' ').next()?.parse::<u32>().ok()
+    };
+    rig.until("the button", |state| state.selection.panes.contains(&Pane::Train));
+    rig.harness.get_by_label("Start training").click();
+    rig.harness.step();
+    rig.until("a few steps", |state| step(state) >= Some(4));
+    rig.harness.get_by_label("Cancel").click();
+    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
+    assert!(rig.harness.state().state().train.stopped.is_some());
+    rig.harness.get_by_label_contains("it is kept");
+    rig.shoot("train-stopped");
+    rig.harness.get_by_label("Start training").click();
+    rig.until("the first step after", |state| step(state).is_some());
+    assert!(step(rig.harness.state().state()) >= Some(4), "it goes on from where it was");
+    rig.harness.get_by_label("Cancel").click();
+    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
+    // What is kept is of what was asked for: another choice begins anew.
+    let other = TrainForm { steps: 61, ..form };
+    rig.harness.state_mut().push(TrainCommand::SetForm(other));
+    rig.harness.step();
+    assert!(rig.harness.state().state().train.stopped.is_none());
+}
+
+/// Simulated grasps of one tool in the folder that the lab keeps for tests; nobody labeled them.
+fn for_tests(root: &Path, grasps: u64) {
+    let tool = &catalog::tools()[0];
+    for index in 0..grasps {
+        let sample = sim::simulate(tool, sim::random_grasp(index + 3), index, &sim::SimConfig::default());
+        write_pair(root, Layout::Test, &tool.name, index, &sample).unwrap();
+    }
+    write_tools(root, &[(tool.name.as_str(), false, tool.mesh())]).unwrap();
 }

@@ -14,7 +14,9 @@
 //! * `assist` ([`propose`], [`label_edit`]): help for those who draw masks.
 //! * `exchange` ([`case`], [`mod@export`]): results and labels as files.
 //! * `learn` ([`adapt`], [`train`]): networks fitted to the data at hand.
+//! * [`about`]: what a data set is, and what would better it.
 
+pub mod about;
 mod assist;
 pub mod error;
 mod exchange;
@@ -31,7 +33,7 @@ mod way;
 pub use assist::{label_edit, propose, queue};
 pub use exchange::{case, export, import, pair_files};
 pub use labeling::{agreement, filter, label_stats, labels, repeats};
-pub use learn::{adapt, new_bundle, train, training_data, tuning};
+pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{
     canvas, compare, deviation, doubts, ensemble, evaluate, fan, figure, fonts, influence, layers, ledger, statistics,
     subject, sweep,

@@ -10,11 +10,14 @@ use super::super::state::settings::ColorMap;
 use super::super::{adapt, dial, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::figure::FigurePane;
+use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
 use touch2touch_work::sweep::Setting;
+use touch2touch_work::train::MasksFrom;
 
 fn command(verb: &str) -> Words {
     Words::default().word("touch2touch").word(verb)
@@ -142,13 +145,20 @@ fn dial_words(state: &State, words: Words) -> Option<Words> {
 }
 
 fn train_words(state: &State, words: Words) -> Words {
-    let form = state.train.form;
+    let (form, by) = (state.train.form, state.settings.registration);
     let words = words
         .option_if("--steps", form.by_steps.then_some(form.steps))
         .option_if("--minutes", (!form.by_steps).then_some(form.minutes))
         .option("--held-out", form.choice.held_out_percent)
         .option("--seed", form.choice.seed)
-        .word_if(form.choice.test_in_train, "--test-in-train");
+        .word_if(form.choice.test_in_train, "--test-in-train")
+        .option_if("--from", (form.choice.from != MasksFrom::default()).then(|| form.choice.from.key()))
+        .option_if("--engine", (by != RegistrationChoice::default()).then_some(by));
+    let words = match state.settings.runtime {
+        EngineChoice::Auto => words,
+        EngineChoice::Rten => words.option("--runtime", "rten"),
+        EngineChoice::Ort => words.option("--runtime", "ort"),
+    };
     match (&state.settings.mask.bundle, recipe::bundle(state, BundleKind::Mask)) {
         (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
         _ => words,

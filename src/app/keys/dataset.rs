@@ -7,6 +7,7 @@ use super::super::keys::{Bits, DatasetSeq, Key, PairKey, Revision};
 use super::super::scores::ScoreTable;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
+use touch2touch_work::about::Fact;
 use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::import::Import;
 use touch2touch_work::label_stats::LabelStats;
@@ -163,6 +164,27 @@ pub struct ImportForm {
     pub over_drawn: bool,
     /// The number of the asking: files may be others than at the one before.
     pub(in crate::app) asked: u64,
+}
+
+/// Everything that decides what is said of the data set.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct AboutKey {
+    /// The data set.
+    pub dataset: DatasetSeq,
+    /// Pairs that it has by now.
+    pub pairs: usize,
+    /// The last change of the document.
+    pub revision: Revision,
+    /// The number of times that scores or units of tools changed.
+    pub round: u64,
+}
+
+impl Key for AboutKey {
+    type Value = Vec<Fact>;
+
+    fn bytes(facts: &Vec<Fact>) -> usize {
+        facts.len() * 512
+    }
 }
 
 /// The plan of a training, on what is drawn and marked now.

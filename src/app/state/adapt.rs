@@ -47,11 +47,13 @@ pub struct AdaptState {
     pub result: Option<Arc<Adapted>>,
     /// The bundle of the result.
     pub bundle: Option<Arc<str>>,
+    /// How far a fit was when it was told to stop: the same goes on from there.
+    pub stopped: Option<String>,
 }
 
 impl Default for AdaptState {
     fn default() -> Self {
-        Self { pairs: AdaptPairs::default(), tune: false, steps: 50, result: None, bundle: None }
+        Self { pairs: AdaptPairs::default(), tune: false, steps: 50, result: None, bundle: None, stopped: None }
     }
 }
 

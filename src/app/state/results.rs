@@ -23,8 +23,10 @@ macro_rules! table {
         Sample(PairKey) in samples, 192 * MIB;
         /// The labels stored for a pair: they go to the document.
         Labels(LabelsKey);
+        /// The lines about the data set.
+        About(AboutKey) in abouts, MIB;
         /// The progress of the labeling, and what it took.
-        LabelStats(LabelStatsKey) in label_stats, 8 * MIB;
+        LabelStats(LabelStatsKey) in label_stats, 7 * MIB;
         /// The CAD model of a tool and what the registration derives from it.
         Tool(ToolKey) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.

@@ -97,6 +97,8 @@ pub struct Settings {
     pub ghosts: bool,
     /// True where the hint of the first start was dismissed.
     pub hint_dismissed: bool,
+    /// True where the panel about the data set opens with each folder of somebody's own.
+    pub about_own_data: bool,
     /// The places that were opened before, newest first.
     pub recent: Vec<Place>,
     /// The arrangement of the panes per workspace, in the window's own format (validated by it).
@@ -157,6 +159,7 @@ impl Default for Settings {
             footprint_visible: true,
             ghosts: true,
             hint_dismissed: false,
+            about_own_data: true,
             recent: Vec::new(),
             layouts: std::collections::BTreeMap::new(),
             workspace: Workspace::Inspect,
@@ -185,6 +188,7 @@ impl Settings {
             person: person.person.clone(),
             repeats_percent: person.repeats_percent,
             hint_dismissed: person.hint_dismissed,
+            about_own_data: person.about_own_data,
             keys: person.keys.clone(),
             last: person.last.clone(),
             ..self

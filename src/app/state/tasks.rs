@@ -39,6 +39,8 @@ kinds! {
     Open, "Open", Files;
     /// A tool's CAD file is read in another unit.
     ReadTool, "Read the tool", Files;
+    /// A data set is read otherwise than it is stored.
+    ReadOtherwise, "Read the data otherwise", Files;
     /// Touches of a pair are predicted.
     Generate, "Generate", Models;
     /// Shift statistics are made.
@@ -53,6 +55,10 @@ kinds! {
     Evaluate, "Evaluate", Batch;
     /// A dial is turned over many pairs.
     Dial, "Dial", Batch;
+    /// The models are tried on a sample of a data set.
+    TryModels, "Try the models", Batch;
+    /// Every pair of a data set is examined.
+    Examine, "Examine the pairs", Batch;
     /// A generator is fitted to pairs.
     Fit, "Fit the model", Batch;
     /// A mask model is trained.

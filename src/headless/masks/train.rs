@@ -1,4 +1,4 @@
-//! `touch2touch masks train`: a mask model trained on corrected masks.
+//! `touch2touch masks train`: a mask model trained on corrected masks, or on those that CAD models make.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -6,15 +6,16 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::super::args::{DatasetArgs, parse_minutes};
+use super::super::args::{DatasetArgs, RegistrationParser, keyed, parse_minutes};
 use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::models::Models;
 use touch2touch_work::new_bundle::models_folder;
-use touch2touch_work::train::{MaskScore, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
+use touch2touch_work::train::{MaskScore, MasksFrom, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
 use touch2touch_work::tuning::{Tuning, unfinished_folder};
 
 /// Trained for so long where nothing is said.
@@ -25,6 +26,10 @@ const MINUTES: f64 = 10.0;
 pub(in crate::headless) struct TrainArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
+    /// The masks that are learned from: `drawn` by people, of pairs marked "done"; or from the `cad` model at the true pose
+    /// (within 1 mm), of every pair that has both, where nobody drew a mask and marked it "done". No label is written.
+    #[arg(long, default_value = MasksFrom::default().key(), value_parser = keyed::<MasksFrom>())]
+    from: MasksFrom,
     /// The folder of the mask model's bundle to begin from; else the first mask model found.
     #[arg(long, value_name = "BUNDLE")]
     start: Option<PathBuf>,
@@ -54,6 +59,9 @@ pub(in crate::headless) struct TrainArgs {
     /// Engine that makes predictions again on which masks were drawn.
     #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
     runtime: RuntimeArg,
+    /// The registration of the poses that tell what the model is worth, where true ones are known.
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
     /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.
     #[arg(long)]
     no_cache: bool,
@@ -66,7 +74,12 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
     let output = Output::new(args.common, "training", 1);
     let labels = Labels::of(&dataset);
     let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
-    let choice = TrainChoice { held_out_percent: args.held_out, seed: args.seed, test_in_train: args.test_in_train };
+    let choice = TrainChoice {
+        from: args.from,
+        held_out_percent: args.held_out,
+        seed: args.seed,
+        test_in_train: args.test_in_train,
+    };
     let planned = plan(&dataset, &masks, choice)?;
     for line in planned.lines() {
         output.note(&line);
@@ -102,6 +115,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
         start: found.take(BundleKind::Mask, args.start.as_deref(), &dataset.rig)?,
         generators: found.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator).cloned().collect(),
         engine: args.runtime.choice(),
+        registration: args.registration,
         choice,
         tuning,
         unfinished: if args.no_cache { None } else { unfinished_folder() },
@@ -139,11 +153,14 @@ fn text(trained: &Trained) -> String {
     if let (Some(before), Some(after)) = (trained.before, trained.after) {
         lines.push(row(before, after, &format!("mean of {}", trained.held_out.len())));
     }
+    for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
+        lines.push(format!("{when} on {} grasps that were left out: {}", worth.grasps, worth.text()));
+    }
     lines.push(format!(
-        "{} masks of {} pairs by {}, {} steps, {:.0} s",
+        "{} masks of {} pairs{}, {} steps, {:.0} s",
         trained.masks,
         trained.pairs,
-        if trained.persons.is_empty() { "nobody named".to_owned() } else { trained.persons.join(", ") },
+        if trained.persons.is_empty() { String::new() } else { format!(" by {}", trained.persons.join(", ")) },
         trained.steps,
         trained.seconds
     ));

@@ -169,7 +169,12 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
-                cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
+                if let Some(at) = cx.state.adapt.stopped.clone() {
+                    cx.action_button(ui, Action::FitPairs, "Go on with the fit");
+                    ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
+                } else {
+                    cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
+                }
                 cx.action_button(ui, Action::UseFit, "Use the fitted model");
                 if adapt::uses_fit(cx.state) {
                     let tip = "The fitted model predicts now; another can be chosen in the Generate pane";

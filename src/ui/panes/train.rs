@@ -2,6 +2,7 @@
 //! see.
 
 use eframe::egui::{self, DragValue, Label, RichText, ScrollArea, Ui, vec2};
+use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TrainCommand};
@@ -14,7 +15,7 @@ use crate::ui::parts::theme::{SMALL, caption, section};
 use crate::ui::parts::widget::curves;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::train::{MaskScore, Trained};
+use touch2touch_work::train::{MaskScore, MasksFrom, Trained};
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
@@ -46,6 +47,15 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         Err(_) => "there is no mask model to begin from".to_owned(),
     };
     ui.add(Label::new(caption(begins, cx.p)).wrap());
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
+        ui.label(caption("Learn from", cx.p));
+        for from in MasksFrom::iter() {
+            if ui.radio(form.choice.from == from, from.name()).on_hover_text(from.tooltip()).clicked() {
+                form.choice.from = from;
+            }
+        }
+    });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         budget(cx, ui, &mut form);
@@ -89,7 +99,7 @@ fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
 }
 
 /// Plan of the training.
-fn plan(cx: &Cx<'_>, ui: &mut Ui) {
+fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
     if cx.state.tasks.of_kind(TaskKind::Train).is_some() {
         return;
     }
@@ -103,10 +113,15 @@ fn plan(cx: &Cx<'_>, ui: &mut Ui) {
             for warning in plan.warnings() {
                 say(warning, cx.p.caution);
             }
-            if plan.masks() == 0 {
-                let what =
-                    "Nothing to learn from yet: correct masks and mark their pairs \"done\" ([[done_and_next]]).";
-                say(cx.keys().fill(what), cx.p.caution);
+            if let Some(nothing) = plan.nothing() {
+                say(format!("Nothing to learn from yet: {}.", nothing.why), cx.p.caution);
+                say(nothing.hint, cx.p.caution);
+                if let Some(cure) = nothing.cure
+                    && ui.button(cure.name()).on_hover_text("Changes the choice above; nothing starts yet").clicked()
+                {
+                    let form = cx.state.train.form;
+                    cx.push(TrainCommand::SetForm(TrainForm { choice: cure.applied(form.choice), ..form }));
+                }
             }
         }
         Lookup::Failed(err) => {
@@ -127,7 +142,12 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
                 cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
             }
             None => {
-                cx.action_button(ui, Action::StartTraining, "Start training");
+                if let Some(at) = cx.state.train.stopped.clone() {
+                    cx.action_button(ui, Action::StartTraining, "Go on with the training");
+                    ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
+                } else {
+                    cx.action_button(ui, Action::StartTraining, "Start training");
+                }
                 if train::uses_trained(cx.state) {
                     let tip = "The trained model makes the automatic masks now";
                     ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
@@ -162,6 +182,9 @@ fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     }
     for remark in &trained.unusable {
         say(format!("not used: {}: {}", remark.name, remark.why), cx.p.caution);
+    }
+    for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
+        say(format!("{when}: {}, on {} grasps", worth.text(), worth.grasps), cx.p.text);
     }
     let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
     let mut select = None;

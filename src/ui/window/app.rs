@@ -14,7 +14,7 @@ use strum::IntoEnumIterator as _;
 
 use super::pane::{Docking, Panes};
 use super::screenshot::Shot;
-use super::{bars, export, layout, palette, pane, shortcuts, unsaved};
+use super::{about, bars, export, layout, palette, pane, shortcuts, unsaved};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest,
@@ -398,9 +398,9 @@ impl StudioApp {
             self.inbox.push(prefer(move |s| s.workspace = workspace).into());
         }
         self.panes.maximized = None;
-        if let Some(tree) = self.trees.get_mut(&workspace)
-            && let Some(id) = tree.tiles.find_pane(&pane)
-        {
+        let stored = self.state.settings.layouts.get(workspace.name());
+        let tree = self.trees.entry(workspace).or_insert_with(|| layout::restore(stored, workspace));
+        if let Some(id) = tree.tiles.find_pane(&pane) {
             tree.set_visible(id, true);
             tree.make_active(|tile, _| tile == id);
         }
@@ -523,6 +523,7 @@ impl eframe::App for StudioApp {
                 }
             });
             bars::hint(&mut cx, &ctx);
+            about::panel(&mut cx, &ctx);
             export::form(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             export::import::form(&mut cx, &ctx);

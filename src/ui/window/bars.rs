@@ -67,6 +67,8 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         recent(cx, ui);
         ui.separator();
         for action in [
+            Action::AboutData,
+            Action::AboutData,
             Action::SaveCase,
             Action::OwnPreferences,
             Action::Figure,

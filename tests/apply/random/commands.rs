@@ -8,12 +8,13 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
+use touch2touch::app::about::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
-    AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
-    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
-    TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
+    AboutCommand, AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand,
+    FollowCommand, Hover, InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand,
+    SettingsCommand, TasksCommand, TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
@@ -47,6 +48,7 @@ use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch_core::manual::{ManualPose, PoseAxis};
 use touch2touch_core::pose::Rejection;
 use touch2touch_core::rig::{PadId, lab};
+use touch2touch_work::about::{Cure, Examined, Worth};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::evaluate::{Evaluation, Setup};
 use touch2touch_work::export::{ExportChoice, Which};
@@ -63,7 +65,7 @@ use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
 use touch2touch_work::sweep::{Dial, Setting};
 use touch2touch_work::tool::UnitSet;
-use touch2touch_work::train::TrainChoice;
+use touch2touch_work::train::{MasksFrom, TrainChoice};
 
 use super::super::answered::{adapted, swept, trained};
 use super::super::double::Double;
@@ -111,6 +113,17 @@ fn number() -> impl Strategy<Value = f32> {
 
 fn point() -> impl Strategy<Value = DVec3> {
     [number(), number(), number()].prop_map(|p| DVec3::from(p.map(f64::from)))
+}
+
+fn cure() -> impl Strategy<Value = Cure> {
+    prop_oneof![
+        [number(), number()].prop_map(|[min_m, max_m]| Cure::FitRange { min_m, max_m }),
+        any_of::<ToolUnit>().prop_map(|unit| Cure::ReadTool { tool: "tool_a".into(), unit, replacing: None }),
+        select(vec!["", "swap-fingers", "swap-toes"]).prop_map(|list| Cure::ReadAs { list: list.into() }),
+        any::<usize>().prop_map(|pairs| Cure::Fit { pairs }),
+        any::<usize>().prop_map(|pairs| Cure::TrainFromCad { pairs }),
+        any::<usize>().prop_map(|pairs| Cure::Examine { pairs }),
+    ]
 }
 
 fn section() -> impl Strategy<Value = Section> {
@@ -365,6 +378,9 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
             TaskKind::Dial => Ended::of::<Turn>(Arc::new(swept())),
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
+            TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
+            TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
+            TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>(("read-as.txt".into(), "swap-fingers".into())),
             TaskKind::Train => {
                 let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
                 Ended::of::<Train>((Arc::new(trained()), bundle))
@@ -555,6 +571,11 @@ draws! {
         1 WriteCase(Just(PathBuf::from("/dev/null/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("/dev/null/folder/picture.png"))),
     }
+    about: AboutCommand {
+        2 Show(any::<bool>()),
+        1 Try,
+        3 Cure(cure()),
+    }
     adapt: AdaptCommand {
         1 Choose(any_of::<AdaptPairs>()),
         1 Tune(any::<bool>()),
@@ -565,7 +586,7 @@ draws! {
     }
     train: TrainCommand {
         1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
-            TrainForm { choice: TrainChoice { held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
+            TrainForm { choice: TrainChoice { from: if by_steps { MasksFrom::Cad } else { MasksFrom::Drawn }, held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
         })),
         1 Start,
         1 Use,
@@ -625,6 +646,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
         (2, evaluate().boxed()),
         (2, dial().boxed()),
         (1, export().boxed()),
+        (1, about().boxed()),
         (1, adapt().boxed()),
         (1, train().boxed()),
         (8, settings().boxed()),
@@ -641,6 +663,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
             | Command::Evaluate(_)
             | Command::Dial(_)
             | Command::Export(_)
+            | Command::About(_)
             | Command::Adapt(_)
             | Command::Train(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}

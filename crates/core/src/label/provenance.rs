@@ -99,6 +99,13 @@ pub enum Provenance {
         /// Clean-up.
         what: CleanUp,
     },
+    /// A person looked at the whole mask, found it right, and marked its pair done.
+    Accepted {
+        /// Name of the person; empty where nobody knows.
+        person: String,
+        /// Provenance of the mask before.
+        was: Box<Provenance>,
+    },
     /// A file that another program wrote.
     Imported {
         /// Name of the file.
@@ -159,6 +166,8 @@ impl Provenance {
                 format!("{}, {}", what.kind.name(), text_mm(what.size_mm * 1e-3))
             }
             Self::CleanUp { what } => what.kind.name().into(),
+            Self::Accepted { person, was } if person.is_empty() => format!("Accepted: {}", was.text()),
+            Self::Accepted { person, was } => format!("Accepted by {person}: {}", was.text()),
             Self::Imported { file } => format!("Imported from {file}"),
             Self::Told { text } => text.clone(),
         }

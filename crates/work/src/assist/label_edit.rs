@@ -62,6 +62,13 @@ pub enum LabelEdit<'a> {
     Remove(MaskPlace),
     /// Sets the review state.
     Review(Review),
+    /// Marks the pair done and accepts automatic masks where nobody drew: they were looked at and are right.
+    Done {
+        /// The automatic masks that were looked at.
+        automatic: Vec<TakenUp>,
+        /// Who says so; empty where nobody knows.
+        by: String,
+    },
     /// Writes the note; see [`note`].
     Note(&'a str),
     /// Accepts a pose of an imprint.
@@ -103,6 +110,8 @@ impl LabelEdit<'_> {
             }
             Self::Remove(_) => Operation::named("correction removed"),
             Self::Review(_) => Operation::named("review state"),
+            Self::Done { automatic, .. } if automatic.is_empty() => Operation::named("review state"),
+            Self::Done { .. } => Operation::named("done, automatic masks accepted"),
             Self::Note(_) => Operation::named("note"),
             Self::AcceptPose(_, AcceptedPose { by_hand: true, .. }) => Operation::named("pose set by hand"),
             Self::AcceptPose(..) => Operation::named("pose accepted"),
@@ -149,6 +158,14 @@ pub fn edit(labels: &PairLabels, edit: LabelEdit<'_>) -> Result<Option<Edited>, 
             }
         }
         LabelEdit::Review(review) => now.review = review,
+        LabelEdit::Done { automatic, by } => {
+            for TakenUp { place, mask } in automatic {
+                if !now.masks.contains_key(&place) {
+                    now.put(&place, Some(mask.accepted(&by)));
+                }
+            }
+            now.review = Review::Done;
+        }
         LabelEdit::Note(text) => now.note = note(text),
         LabelEdit::AcceptPose(of, pose) => now.accept(&of, Some(pose)),
         LabelEdit::WithdrawPose(of) => now.accept(&of, None),
@@ -193,6 +210,19 @@ mod tests {
         assert!(edit(&labels, over(Some([8, 5]))).is_err() && edit(&labels, over(None)).is_err());
         assert!(edit(&labels, over(Some([8, 4]))).unwrap().is_some());
         assert_eq!(edit(&labels, LabelEdit::Review(Review::InProgress)), Ok(None));
+        // Done accepts what nobody drew, and nothing else.
+        let right = MaskPlace::measured(lab::RIGHT);
+        let automatic = vec![
+            TakenUp { place: place.clone(), mask: drawn(true) },
+            TakenUp { place: right.clone(), mask: drawn(true) },
+        ];
+        let done = edit(&labels, LabelEdit::Done { automatic, by: "Anna".into() }).unwrap().unwrap();
+        let mut finished = labels.clone();
+        done.change.apply_to(&mut finished);
+        assert_eq!((finished.review, finished.masks[&place].clone()), (Review::Done, labels.masks[&place].clone()));
+        assert_eq!(finished.masks[&right].base(), "Accepted by Anna: ");
+        done.change.inverse().apply_to(&mut finished);
+        assert_eq!(finished, labels);
         assert_eq!(edit(&labels, LabelEdit::Note(" \n")), Ok(None));
         assert_eq!(edit(&labels, LabelEdit::WithdrawPose(of)), Ok(None));
         cleaned.change.inverse().apply_to(&mut labels);

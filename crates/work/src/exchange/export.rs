@@ -123,6 +123,8 @@ pub enum LeftOut {
     Flagged,
     /// It is marked *skip*.
     Skip,
+    /// A mask was to come from the CAD model, and there is none.
+    NoCad,
 }
 
 impl LeftOut {
@@ -133,6 +135,7 @@ impl LeftOut {
             Self::NotDrawn => "marked \"done\" without a mask drawn (take the automatic one over first)",
             Self::Flagged => "marked \"flagged\"",
             Self::Skip => "marked \"skip\"",
+            Self::NoCad => "of a tool without a CAD model",
         }
     }
 }

@@ -95,6 +95,7 @@ fn source_of(base: &Provenance) -> &'static str {
         Provenance::Copied { .. } => "copy",
         Provenance::Grown => "grown",
         Provenance::Imported { .. } => "imported",
+        Provenance::Accepted { was, .. } => source_of(was),
         Provenance::Told { text } => {
             TOLD.iter().find(|(begins, _)| text.starts_with(begins)).map_or("other", |(_, source)| source)
         }

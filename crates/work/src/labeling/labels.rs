@@ -234,6 +234,14 @@ impl DrawnMask {
         Self { mask, marks, revision: Revision::default() }
     }
 
+    /// The mask as the person `by` accepts it whole: an automatic one that is right.
+    #[must_use]
+    pub fn accepted(mut self, by: &str) -> Self {
+        let was = Box::new(self.marks.base().clone());
+        self.marks = Arc::new(Marks::all(self.mask.size(), Provenance::Accepted { person: by.to_owned(), was }));
+        self
+    }
+
     /// Source of the mask before the first correction, in words; empty where there was none.
     pub fn base(&self) -> String {
         self.marks.base().text()

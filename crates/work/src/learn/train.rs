@@ -9,9 +9,13 @@ mod tune;
 #[cfg(feature = "tune")]
 mod write;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+#[cfg(feature = "tune")]
+use super::mask_worth::{MaskWorth, mask_worth};
 use super::tuning::Tuning;
 use crate::bundles::BundleInfo;
 use crate::error::TaskError;
@@ -23,7 +27,10 @@ use crate::io::names;
 use crate::job::JobCx;
 use crate::labels::{ImprintOf, MaskPlace, Review};
 use crate::models::Models;
+#[cfg(feature = "tune")]
+use crate::pairs::spread;
 use touch2touch_core::dataset::{PairId, Split};
+use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::units::counted;
 
 pub use crate::error::Remark;
@@ -40,9 +47,48 @@ const MOST_MASKS: usize = 5000;
 /// Pairs of tools that nobody named.
 pub(crate) const NO_TOOL: &str = "no tool named";
 
+/// Source of the masks that are learned from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter, EnumString, IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
+pub enum MasksFrom {
+    /// Masks that people drew or took over, of pairs marked *done*.
+    #[default]
+    Drawn,
+    /// The CAD model at the true pose, for every pair that has both; what people drew of pairs marked *done* comes before it.
+    Cad,
+}
+
+impl MasksFrom {
+    /// The name on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Drawn => "corrected masks",
+            Self::Cad => "CAD at the true pose",
+        }
+    }
+
+    /// Description in a line.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Drawn => "Masks that people drew or took over, of pairs marked done",
+            Self::Cad => {
+                "What lies within a millimeter of the CAD model at the true pose, for every pair that has both; masks that \
+                 people drew of pairs marked done come before it. No label is written"
+            }
+        }
+    }
+}
+
 /// Division of the pairs into those that are learned from and those that are left out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrainChoice {
+    /// Source of the masks.
+    pub from: MasksFrom,
     /// Percent of the pairs that are left out of the training, for the score.
     pub held_out_percent: u8,
     /// Decides which those are, and the order and variation of the masks.
@@ -54,7 +100,7 @@ pub struct TrainChoice {
 
 impl Default for TrainChoice {
     fn default() -> Self {
-        Self { held_out_percent: 20, seed: 0, test_in_train: false }
+        Self { from: MasksFrom::Drawn, held_out_percent: 20, seed: 0, test_in_train: false }
     }
 }
 
@@ -67,6 +113,8 @@ pub struct TrainSetup {
     pub generators: Vec<BundleInfo>,
     /// The engine that makes these predictions again.
     pub engine: EngineChoice,
+    /// The registration that the worth is told by, where true poses are known.
+    pub registration: RegistrationChoice,
     /// The division.
     pub choice: TrainChoice,
     /// Length of the training.
@@ -86,6 +134,8 @@ struct Entry {
     tool: Option<String>,
     /// True where it is left out of the training.
     held_out: bool,
+    /// True where its masks come from the CAD model.
+    cad: bool,
     places: Vec<MaskPlace>,
 }
 
@@ -102,6 +152,9 @@ pub struct TrainPlan {
     pub held_out: [usize; 2],
     /// Of these pairs the ones that the data set keeps for tests.
     pub for_tests: usize,
+    /// Pairs whose masks may come from a CAD model: their tool has one. Whether their true pose is known shows when they
+    /// are read.
+    pub by_cad: usize,
     /// Pairs that take no part.
     pub left_out: BTreeMap<LeftOut, usize>,
     /// Pairs whose labels cannot be read.
@@ -167,25 +220,111 @@ impl TrainPlan {
         warnings
     }
 
+    /// Why there is nothing to learn from, and what cures it; `None` where there is something.
+    pub fn nothing(&self) -> Option<Nothing> {
+        if self.masks() > 0 {
+            return None;
+        }
+        let left_out = |why: LeftOut| self.left_out.get(&why).copied().unwrap_or(0);
+        let pairs = |n: usize| counted(n, "pair");
+        let (why, hint, cure) = if self.for_tests > 0 {
+            let (all, is) = if self.for_tests == 1 { ("the only pair", "is") } else { ("all pairs", "are") };
+            (
+                format!(
+                    "{all} with masks to learn from {is} kept for tests by the data set ({}, {})",
+                    pairs(self.for_tests),
+                    counted(self.held_out[0], "mask")
+                ),
+                "Tick \"train on pairs kept for tests\" (--test-in-train): a share of them is still left out for the score.",
+                Some(TrainCure::TestInTrain),
+            )
+        } else if left_out(LeftOut::NotDone) > 0 {
+            let n = left_out(LeftOut::NotDone);
+            (
+                format!("masks of {} were corrected, and none of these is marked \"done\"", pairs(n)),
+                "Mark those that are right as \"done\".",
+                None,
+            )
+        } else if left_out(LeftOut::NotDrawn) > 0 {
+            (
+                format!("{} marked \"done\" have no mask of their own", pairs(left_out(LeftOut::NotDrawn))),
+                "Mark them \"todo\" and \"done\" again: that accepts the automatic masks where they are right.",
+                None,
+            )
+        } else {
+            (
+                "no mask was corrected or accepted".into(),
+                "Look at pairs, correct what is wrong, and mark them \"done\".",
+                None,
+            )
+        };
+        let cure = cure.or((self.by_cad > 0).then_some(TrainCure::FromCad));
+        let mut hint = hint.to_owned();
+        if cure == Some(TrainCure::FromCad) {
+            hint += &format!(
+                " Or take masks from the CAD models at the true poses (--from cad), where {} may have them.",
+                pairs(self.by_cad)
+            );
+        }
+        let others = self.left_out.iter().map(|(why, n)| format!("{} {}", pairs(*n), why.text())).collect();
+        Some(Nothing { why, hint, cure, others })
+    }
+
     /// That there is something to learn from.
     ///
     /// # Errors
     /// If there is not: what is there instead, and what to do.
     pub fn check(&self) -> Result<(), TaskError> {
-        if self.masks() > 0 {
-            return Ok(());
-        }
-        let others: Vec<String> =
-            self.left_out.iter().map(|(why, n)| format!("; {} {}", counted(*n, "pair"), why.text())).collect();
-        Err(TaskError::new(WHAT, format!("there is no mask to learn from{}", others.concat())).with_hint(
-            "Correct masks (or take automatic ones over where they are right) and mark their pairs \"done\"; pairs that \
-             the data set keeps for tests are not learned from unless you ask for it.",
-        ))
+        self.nothing().map_or(Ok(()), |nothing| {
+            let why = [vec![nothing.why], nothing.others].concat().join("; ");
+            Err(TaskError::new(WHAT, format!("there is no mask to learn from: {why}")).with_hint(nothing.hint))
+        })
     }
 }
 
-/// Plan of a training: the masks drawn by hand, on measured imprints and on predictions, of pairs marked *done*. Reads
-/// the labels of these pairs, no data.
+/// A choice that gives a training something to learn from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TrainCure {
+    /// Pairs that the data set keeps for tests are divided like the rest.
+    TestInTrain,
+    /// Masks come from the CAD models at the true poses.
+    FromCad,
+}
+
+impl TrainCure {
+    /// The choice with it.
+    #[must_use]
+    pub fn applied(self, choice: TrainChoice) -> TrainChoice {
+        match self {
+            Self::TestInTrain => TrainChoice { test_in_train: true, ..choice },
+            Self::FromCad => TrainChoice { from: MasksFrom::Cad, ..choice },
+        }
+    }
+
+    /// The words on its button.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TestInTrain => "Train on pairs kept for tests",
+            Self::FromCad => "Take masks from CAD",
+        }
+    }
+}
+
+/// Absence of anything to learn from.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Nothing {
+    /// Reason, in words.
+    pub why: String,
+    /// The advice.
+    pub hint: String,
+    /// The choice that cures it.
+    pub cure: Option<TrainCure>,
+    /// Pairs that take no part, by reason.
+    pub others: Vec<String>,
+}
+
+/// Plan of a training: the masks drawn by hand, on measured imprints and on predictions, of pairs marked *done*; or those
+/// that CAD models make. Reads the labels of these pairs, no data.
 ///
 /// Pairs that the data set keeps for tests are left out for the score, unless the choice says otherwise. Of the others
 /// so many are as the choice says, by the pair's name and the seed, at least one where there are two.
@@ -195,13 +334,19 @@ impl TrainPlan {
 pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, choice: TrainChoice) -> Result<TrainPlan, TaskError> {
     masks.labels.folder()?;
     let (reviews, drawn) = (masks.reviews(), masks.all(&dataset.rig));
+    let modeled: BTreeSet<String> = dataset.index.tools().into_iter().filter(|tool| has_model(dataset, tool)).collect();
     let mut plan = TrainPlan::default();
     for (at, entry) in dataset.index.pairs.iter().enumerate() {
         let is_drawn = || dataset.rig.pads().any(|pad| drawn.contains(&(entry.name.clone(), pad)));
-        let why = match reviews.get(&entry.name).copied().unwrap_or_default() {
-            Review::Done => None,
+        let review = reviews.get(&entry.name).copied().unwrap_or_default();
+        let modeled = entry.tool.as_ref().is_some_and(|tool| modeled.contains(tool));
+        plan.by_cad += usize::from(modeled && !matches!(review, Review::Skip | Review::Flagged));
+        let cad = choice.from == MasksFrom::Cad && !(review == Review::Done && is_drawn());
+        let why = match review {
             Review::Skip => Some(LeftOut::Skip),
             Review::Flagged => Some(LeftOut::Flagged),
+            _ if cad => (!modeled).then_some(LeftOut::NoCad),
+            Review::Done => None,
             Review::Todo | Review::InProgress if is_drawn() => Some(LeftOut::NotDone),
             Review::Todo | Review::InProgress => continue,
         };
@@ -209,14 +354,17 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, choice: TrainChoice) -> R
             *plan.left_out.entry(why).or_default() += 1;
             continue;
         }
-        let labels = match masks.of_pair(&entry.name) {
-            Ok(labels) => labels,
-            Err(err) => {
-                plan.unreadable.push(Remark { name: entry.name.clone(), why: err.why });
-                continue;
+        let places: Vec<MaskPlace> = if cad {
+            dataset.rig.pads().map(MaskPlace::measured).collect()
+        } else {
+            match masks.of_pair(&entry.name) {
+                Ok(labels) => labels.masks.keys().cloned().collect(),
+                Err(err) => {
+                    plan.unreadable.push(Remark { name: entry.name.clone(), why: err.why });
+                    continue;
+                }
             }
         };
-        let places: Vec<MaskPlace> = labels.masks.keys().cloned().collect();
         if places.is_empty() {
             *plan.left_out.entry(LeftOut::NotDrawn).or_default() += 1;
             continue;
@@ -226,6 +374,7 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, choice: TrainChoice) -> R
             name: entry.name.clone(),
             tool: entry.tool.clone(),
             held_out: entry.split == Split::Test && !choice.test_in_train,
+            cad,
             places,
         });
     }
@@ -243,6 +392,11 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, choice: TrainChoice) -> R
         *plan.tools.entry(tool).or_default() += entry.places.len();
     }
     Ok(plan)
+}
+
+/// True where there is a CAD model of a tool, readable or not.
+fn has_model(dataset: &Dataset, tool: &str) -> bool {
+    dataset.tool_mesh_file(tool).is_some() || (dataset.root.is_none() && matches!(dataset.tool_mesh(tool), Ok(Some(_))))
 }
 
 /// Leaves pairs out: whole grasps, so that no finger of one tells of the other.
@@ -288,7 +442,39 @@ pub fn train(
     let plan = plan(dataset, masks, setup.choice)?;
     plan.check()?;
     let gathered = gather::gather(dataset, masks, &plan, setup, models, cx)?;
-    tune::tune(dataset, &plan, gathered, setup, begin, cx)
+    let mut trained = tune::tune(dataset, &plan, gathered, setup, begin, cx)?;
+    trained.poses = poses(dataset, setup, &trained, models, cx)?;
+    trained.seconds = begin.elapsed().as_secs_f64();
+    Ok(trained)
+}
+
+/// Most grasps that are posed for the score: enough for a mean, and a matter of seconds.
+#[cfg(feature = "tune")]
+const MOST_POSED: usize = 60;
+
+/// The worth of the model before and after, by the poses of grasps that were left out. None where none is known, or whoever
+/// waits has waited enough: the bundle is there.
+#[cfg(feature = "tune")]
+fn poses(
+    dataset: &Dataset,
+    setup: &TrainSetup,
+    trained: &Trained,
+    models: &Models,
+    cx: &JobCx,
+) -> Result<Option<[MaskWorth; 2]>, TaskError> {
+    let held: BTreeSet<PairId> = trained.held_out.iter().map(|one| one.id).collect();
+    let held: Vec<PairId> = held.into_iter().collect();
+    let pairs = spread(held.len(), Some(MOST_POSED)).map(|at| held[at]).collect();
+    let after = crate::bundles::open(WHAT, trained.bundle.as_path())?;
+    let worth =
+        |model: &BundleInfo| match mask_worth(dataset, &pairs, (model, setup.engine, setup.registration), models, cx) {
+            Err(err) if err.is_cancelled() => Ok(None),
+            worth => worth,
+        };
+    Ok(match worth(&setup.start)? {
+        Some(before) => worth(&after)?.map(|after| [before, after]),
+        None => None,
+    })
 }
 
 /// Without tuning nothing is trained.

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use rayon::prelude::*;
 
+use crate::error::TaskError;
 use crate::imprint::imprint_of;
-use crate::io::dataset::{Dataset, SourceKind};
+use crate::io::dataset::{Dataset, READ_AS_FILE, SourceKind, write_read_as};
 use crate::job::JobCx;
 use crate::models::Models;
 use crate::predict::Generating;
@@ -15,7 +16,7 @@ use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::doubt::{Doubt, Felt, Placed, judge};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_core::read_as::{also, list};
+use touch2touch_core::read_as::{ReadAs, also, list};
 use touch2touch_core::sample::Sample;
 
 /// Pairs that are looked at where nobody says how many: what is wrong with all of a set shows in these.
@@ -56,6 +57,22 @@ pub fn remedy(dataset: &Dataset, doubts: &[Doubt]) -> Option<String> {
     let mut readings = doubts.iter().filter_map(Doubt::read_as).peekable();
     readings.peek()?;
     Some(list(&readings.fold(dataset.read_as().to_vec(), |known, more| also(&known, more))))
+}
+
+/// Has a data set read otherwise than it is stored from now on, by the file beside its data that says so, which it returns.
+/// Whoever has it open opens it again.
+///
+/// # Errors
+/// If it is built in, or the file cannot be written.
+pub fn read_otherwise(dataset: &Dataset, read_as: &[ReadAs]) -> Result<PathBuf, TaskError> {
+    const WHAT: &str = "Read the data otherwise";
+    let root = dataset.root.as_ref();
+    let root =
+        root.ok_or_else(|| TaskError::new(WHAT, format!("a built-in data set has no folder for {READ_AS_FILE}")))?;
+    let file = root.join(READ_AS_FILE);
+    write_read_as(root, read_as)
+        .map_err(|err| TaskError::new(WHAT, format!("cannot write {}: {err}", file.display())))?;
+    Ok(file)
 }
 
 /// Doubts as entries of a problem list.

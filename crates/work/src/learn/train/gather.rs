@@ -5,16 +5,19 @@ use std::collections::BTreeSet;
 use rayon::prelude::*;
 use touch2touch_tuning::MaskTouch;
 
+use super::super::mask_worth::from_cad;
 use super::{Entry, MOST_MASKS, Remark, TrainPlan, TrainSetup, WHAT};
 use crate::bundles::{BundleKind, by_id};
 use crate::error::TaskError;
 use crate::export::DrawnMasks;
+use crate::feel::Touch;
 use crate::imprint::imprint_of;
 use crate::infer::bundle::MaskInput;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::labels::{DrawnMask, ImprintOf, ImprintSource, MaskPlace};
+use crate::labels::{DrawnMask, ImprintOf, ImprintSource, MaskPlace, PairLabels};
 use crate::models::{GenerateInput, Models};
+use crate::tool::Tools;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::Provenance;
@@ -86,7 +89,7 @@ pub(super) fn gather(
     cx: &JobCx,
 ) -> Result<Gathered, TaskError> {
     let mut gathered = Gathered { unusable: plan.unreadable.clone(), ..Gathered::default() };
-    let total = plan.entries.len();
+    let (total, mut tools) = (plan.entries.len(), Tools::new(dataset));
     for (round, entries) in plan.entries.chunks(CHUNK).enumerate() {
         cx.check(WHAT)?;
         cx.progress((round * CHUNK) as u64, total as u64, "reading masks and imprints");
@@ -100,13 +103,30 @@ pub(super) fn gather(
                     continue;
                 }
             };
-            // Who drew what is not on the disk yet is not known there.
-            gathered.persons.extend(masks.labels.persons(&entry.name).unwrap_or_default());
-            let labels = masks.of_pair(&entry.name)?;
+            let labels = if entry.cad {
+                match cad_masks(dataset, entry, &sample, &mut tools, models) {
+                    Ok((labels, lacking)) => {
+                        gathered.unusable.extend(lacking.into_iter().map(refused));
+                        labels
+                    }
+                    Err(err) => {
+                        gathered.unusable.push(refused(err.why));
+                        continue;
+                    }
+                }
+            } else {
+                // Who drew what is not on the disk yet is not known there.
+                gathered.persons.extend(masks.labels.persons(&entry.name).unwrap_or_default());
+                masks.of_pair(&entry.name)?
+            };
             for place in &entry.places {
                 let Some(hand) = labels.masks.get(place) else { continue };
                 gathered.persons.extend(hand.marks.layers().into_iter().filter_map(|(layer, px)| match layer {
-                    Provenance::Hand { person } if px > 0 && !person.is_empty() => Some(person.clone()),
+                    Provenance::Hand { person } | Provenance::Accepted { person, .. }
+                        if px > 0 && !person.is_empty() =>
+                    {
+                        Some(person.clone())
+                    }
                     _ => None,
                 }));
                 let imprint = match imprint(&sample, place, setup, models, cx) {
@@ -154,6 +174,30 @@ impl Gathered {
             to.push(drawn);
         }
     }
+}
+
+/// The masks that the CAD model of a pair's tool makes at the true pose, and why there is none of a finger.
+fn cad_masks(
+    dataset: &Dataset,
+    entry: &Entry,
+    sample: &Sample,
+    tools: &mut Tools<'_>,
+    models: &Models,
+) -> Result<(PairLabels, Vec<String>), TaskError> {
+    let tool = entry.tool.as_deref().and_then(|tool| tools.get(tool));
+    let tool = tool.ok_or_else(|| TaskError::new(WHAT, "the CAD model of its tool cannot be used"))?;
+    let nothing = PairLabels::default();
+    let touch = Touch { dataset, pair: entry.id, sample, tool: Ok(tool), labels: &nothing };
+    let (mut labels, mut lacking) = (PairLabels::default(), Vec::new());
+    for (pad, proposal) in from_cad(touch, models)? {
+        match proposal {
+            Ok(proposal) => {
+                labels.put(&MaskPlace::measured(pad), Some(DrawnMask::new(proposal.mask, proposal.provenance)));
+            }
+            Err(err) => lacking.push(format!("{} finger: {}", dataset.rig.pad_key(pad), err.why)),
+        }
+    }
+    Ok((labels, lacking))
 }
 
 /// Why nothing can be learned from a mask of an imprint.

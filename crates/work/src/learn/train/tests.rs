@@ -8,6 +8,7 @@ fn entries(count: usize, for_tests: usize) -> Vec<Entry> {
         name: format!("data_{at}"),
         tool: None,
         held_out: at < for_tests,
+        cad: false,
         places: Vec::new(),
     };
     (0..count).map(entry).collect()
@@ -19,7 +20,7 @@ fn held(entries: &[Entry]) -> Vec<&str> {
 
 fn divided(count: usize, for_tests: usize, held_out_percent: u8, seed: u64) -> Vec<Entry> {
     let mut entries = entries(count, for_tests);
-    divide(&mut entries, TrainChoice { held_out_percent, seed, test_in_train: false });
+    divide(&mut entries, TrainChoice { held_out_percent, seed, ..TrainChoice::default() });
     entries
 }
 
@@ -69,4 +70,26 @@ fn a_plan_says_what_is_learned_from_and_warns_of_little() {
     let err = nothing.check().unwrap_err();
     assert!(err.why.contains("begun and not marked") && err.hint.is_some(), "{err}");
     assert!(nothing.warnings().is_empty());
+}
+
+#[test]
+fn nothing_to_learn_from_has_its_reason_and_where_there_is_one_its_tick() {
+    let of = |left_out: &[(LeftOut, usize)], for_tests, by_cad| {
+        let left_out = left_out.iter().copied().collect();
+        TrainPlan { for_tests, by_cad, held_out: [2 * for_tests, for_tests], left_out, ..TrainPlan::default() }
+    };
+    let tests = of(&[], 9, 40).nothing().unwrap();
+    assert!(tests.why.contains("all pairs") && tests.why.contains("9 pairs, 18 masks"), "{tests:?}");
+    assert_eq!(tests.cure, Some(TrainCure::TestInTrain));
+    assert!(TrainCure::TestInTrain.applied(TrainChoice::default()).test_in_train);
+    let not_done = of(&[(LeftOut::NotDone, 3)], 0, 0).nothing().unwrap();
+    assert!(not_done.why.contains("3 pairs were corrected, and none") && not_done.cure.is_none(), "{not_done:?}");
+    let empty = of(&[(LeftOut::NotDrawn, 2)], 0, 0).nothing().unwrap();
+    assert!(empty.why.contains("2 pairs marked \"done\" have no mask"), "{empty:?}");
+    let begin = of(&[], 0, 12).nothing().unwrap();
+    assert_eq!(begin.cure, Some(TrainCure::FromCad));
+    assert!(begin.hint.contains("12 pairs"), "{begin:?}");
+    assert_eq!(TrainCure::FromCad.applied(TrainChoice::default()).from, MasksFrom::Cad);
+    let some = TrainPlan { tools: BTreeMap::from([("rod".to_owned(), 1)]), ..TrainPlan::default() };
+    assert_eq!(some.nothing(), None);
 }

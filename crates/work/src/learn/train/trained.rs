@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use serde::Serialize;
 
+use super::super::mask_worth::MaskWorth;
 use crate::error::Remark;
 use crate::export::LeftOut;
 use crate::job::Curve;
@@ -76,6 +77,8 @@ pub struct Trained {
     pub before: Option<MaskScore>,
     /// The trained model on the same.
     pub after: Option<MaskScore>,
+    /// The model before and after by the poses of grasps that were left out, where tool and true pose are known.
+    pub poses: Option<[MaskWorth; 2]>,
     /// These masks, the worst (after) first.
     pub held_out: Vec<HeldOut>,
     /// Steps.

@@ -10,7 +10,7 @@ use touch2touch_tuning::{Cast, Descent as _, Error, MaskConfig, MaskStart, MaskT
 use super::gather::{Drawn, Gathered};
 use super::trained::HeldOut;
 use super::write::{Provenance, bundle};
-use super::{MaskScore, NO_TOOL, TrainPlan, TrainSetup, Trained, WHAT};
+use super::{MaskScore, MasksFrom, NO_TOOL, TrainPlan, TrainSetup, Trained, WHAT};
 use crate::error::TaskError;
 use crate::infer::bundle::{self, MaskSpec, Role};
 use crate::infer::mask::contact_of;
@@ -119,6 +119,7 @@ pub(super) fn tune(
         unusable: gathered.unusable,
         before,
         after,
+        poses: None,
         held_out,
         steps,
         curves,
@@ -175,6 +176,9 @@ fn digest(setup: &TrainSetup, gathered: &Gathered) -> String {
         "seed": setup.choice.seed, "held_out": setup.choice.held_out_percent, "test_in_train": setup.choice.test_in_train,
     });
     all.update(asked.to_string());
+    if setup.choice.from != MasksFrom::Drawn {
+        all.update(setup.choice.from.key());
+    }
     for drawn in gathered.learned.iter().chain(&gathered.held) {
         all.update(drawn.pair.as_bytes());
         all.update([drawn.pad.index() as u8]);

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde_json::{Value, json};
 
 use super::gather::{Drawn, Gathered};
-use super::{MaskScore, TrainSetup, WHAT};
+use super::{MaskScore, MasksFrom, TrainSetup, WHAT};
 use crate::bundles::{BundleInfo, TRAINED};
 use crate::error::TaskError;
 use crate::infer::bundle::Role;
@@ -36,13 +36,15 @@ pub(super) fn bundle(setup: &TrainSetup, graph: Vec<u8>, said: &Provenance<'_>) 
     let root = setup.start.name.split(", trained on ").next().unwrap_or_default();
     let masks = said.gathered.learned.len();
     let digest = &sha256(&graph)[..6];
-    let name = format!("{root}, trained on {masks} masks of {} ({digest})", said.dataset.title);
+    let cad = if setup.choice.from == MasksFrom::Cad { "CAD " } else { "" };
+    let name = format!("{root}, trained on {masks} {cad}masks of {} ({digest})", said.dataset.title);
     let pairs = |drawn: &[Drawn]| drawn.iter().map(|one| one.pair.clone()).collect::<BTreeSet<String>>();
     let trained = json!({
         "from": setup.start.name,
         "from_sha256": *setup.start.id,
         "data": said.dataset.title,
         "masks": masks,
+        "masks_from": setup.choice.from.key(),
         "pairs": pairs(&said.gathered.learned),
         "held_out": pairs(&said.gathered.held),
         "persons": said.gathered.persons,

@@ -1,0 +1,32 @@
+//! The lines about the open data set, as far as they cost no more than a second.
+
+use super::super::about::about_key;
+use super::super::jobs::{Job, Lane};
+use super::super::keys::AboutKey;
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use touch2touch_work::about::{Fact, facts};
+use touch2touch_work::export::DrawnMasks;
+use touch2touch_work::labels::Labels;
+
+impl Computes for AboutKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Fact>>> {
+        let source = state.library.open.as_ref()?.source.clone();
+        let changed = state.document.labels.clone();
+        Some(Job::new(Lane::Compute, "About this data", move |_| {
+            let dataset = source.on_disk("About this data")?;
+            Ok(facts(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }))
+        }))
+    }
+}
+
+/// Asks for them while the panel is looked at.
+pub(crate) fn want_about(wants: &mut Demands<'_>) {
+    if wants.state.about.shown
+        && wants.state.document.stroke.is_none()
+        && let Some(key) = about_key(wants.state)
+    {
+        wants.ask(key);
+    }
+}
