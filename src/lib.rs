@@ -17,4 +17,6 @@ pub mod app;
 pub mod gpu;
 pub mod headless;
 #[cfg(feature = "gui")]
+pub mod spatial;
+#[cfg(feature = "gui")]
 pub mod ui;

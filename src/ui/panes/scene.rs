@@ -31,7 +31,9 @@ use crate::app::results;
 use crate::app::state::Lookup;
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
+use crate::gpu::scene::SceneData;
 use crate::gpu::view::{Camera, Preset};
+use crate::spatial;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::scene_view::{Grip, SceneOutput, SceneView};
 use crate::ui::parts::widget::empty;
@@ -206,7 +208,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
-    place_camera(cx, ui, memory, source, &output, scene.bounds());
+    place_camera(cx, ui, memory, source, &output, &scene);
     // A linked camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
@@ -249,7 +251,7 @@ fn place_camera(
     memory: &mut Memory,
     source: ImprintSource,
     output: &SceneOutput,
-    bounds: Option<[DVec3; 2]>,
+    scene: &SceneData,
 ) {
     let pasted = pasted(ui, output);
     if let Some(camera) = pasted {
@@ -265,16 +267,18 @@ fn place_camera(
         _ => false,
     };
     let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
-    if place && let Some(bounds) = bounds {
+    if place {
         let view = &mut memory.views[source as usize];
-        view.camera.fit(bounds, output.size);
-        view.placed = true;
+        view.camera.frame(&spatial::focus(scene), spatial::FILLED);
+        // Until the model stands where it belongs, what is shown is not yet what is to be looked at.
+        view.placed = !matches!(results::pose(cx.state, source), Lookup::Waiting | Lookup::Stale(_));
     }
     if (output.moved || place || aimed || pasted.is_some()) && cx.state.settings.cameras_linked {
         let camera = memory.views[source as usize].camera;
+        let placed = memory.views[source as usize].placed && memory.clouds[1 - source as usize].is_some();
         let other = &mut memory.views[1 - source as usize];
         other.camera = camera;
-        other.placed |= memory.clouds[1 - source as usize].is_some();
+        other.placed |= placed;
     }
 }
 
