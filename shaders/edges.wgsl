@@ -94,7 +94,7 @@ fn covered(in: Varying) -> f32 {
 // Behind something: faint.
 @fragment
 fn fs_hidden(in: Varying) -> @location(0) vec4<f32> {
-    return vec4<f32>(edges.color.rgb, edges.color.a * 0.3 * covered(in));
+    return vec4<f32>(edges.color.rgb, edges.color.a * select(0.3, 0.2, edges.dash_px > 0.0) * covered(in));
 }
 
 @fragment

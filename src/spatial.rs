@@ -1,28 +1,31 @@
 //! The parts of a pair in 3D, as items for the renderer: membrane, contact points, CAD model, true pose, floor. The panes and the
 //! stills put their scenes together from the same ones, and look from the same place.
 //!
-//! It knows the science and the renderer, no window and no state.
+//! It knows the job and the renderer, no window and no state. Without the feature `gui` there is no renderer, and a still
+//! says so.
 
+#[cfg(feature = "gui")]
 pub mod items;
+#[cfg(feature = "gui")]
+pub mod still;
 
-use glam::DVec3;
+#[cfg(feature = "gui")]
+pub use focus::{FILLED, focus};
 
-use crate::gpu::mesh::Look;
-use crate::gpu::scene::SceneData;
+#[cfg(feature = "gui")]
+mod focus;
 
-/// Share of the smaller side of a picture that the model and the contact points span.
-pub const FILLED: f64 = 0.72;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::space::DrawSpace;
 
-/// The points of a scene that a camera is to show: solid models and contact points, and all there is where it has neither.
-/// Membrane, outlines and floor may reach beyond the picture.
-pub fn focus(scene: &SceneData) -> Vec<DVec3> {
-    let meshes = scene.meshes.iter().filter(|m| matches!(m.style.look, Look::Solid | Look::XRay));
-    let corners = meshes.flat_map(|m| m.mesh.vertices.iter().map(|p| m.style.world_from_mesh.transform_point3(*p)));
-    let contact = scene.clouds.iter().filter(|c| c.name.starts_with(items::CONTACT));
-    let points = contact.flat_map(|c| c.points.iter().map(|p| c.style.world_from_points.transform_point3(*p)));
-    let found: Vec<DVec3> = corners.chain(points).filter(|p| p.is_finite()).collect();
-    if !found.is_empty() {
-        return found;
-    }
-    scene.bounds().map_or_else(Vec::new, |[lo, hi]| vec![lo, hi])
+/// The renderer of stills, on the best graphics device that there is; a software one will do.
+///
+/// # Errors
+/// If there is no device, or the program was built without a renderer.
+pub fn stills() -> Result<Box<dyn DrawSpace>, TaskError> {
+    #[cfg(feature = "gui")]
+    return Ok(Box::new(still::Stills::new()?));
+    #[cfg(not(feature = "gui"))]
+    return Err(TaskError::new("3D picture", "this program was built without the 3D renderer")
+        .with_hint("Build it with the feature gui."));
 }

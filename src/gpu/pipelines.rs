@@ -202,6 +202,7 @@ impl Pipelines {
                     label: "Lines::pipeline",
                     module: &lines,
                     blend: true,
+                    depth: Depth::Tests,
                     stencil: Stencil::Unused,
                     ..pulled
                 }),

@@ -15,7 +15,7 @@ use touch2touch_core::mesh::TriMesh;
 /// The names of contact points begin so.
 pub(crate) const CONTACT: &str = "contact ";
 /// Height of the floor, meters along +z (down).
-const FLOOR_M: f64 = 0.045;
+const FLOOR_M: f64 = 0.036;
 /// Half the width of the floor, meters.
 const REACH_M: f64 = 0.09;
 /// Length of the drawn axes, meters.
@@ -70,12 +70,17 @@ pub fn outline(world_from_mesh: DAffine3, color: [f32; 3], opacity: f32, width_p
 /// The look of the model at the true pose: a dashed outline, so that it is not taken for the model.
 pub fn truth(world_from_mesh: DAffine3, color: [f32; 3], opacity: f32, width_px: f32) -> MeshStyle {
     let whole = outline(world_from_mesh, color, opacity, width_px);
-    MeshStyle { edges: whole.edges.map(|edges| EdgeStyle { dash_px: DASH_PX, ..edges }), ..whole }
+    // The silhouette alone: beside the model's own creases more would be a thicket.
+    MeshStyle { edges: whole.edges.map(|edges| EdgeStyle { dash_px: DASH_PX, creases: false, ..edges }), ..whole }
+}
+
+fn is_dark(ground: [f32; 3]) -> bool {
+    ground.iter().sum::<f32>() < 1.5
 }
 
 /// The floor, which takes the shadow: a little away from the ground's color towards `ink`.
 pub fn floor(ground: [f32; 3], ink: [f32; 3]) -> Floor {
-    let dark = ground.iter().sum::<f32>() < 1.5;
+    let dark = is_dark(ground);
     Floor {
         center: DVec3::new(0.0, 0.0, FLOOR_M),
         reach_m: REACH_M,
@@ -88,7 +93,8 @@ pub fn floor(ground: [f32; 3], ink: [f32; 3]) -> Floor {
 /// The grid on the floor and the axes at its corner; `revision` changes with the colors.
 pub fn guides(ground: [f32; 3], ink: [f32; 3], revision: u64) -> [LinesItem; 2] {
     let color = mix(ground, ink, 0.5).map(|v| (v * 255.0).round() as u8);
-    let plain = LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity: 0.42, overlay: false };
+    let opacity = if is_dark(ground) { 0.42 } else { 0.3 };
+    let plain = LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity, overlay: false };
     let grid = guides::grid(DVec3::new(0.0, 0.0, FLOOR_M), [DVec3::X, DVec3::Y], 0.01, 5, color);
     [
         LinesItem { name: "grid".into(), revision, segments: grid.into(), style: plain },
@@ -96,12 +102,12 @@ pub fn guides(ground: [f32; 3], ink: [f32; 3], revision: u64) -> [LinesItem; 2] 
             name: "axes".into(),
             revision: 1,
             segments: guides::axes(axes_origin(), AXIS_M).into(),
-            style: LinesStyle { width_px: 2.0, opacity: 1.0, overlay: true, ..plain },
+            style: LinesStyle { width_px: 1.5, opacity: 1.0, ..plain },
         },
     ]
 }
 
-/// A corner of the floor grid: in the middle the axes would hide the contact.
+/// The place of the axes: on the floor beside the tool, where they hide nothing.
 pub fn axes_origin() -> DVec3 {
-    DVec3::new(-0.05, -0.05, FLOOR_M)
+    DVec3::new(0.03, -0.03, FLOOR_M)
 }

@@ -96,8 +96,8 @@ impl SceneLayer {
         let look = LayerLook::default();
         match self {
             Self::Membrane => LayerLook { shown: false, size: LayerSize::Px(1.5), ..look },
-            Self::Surface => LayerLook { opacity: 0.5, ..look },
-            Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.3), ..look },
+            Self::Surface => LayerLook { opacity: 0.4, ..look },
+            Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.35), ..look },
             Self::TrueCad => LayerLook { size: LayerSize::Px(1.2), ..look },
             Self::Dropped | Self::Added => LayerLook { size: LayerSize::Mm(0.6), ..look },
             _ => look,

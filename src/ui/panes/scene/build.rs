@@ -134,11 +134,13 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
     match layer {
         // The membrane recedes, the contact stands out.
         SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
-        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.45),
+        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.7),
         SceneLayer::Contact => CONTACT,
         SceneLayer::OtherContact => side_color(p, other_side(source)),
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
         SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => p.good,
+        // Lit from all sides it is darker than its color: before a light ground it begins paler.
+        SceneLayer::Cad if *p == theme::LIGHT => theme::mix(p.cad, Color32::WHITE, 0.5),
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
         SceneLayer::TrueCad => p.strong,
