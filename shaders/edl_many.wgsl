@@ -1,4 +1,4 @@
-// Eye-dome lighting of a picture with several samples per pixel: the first one speaks for all.
+// Eye-dome lighting and ambient occlusion of a picture with several samples per pixel: the first one speaks for all.
 #import <common/view.wgsl>
 #import <common/edl.wgsl>
 
@@ -9,15 +9,40 @@ fn vs_main(@builtin(vertex_index) vertex: u32) -> @builtin(position) vec4<f32> {
     return vec4<f32>(quad_corner(vertex), 0.0, 1.0);
 }
 
+fn depth_at(at: vec2<i32>) -> f32 {
+    return textureLoad(depths, at, 0).x;
+}
+
+fn all_behind(at: vec2<f32>, own: f32) -> f32 {
+    var behind = 0.0;
+    for (var i = 0; i < NEIGHBORS; i++) {
+        behind += meters_behind(own, depth_at(neighbor(at, i)));
+    }
+    return behind;
+}
+
 @fragment
 fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
-    let own = textureLoad(depths, vec2<i32>(at.xy), 0).x;
+    let own = depth_at(vec2<i32>(at.xy));
     if own <= 0.0 {
         discard;
     }
-    var behind = 0.0;
-    for (var i = 0; i < NEIGHBORS; i++) {
-        behind += meters_behind(own, textureLoad(depths, neighbor(at.xy, i), 0).x);
+    var hollows = 0.0;
+    for (var j = 0; j < HOLLOWS; j++) {
+        for (var i = 0; i < LINES; i++) {
+            let way = ends_px(own, j, i);
+            hollows += hollow(own, depth_at(inside(at.xy + way)), depth_at(inside(at.xy - way)), j);
+        }
     }
-    return shade(behind);
+    return shade(all_behind(at.xy, own), hollows);
+}
+
+// While the view turns: the neighbors alone.
+@fragment
+fn fs_moving(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let own = depth_at(vec2<i32>(at.xy));
+    if own <= 0.0 {
+        discard;
+    }
+    return shade(all_behind(at.xy, own), 0.0);
 }

@@ -23,6 +23,7 @@ struct LinesUniform {
 struct Varying {
     @builtin(position) clip: vec4<f32>,
     @location(0) color: vec4<f32>,
+    @location(1) off_px: vec2<f32>,
 }
 
 @vertex
@@ -37,7 +38,9 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) segment:
     let clip_from_lines = view.clip_from_world * lines.world_from_lines;
     let a = clip_from_lines * vec4<f32>(from_end.position, 1.0);
     let b = clip_from_lines * vec4<f32>(to_end.position, 1.0);
-    out.clip = stroke(a, b, lines.width_px, vertex);
+    let line = stroke(a, b, lines.width_px, vertex);
+    out.clip = line.clip;
+    out.off_px = line.off_px;
     let at_b = quad_corner(vertex).x > 0.0;
     out.color = unpack4x8unorm(select(from_end.color, to_end.color, at_b));
     out.color.a = out.color.a * lines.opacity;
@@ -46,5 +49,5 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) segment:
 
 @fragment
 fn fs_main(in: Varying) -> @location(0) vec4<f32> {
-    return in.color;
+    return vec4<f32>(in.color.rgb, in.color.a * stroke_cover(in.off_px, lines.width_px));
 }

@@ -1,6 +1,10 @@
-// Lit triangle meshes: solid, translucent, or as an x-ray. Rust twins: gpu::mesh::{MeshVertex, MeshUniform}.
+// Lit triangle meshes: solid, translucent, a veil, or as an x-ray. Rust twins: gpu::mesh::{MeshVertex, MeshUniform}.
 #import <common/view.wgsl>
 #import <common/color.wgsl>
+#import <common/light.wgsl>
+
+// The share of its opacity that a veil keeps before something solid.
+const VEIL_THIN: f32 = 0.2;
 
 struct MeshUniform {
     world_from_mesh: mat4x4<f32>,
@@ -23,7 +27,8 @@ struct MeshUniform {
 @group(1) @binding(0) var<uniform> mesh: MeshUniform;
 
 struct Varying {
-    @builtin(position) clip: vec4<f32>,
+    // Two pipelines must find the same depth.
+    @invariant @builtin(position) clip: vec4<f32>,
     @location(0) in_world: vec3<f32>,
     @location(1) normal: vec3<f32>,
     // The value, and whether there is one (1) or not (0).
@@ -69,18 +74,44 @@ fn fs_main(in: Varying, @builtin(front_facing) outside: bool) -> @location(0) ve
     }
     var color = mesh.color.rgb;
     var light = light_on(normal);
+    var gloss = gloss_on(normal, to_eye);
     if mesh.scalar != 0u {
         let mapped = scalar_color(mesh.map, bitcast<u32>(in.value.x / max(in.value.y, 1.0e-3)), mesh.lo, mesh.hi);
         color = mix(color, mapped, in.value.y);
-        // A color that is to be read must not be taken for a darker one of its map.
+        // A color that is to be read must not be taken for a darker or a paler one of its map.
         light = mix(light, 0.5 + 0.5 * light, in.value.y);
+        gloss = gloss * (1.0 - in.value.y);
     }
-    return vec4<f32>(srgb_from_linear(linear_from_srgb(color) * light), mesh.color.a);
+    return vec4<f32>(lit(color, light, gloss), mesh.color.a);
 }
 
-// A key light and a soft one from above; the sum stays below 1, so that the color stays itself. CPU twin: gpu::mesh::light_on.
-fn light_on(normal: vec3<f32>) -> f32 {
-    let key = clamp(dot(normal, view.key_in_world.xyz), 0.0, 1.0);
-    let above = 0.5 + 0.5 * dot(normal, view.up_in_world.xyz);
-    return 0.24 + 0.16 * above + 0.60 * key;
+// A veil: lit on both sides, more opaque where it turns away from the eye.
+fn veil(in: Varying) -> vec4<f32> {
+    let to_eye = towards_eye(in.in_world);
+    var normal = normalize(in.normal);
+    normal = normal * select(-1.0, 1.0, dot(normal, to_eye) >= 0.0);
+    let away = 1.0 - clamp(dot(normal, to_eye), 0.0, 1.0);
+    let alpha = mix(mesh.color.a, min(mesh.color.a * 1.7, 1.0), away * away);
+    return vec4<f32>(lit(mesh.color.rgb, light_on(normal), 0.7 * gloss_on(normal, to_eye)), alpha);
+}
+
+@fragment
+fn fs_veil(in: Varying) -> @location(0) vec4<f32> {
+    return veil(in);
+}
+
+// Before something solid, which is what one looks at.
+@fragment
+fn fs_veil_thin(in: Varying) -> @location(0) vec4<f32> {
+    let color = veil(in);
+    return vec4<f32>(color.rgb, color.a * VEIL_THIN);
+}
+
+// Depth alone: what the nearest layer of a veil is.
+@fragment
+fn fs_depth(in: Varying) -> @location(0) vec4<f32> {
+    if is_cut(in.in_world) {
+        discard;
+    }
+    return vec4<f32>(0.0);
 }

@@ -2,6 +2,7 @@
 // Rust twins: gpu::points::{PointVertex, PointsUniform}.
 #import <common/view.wgsl>
 #import <common/color.wgsl>
+#import <common/light.wgsl>
 
 struct PointVertex {
     position: vec3<f32>,
@@ -42,6 +43,7 @@ struct Varying {
     @location(1) @interpolate(flat) color: vec4<f32>,
     // Radius in pixels, plus 1 for a highlighted point's ring (in y).
     @location(2) @interpolate(flat) radius: vec2<f32>,
+    @location(3) @interpolate(flat) to_eye: vec3<f32>,
 }
 
 @vertex
@@ -59,7 +61,7 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
     if clip.w <= 0.0 || is_cut(in_world.xyz) {
         return out;
     }
-    var diameter = cloud.size;
+    var diameter = cloud.size * view.unit_px;
     if cloud.size_in_meters != 0u {
         diameter = cloud.size * view.px_per_m / clip.w;
     }
@@ -70,6 +72,7 @@ fn vs_main(@builtin(vertex_index) vertex: u32, @builtin(instance_index) instance
         // In front of its neighbors, and of the unmarked disc of the same point.
         clip.z = min(clip.z * 1.02 , clip.w);
     }
+    out.to_eye = towards_eye(in_world.xyz);
     out.corner = quad_corner(vertex);
     out.clip = offset_px(clip, out.corner * radius);
     out.radius = vec2<f32>(radius, f32(is_extra));
@@ -94,6 +97,13 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
     if in.radius.y > 0.5 && dot(in.corner, in.corner) > 0.55 {
         // A dark rim keeps the highlight visible on any color.
         return vec4<f32>(in.color.rgb * 0.15, 1.0);
+    }
+    if cloud.color_mode == 2u && in.radius.x > 1.25 && in.radius.y < 0.5 {
+        // A color that says nothing but which cloud it is may be shaded: a bead instead of a disc.
+        let up = view.up_in_world.xyz;
+        let depth = sqrt(max(1.0 - dot(in.corner, in.corner), 0.0));
+        let normal = normalize(cross(up, in.to_eye) * in.corner.x + up * in.corner.y + in.to_eye * depth);
+        return vec4<f32>(lit(in.color.rgb, light_on(normal), gloss_on(normal, in.to_eye)), in.color.a);
     }
     return in.color;
 }

@@ -12,6 +12,7 @@ pub use eframe::wgpu;
 
 pub mod context;
 pub mod edges;
+pub mod floor;
 pub mod guides;
 pub mod lines;
 pub mod mesh;

@@ -29,6 +29,7 @@ mod report;
 mod seeds;
 mod simulate;
 mod stats;
+mod still;
 mod sweep;
 mod training_data;
 mod unit;
@@ -98,6 +99,8 @@ enum Verb {
     Sweep(Box<sweep::SweepArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
     Figure(Box<figure::FigureArgs>),
+    /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
+    Still(Box<still::StillArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
     Export(Box<export::ExportArgs>),
     /// Fit a generator to pairs of your own sensors, and say what it is worth on pairs that were left out.
@@ -273,6 +276,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Sweep(args)) => sweep::run(&args),
         Some(Verb::Figure(args)) => figure::run(&args),
+        Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::TrainingData(args)) => training_data::run(&args),

@@ -16,5 +16,6 @@ pub mod app;
 #[cfg(feature = "gui")]
 pub mod gpu;
 pub mod headless;
+pub mod spatial;
 #[cfg(feature = "gui")]
 pub mod ui;

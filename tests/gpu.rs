@@ -625,7 +625,7 @@ fn a_plane_cuts_meshes_and_points_and_fills_what_it_lays_open() {
 fn an_outline_shows_edges_alone_and_faintly_what_is_behind() {
     let Some(mut view) = View::new() else { return };
     let back = view.camera.axes()[2];
-    let edges = EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: true };
+    let edges = EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: true, dash_px: 0.0 };
     let style = MeshStyle { look: Look::Outline, edges: Some(edges), ..MeshStyle::default() };
     let item = MeshItem { name: "outline".into(), ..mesh_item(square(DVec3::ZERO, back, 0.02), style) };
     let (v, _) = back.any_orthonormal_pair();

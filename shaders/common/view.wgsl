@@ -17,6 +17,11 @@ struct ViewUniform {
     px_per_m: f32,
     // How many of the planes cut.
     plane_count: u32,
+    // Pixels that stand for one pixel of a screen: a still of four times the size has lines of four times the width.
+    unit_px: f32,
+    unused_0: f32,
+    unused_1: f32,
+    unused_2: f32,
     // Normal and offset: what has dot(normal, p) + offset < 0 is cut away.
     planes: array<vec4<f32>, 8>,
 }
@@ -36,6 +41,11 @@ fn is_hidden(p: vec3<f32>) -> bool {
 // Moves a clip position by pixels (x right, y up).
 fn offset_px(clip: vec4<f32>, px: vec2<f32>) -> vec4<f32> {
     return vec4<f32>(clip.xy + px * 2.0 / view.size_px * clip.w, clip.zw);
+}
+
+// Pixels between two points that are a meter apart across the line of sight, at a clip w.
+fn px_per_m_at(w: f32) -> f32 {
+    return view.px_per_m / max(w, 1.0e-9);
 }
 
 // The unit vector from a point towards the eye.

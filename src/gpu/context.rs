@@ -7,8 +7,8 @@ use super::{GpuError, wgpu};
 
 /// sRGB-encoded bytes behind a plain format: the window toolkit samples its images so, and blends so.
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
-/// Depth is reversed (1 near, 0 far), which spreads the precision of a float evenly.
-pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth32Float;
+/// Depth is reversed (1 near, 0 far); the stencil says where something solid was drawn, so that a veil before it is thin.
+pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth24PlusStencil8;
 
 /// A device with its queue, and what the renderer needs to know about them. Cheap to clone.
 #[derive(Clone, Debug)]

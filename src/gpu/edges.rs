@@ -22,6 +22,8 @@ pub struct EdgeStyle {
     pub width_px: f32,
     /// True where creases are drawn, else the silhouette and borders alone.
     pub creases: bool,
+    /// Pixels from the start of a dash to that of the next, to the nearest octave; 0 = whole lines.
+    pub dash_px: f32,
 }
 
 /// Twin of the struct in `shaders/edges.wgsl`.
@@ -44,8 +46,8 @@ pub(super) struct EdgesUniform {
     pub(super) color: [f32; 4],
     pub(super) width_px: f32,
     pub(super) creases: u32,
-    pub(super) unused_0: u32,
-    pub(super) unused_1: u32,
+    pub(super) dash_px: f32,
+    pub(super) unused: u32,
 }
 
 /// The edges of one mesh on the device.
@@ -88,8 +90,8 @@ impl EdgeData {
                 color: [r, g, b, style.opacity.clamp(0.0, 1.0)],
                 width_px: if style.width_px.is_finite() { style.width_px.max(0.5) } else { 1.0 },
                 creases: u32::from(style.creases),
-                unused_0: 0,
-                unused_1: 0,
+                dash_px: if style.dash_px.is_finite() { style.dash_px.max(0.0) } else { 0.0 },
+                unused: 0,
             },
         );
         Ok((data, [uploaded, written]))

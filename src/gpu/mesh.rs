@@ -40,6 +40,8 @@ pub enum Shading {
     /// Rounded over edges of less than 40°, sharp over others.
     #[default]
     Smooth,
+    /// Rounded over every edge.
+    Round,
 }
 
 /// Effect of a mesh on the things behind it.
@@ -50,6 +52,8 @@ pub enum Look {
     Solid,
     /// Lets all of them through; its rim is stronger than its faces.
     XRay,
+    /// Its nearest layer alone, see-through; thin before something solid.
+    Veil,
     /// No faces: [`MeshStyle::edges`] alone, faint where something is in front.
     Outline,
 }
@@ -107,16 +111,26 @@ pub(super) struct MeshUniform {
 }
 
 /// Brightness of a surface, 0..1, for a unit normal towards the eye, with the directions of the camera. Twin of the
-/// function in `shaders/mesh.wgsl`.
+/// function in `shaders/common/light.wgsl`.
 pub fn light_on(normal: DVec3, camera: &Camera) -> f64 {
     let [_, up, _] = camera.axes();
-    0.24 + 0.16 * (0.5 + 0.5 * normal.dot(up)) + 0.60 * normal.dot(camera.key_light()).clamp(0.0, 1.0)
+    let facing = normal.dot(camera.key_light());
+    let key = ((facing + 0.2) / 1.2).clamp(0.0, 1.0);
+    let above = 0.5 + 0.5 * normal.dot(up);
+    0.14 + 0.20 * above * above + 0.62 * key.powf(1.5) + 0.08 * (-facing).clamp(0.0, 1.0)
+}
+
+/// White light that a surface mirrors towards the eye, 0..1, linear; `to_eye` is a unit vector. Twin of the function in
+/// `shaders/common/light.wgsl`.
+pub fn gloss_on(normal: DVec3, to_eye: DVec3, camera: &Camera) -> f64 {
+    let halfway = normal.dot((camera.key_light() + to_eye).normalize()).clamp(0.0, 1.0);
+    0.03 * halfway.powi(8) + 0.11 * halfway.powi(40)
 }
 
 /// A mesh on the device.
 #[derive(Debug)]
 pub(super) struct MeshData {
-    uploaded: (u64, Shading),
+    pub(super) uploaded: (u64, Shading),
     vertices: Elements,
     uniform: Uniform<MeshUniform>,
     bindings: wgpu::BindGroup,
@@ -208,7 +222,11 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
     // Twice the area long: large triangles have more say in a shared normal.
     let areas: Vec<DVec3> = faces.iter().map(|[a, b, c]| (*b - *a).cross(*c - *a)).collect();
     let mut around: HashMap<[u64; 3], Vec<usize>> = HashMap::new();
-    if shading == Shading::Smooth {
+    let crease = match shading {
+        Shading::Flat | Shading::Smooth => CREASE_RAD.cos(),
+        Shading::Round => -2.0,
+    };
+    if shading != Shading::Flat {
         for (f, face) in faces.iter().enumerate() {
             for p in face {
                 around.entry(place(*p)).or_default().push(f);
@@ -221,7 +239,7 @@ fn vertices(mesh: &TriMesh, shading: Shading, values: &[f32]) -> Vec<MeshVertex>
         for (p, value) in face.iter().zip(values) {
             let neighbors = around.get(&place(*p)).map_or(&[][..], Vec::as_slice);
             let rounded: DVec3 =
-                neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > CREASE_RAD.cos()).sum();
+                neighbors.iter().map(|&f| areas[f]).filter(|n| n.normalize_or_zero().dot(own) > crease).sum();
             let normal = rounded.try_normalize().unwrap_or(own);
             out.push(MeshVertex { position: view::position(*p), normal: normal.as_vec3().to_array(), value });
         }

@@ -1,6 +1,7 @@
 //! The render pipelines, built once per device and shared by all views.
 
 use super::context::{COLOR_FORMAT, DEPTH_FORMAT};
+use super::floor::SHADOW_FORMAT;
 use super::vertex::VERTEX_LAYOUT;
 use super::{Gpu, GpuError, shaders, wgpu};
 
@@ -14,6 +15,16 @@ pub struct Pipelines {
     pub(super) pulled_layout: wgpu::BindGroupLayout,
     /// The depth of a target.
     pub(super) depth_layout: wgpu::BindGroupLayout,
+    /// A picture of one sample per pixel.
+    pub(super) picture_layout: wgpu::BindGroupLayout,
+    /// A uniform, a picture and its sampler.
+    floor_layout: wgpu::BindGroupLayout,
+    floor_sampler: wgpu::Sampler,
+    pub(super) floor: wgpu::RenderPipeline,
+    /// The shadow on the floor, and its blur in both directions.
+    pub(super) shadow: wgpu::RenderPipeline,
+    pub(super) shadow_across: wgpu::RenderPipeline,
+    pub(super) shadow_down: wgpu::RenderPipeline,
     pub(super) points: wgpu::RenderPipeline,
     /// Hides nothing.
     pub(super) points_translucent: wgpu::RenderPipeline,
@@ -21,14 +32,18 @@ pub struct Pipelines {
     pub(super) mesh_solid: wgpu::RenderPipeline,
     /// Hides nothing.
     pub(super) mesh_xray: wgpu::RenderPipeline,
+    /// The depth of veils, then their nearest layer before nothing solid, and before something.
+    pub(super) veil: [wgpu::RenderPipeline; 3],
     pub(super) edges: wgpu::RenderPipeline,
     /// Hidden by nothing.
     pub(super) edges_overlay: wgpu::RenderPipeline,
     pub(super) lines: wgpu::RenderPipeline,
     /// Hidden by nothing.
     pub(super) lines_overlay: wgpu::RenderPipeline,
-    /// Darkens what lies behind its neighbors; reads the depth and so has none.
+    /// Darkens what lies behind its neighbors or in a hollow; reads the depth and so has none.
     pub(super) edl: wgpu::RenderPipeline,
+    /// The same while the camera moves, without the hollows.
+    pub(super) edl_moving: wgpu::RenderPipeline,
 }
 
 /// Settings that differ between the pipelines.
@@ -41,6 +56,20 @@ struct Variant<'a> {
     fragment: &'a str,
     blend: bool,
     depth: Depth,
+    stencil: Stencil,
+}
+
+/// Use of the stencil by a pipeline.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stencil {
+    /// None.
+    Unused,
+    /// Says that something solid is here.
+    Marks,
+    /// Draws where nothing solid is.
+    Beside,
+    /// Draws where something solid is.
+    Before,
 }
 
 /// Use of depth by a pipeline.
@@ -48,8 +77,12 @@ struct Variant<'a> {
 enum Depth {
     /// Tests and writes it.
     Hides,
+    /// Tests and writes it, and no color.
+    Only,
     /// Tests it alone.
     Tests,
+    /// Draws only what is at just this depth.
+    Equals,
     /// Neither, in a pass that has it.
     Ignores,
     /// None: its pass has no depth.
@@ -68,7 +101,7 @@ impl Pipelines {
         }
         let compiled = |name| shaders::compile(gpu, name);
         let (points, mesh, edges) = (compiled("points.wgsl")?, compiled("mesh.wgsl")?, compiled("edges.wgsl")?);
-        let lines = compiled("lines.wgsl")?;
+        let (lines, floor, shadow) = (compiled("lines.wgsl")?, compiled("floor.wgsl")?, compiled("shadow.wgsl")?);
         let edl = compiled(if gpu.samples > 1 { "edl_many.wgsl" } else { "edl_one.wgsl" })?;
         gpu.guarded("building the render pipelines", || {
             let uniform = binding(0, wgpu::BufferBindingType::Uniform);
@@ -80,6 +113,12 @@ impl Pipelines {
             let plain_layout = layout("Pipelines::plain_layout", &[uniform]);
             let pulled_layout = layout("Pipelines::pulled_layout", &[uniform, storage]);
             let depth_layout = layout("Pipelines::depth_layout", &[depth_texture(gpu.samples > 1)]);
+            let picture_layout = layout("Pipelines::picture_layout", &[depth_texture(false)]);
+            let floor_layout = layout("Pipelines::floor_layout", &[uniform, filtered_texture(1), sampler(2)]);
+            let thrown = |label, item_layout: &_, vertices: &[_], vertex, fragment| {
+                let layouts = [&view_layout, item_layout];
+                build_shadow(gpu, label, layouts, &shadow, vertices, [vertex, fragment])
+            };
             let build = |variant: Variant<'_>| build(gpu, &view_layout, &variant);
             let pulled = Variant {
                 label: "Points::pipeline",
@@ -89,6 +128,7 @@ impl Pipelines {
                 fragment: "fs_main",
                 blend: false,
                 depth: Depth::Hides,
+                stencil: Stencil::Marks,
             };
             let lit = Variant {
                 label: "Mesh::solid",
@@ -98,16 +138,50 @@ impl Pipelines {
                 blend: true,
                 ..pulled
             };
+            let screen = Variant {
+                label: "Edl::pipeline",
+                module: &edl,
+                item_layout: &depth_layout,
+                blend: true,
+                depth: Depth::Absent,
+                ..pulled
+            };
+            let veil = |label, fragment, depth, stencil| {
+                build(Variant { label, fragment, depth, stencil, ..lit })
+            };
             Ok(Self {
                 points: build(Variant { ..pulled }),
                 points_translucent: build(Variant {
                     label: "Points::translucent",
                     blend: true,
                     depth: Depth::Tests,
+                    stencil: Stencil::Unused,
                     ..pulled
                 }),
                 mesh_solid: build(Variant { ..lit }),
-                mesh_xray: build(Variant { label: "Mesh::xray", depth: Depth::Tests, ..lit }),
+                mesh_xray: build(Variant {
+                    label: "Mesh::xray",
+                    depth: Depth::Tests,
+                    stencil: Stencil::Unused,
+                    ..lit
+                }),
+                veil: [
+                    veil("Veil::depth", "fs_depth", Depth::Only, Stencil::Unused),
+                    veil("Veil::beside", "fs_veil", Depth::Equals, Stencil::Beside),
+                    veil("Veil::before", "fs_veil_thin", Depth::Equals, Stencil::Before),
+                ],
+                floor: build(Variant {
+                    label: "Floor::pipeline",
+                    module: &floor,
+                    item_layout: &floor_layout,
+                    blend: true,
+                    depth: Depth::Tests,
+                    stencil: Stencil::Unused,
+                    ..pulled
+                }),
+                shadow: thrown("Shadow::pipeline", &plain_layout, &[Some(VERTEX_LAYOUT)], "vs_main", "fs_main"),
+                shadow_across: thrown("Shadow::across", &picture_layout, &[], "vs_blur", "fs_across"),
+                shadow_down: thrown("Shadow::down", &picture_layout, &[], "vs_blur", "fs_down"),
                 edges: build(Variant {
                     label: "Edges::pipeline",
                     module: &edges,
@@ -121,28 +195,39 @@ impl Pipelines {
                     fragment: "fs_hidden",
                     blend: true,
                     depth: Depth::Ignores,
+                    stencil: Stencil::Unused,
                     ..pulled
                 }),
-                lines: build(Variant { label: "Lines::pipeline", module: &lines, blend: true, ..pulled }),
+                lines: build(Variant {
+                    label: "Lines::pipeline",
+                    module: &lines,
+                    blend: true,
+                    depth: Depth::Tests,
+                    stencil: Stencil::Unused,
+                    ..pulled
+                }),
                 lines_overlay: build(Variant {
                     label: "Lines::overlay",
                     module: &lines,
                     blend: true,
                     depth: Depth::Ignores,
+                    stencil: Stencil::Unused,
                     ..pulled
                 }),
-                edl: build(Variant {
-                    label: "Edl::pipeline",
-                    module: &edl,
-                    item_layout: &depth_layout,
-                    blend: true,
-                    depth: Depth::Absent,
-                    ..pulled
+                edl: build(Variant { ..screen }),
+                edl_moving: build(Variant { label: "Edl::moving", fragment: "fs_moving", ..screen }),
+                floor_sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
+                    label: Some("Floor::sampler"),
+                    mag_filter: wgpu::FilterMode::Linear,
+                    min_filter: wgpu::FilterMode::Linear,
+                    ..Default::default()
                 }),
                 view_layout,
                 plain_layout,
                 pulled_layout,
                 depth_layout,
+                picture_layout,
+                floor_layout,
             })
         })
     }
@@ -163,6 +248,19 @@ impl Pipelines {
             .map(|(buffer, binding)| wgpu::BindGroupEntry { binding, resource: buffer.as_entire_binding() })
             .collect();
         gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
+    }
+
+    /// Binds a floor with its shadow.
+    pub(super) fn bind_floor(&self, gpu: &Gpu, uniform: &wgpu::Buffer, shadow: &wgpu::TextureView) -> wgpu::BindGroup {
+        let entries = [
+            uniform.as_entire_binding(),
+            wgpu::BindingResource::TextureView(shadow),
+            wgpu::BindingResource::Sampler(&self.floor_sampler),
+        ];
+        let entries: Vec<_> =
+            (0..).zip(entries).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
+        let (label, layout) = (Some("Floor::shown"), &self.floor_layout);
+        gpu.device.create_bind_group(&wgpu::BindGroupDescriptor { label, layout, entries: &entries })
     }
 
     /// Binds the depth of a target.
@@ -200,6 +298,73 @@ fn depth_texture(multisampled: bool) -> wgpu::BindGroupLayoutEntry {
     }
 }
 
+/// A picture that is read between its pixels, for the fragment stage.
+fn filtered_texture(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Texture {
+        sample_type: wgpu::TextureSampleType::Float { filterable: true },
+        view_dimension: wgpu::TextureViewDimension::D2,
+        multisampled: false,
+    };
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }
+}
+
+/// Its sampler.
+fn sampler(binding: u32) -> wgpu::BindGroupLayoutEntry {
+    let ty = wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering);
+    wgpu::BindGroupLayoutEntry { binding, visibility: wgpu::ShaderStages::FRAGMENT, ty, count: None }
+}
+
+/// Builds a pipeline of the shadow: into its own small picture, without depth.
+fn build_shadow(
+    gpu: &Gpu,
+    label: &str,
+    layouts: [&wgpu::BindGroupLayout; 2],
+    module: &wgpu::ShaderModule,
+    vertices: &[Option<wgpu::VertexBufferLayout<'_>>],
+    [vertex, fragment]: [&str; 2],
+) -> wgpu::RenderPipeline {
+    let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some(label),
+        bind_group_layouts: &layouts.map(Some),
+        immediate_size: 0,
+    });
+    let compilation_options = wgpu::PipelineCompilationOptions::default();
+    gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some(label),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module,
+            entry_point: Some(vertex),
+            compilation_options: compilation_options.clone(),
+            buffers: vertices,
+        },
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        fragment: Some(wgpu::FragmentState {
+            module,
+            entry_point: Some(fragment),
+            compilation_options,
+            targets: &[Some(SHADOW_FORMAT.into())],
+        }),
+        multiview_mask: None,
+        cache: None,
+    })
+}
+
+/// The stencil of a pipeline; the reference is 1.
+fn stencil_state(stencil: Stencil) -> wgpu::StencilState {
+    let keep = wgpu::StencilFaceState::IGNORE;
+    let compare = |compare| wgpu::StencilFaceState { compare, ..keep };
+    let face = match stencil {
+        Stencil::Unused => keep,
+        Stencil::Marks => wgpu::StencilFaceState { pass_op: wgpu::StencilOperation::Replace, ..keep },
+        Stencil::Beside => compare(wgpu::CompareFunction::NotEqual),
+        Stencil::Before => compare(wgpu::CompareFunction::Equal),
+    };
+    wgpu::StencilState { front: face, back: face, read_mask: 0xff, write_mask: 0xff }
+}
+
 /// Builds one pipeline.
 fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) -> wgpu::RenderPipeline {
     let layout = gpu.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -208,14 +373,15 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
         immediate_size: 0,
     });
     let compare = match variant.depth {
-        Depth::Hides | Depth::Tests => wgpu::CompareFunction::GreaterEqual,
+        Depth::Hides | Depth::Only | Depth::Tests => wgpu::CompareFunction::GreaterEqual,
+        Depth::Equals => wgpu::CompareFunction::Equal,
         Depth::Ignores | Depth::Absent => wgpu::CompareFunction::Always,
     };
     let depth_stencil = wgpu::DepthStencilState {
         format: DEPTH_FORMAT,
-        depth_write_enabled: Some(variant.depth == Depth::Hides),
+        depth_write_enabled: Some(matches!(variant.depth, Depth::Hides | Depth::Only)),
         depth_compare: Some(compare),
-        stencil: wgpu::StencilState::default(),
+        stencil: stencil_state(variant.stencil),
         bias: wgpu::DepthBiasState::default(),
     };
     gpu.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
@@ -237,7 +403,10 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
             targets: &[Some(wgpu::ColorTargetState {
                 format: COLOR_FORMAT,
                 blend: variant.blend.then_some(OVER),
-                write_mask: wgpu::ColorWrites::ALL,
+                write_mask: match variant.depth {
+                    Depth::Only => wgpu::ColorWrites::empty(),
+                    _ => wgpu::ColorWrites::ALL,
+                },
             })],
         }),
         multiview_mask: None,
@@ -245,6 +414,6 @@ fn build(gpu: &Gpu, view_layout: &wgpu::BindGroupLayout, variant: &Variant<'_>) 
     })
 }
 
-/// Blends colors by alpha; the picture itself stays opaque.
+/// Blends colors by alpha; the picture itself stays as opaque as its ground.
 const OVER: wgpu::BlendState =
     wgpu::BlendState { color: wgpu::BlendState::ALPHA_BLENDING.color, alpha: wgpu::BlendComponent::OVER };

@@ -1,7 +1,7 @@
 //! A scene, and the renderer of one view of it.
 //!
-//! Draw order: lines, opaque meshes and their edges, points, outlines, what is translucent, x-ray meshes; eye-dome
-//! lighting; outlines behind something, overlay lines.
+//! Draw order: the floor, lines, opaque meshes and their edges, points; shading by depth; outlines, veils, what is
+//! translucent, x-ray meshes; outlines behind something, overlay lines.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -9,12 +9,13 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::buffer::Uniform;
+use super::floor::{Caster, Floor, FloorData};
 use super::lines::{LinesData, LinesItem};
 use super::mesh::{Look, MeshData, MeshItem};
 use super::pipelines::Pipelines;
 use super::points::{CloudItem, PointsData};
 use super::target::{Pass, Target};
-use super::view::{Camera, Plane, ViewUniform};
+use super::view::{self, Camera, Part, Plane, ViewUniform};
 use super::{Gpu, GpuError, wgpu};
 
 /// Everything that one view shows. Cheap to make anew for every frame: the geometry is shared.
@@ -32,7 +33,13 @@ pub struct SceneData {
     ///
     /// [`MAX_PLANES`]: super::view::MAX_PLANES
     pub cut: Vec<Plane>,
-    /// True where what lies behind its neighbors is darkened (eye-dome lighting).
+    /// The floor, with the shadow of solid meshes.
+    pub floor: Option<Floor>,
+    /// True where the background is left out: what nothing covers has no opacity.
+    pub transparent: bool,
+    /// Pixels that stand for one of a screen: widths and sizes in pixels are drawn so many times as large.
+    pub unit_px: f32,
+    /// True where what lies behind its neighbors or in a hollow is darkened (eye-dome lighting, ambient occlusion).
     pub eye_dome: bool,
     /// The camera is being moved: only so many points are drawn as [`SceneRenderer::moving_points`] allows.
     pub moving: bool,
@@ -46,6 +53,9 @@ impl Default for SceneData {
             meshes: vec![],
             lines: vec![],
             cut: vec![],
+            floor: None,
+            transparent: false,
+            unit_px: 1.0,
             eye_dome: false,
             moving: false,
         }
@@ -92,6 +102,7 @@ pub struct SceneRenderer {
     clouds: BTreeMap<String, PointsData>,
     meshes: BTreeMap<String, MeshData>,
     lines: BTreeMap<String, LinesData>,
+    floor: Option<FloorData>,
     /// The depth of the target of this generation.
     depth: Option<(u64, wgpu::BindGroup)>,
     shown: Option<Shown>,
@@ -102,19 +113,26 @@ pub struct SceneRenderer {
 #[derive(Clone, Debug, PartialEq)]
 struct Shown {
     target: u64,
-    background: [f32; 3],
+    background: [f32; 4],
     eye_dome: bool,
+    moving: bool,
+    casters: Vec<Caster>,
     order: Vec<(Layer, String)>,
 }
 
 /// When an item is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Layer {
+    Floor,
     Lines,
     OpaqueMesh,
     Edges,
     Points,
+    /// From here on nothing is shaded by its depth.
     Outline,
+    VeilDepth,
+    VeilBeside,
+    VeilBefore,
     TranslucentMesh,
     TranslucentPoints,
     XRayMesh,
@@ -144,6 +162,7 @@ impl SceneRenderer {
                 clouds: BTreeMap::new(),
                 meshes: BTreeMap::new(),
                 lines: BTreeMap::new(),
+                floor: None,
                 depth: None,
                 shown: None,
                 counters: Counters::default(),
@@ -164,16 +183,35 @@ impl SceneRenderer {
     /// # Errors
     /// [`GpuError::TooLarge`] and [`GpuError::Device`]; the next call starts afresh.
     pub fn render(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, target: &Target) -> Result<bool, GpuError> {
+        self.render_part(gpu, scene, (camera, Part::whole(target.size())), target)
+    }
+
+    /// As [`Self::render`], a part of a larger picture: the target has the size of the part.
+    ///
+    /// # Errors
+    /// As [`Self::render`].
+    pub fn render_part(
+        &mut self,
+        gpu: &Gpu,
+        scene: &SceneData,
+        (camera, part): (&Camera, Part),
+        target: &Target,
+    ) -> Result<bool, GpuError> {
         let before = self.shown.take();
         let result = gpu.guarded("drawing a 3D view", || {
-            let changed = self.update(gpu, scene, camera, target.size())?;
+            let changed = self.update(gpu, scene, camera, part)?;
             if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
                 self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth())));
             }
             let shown = Shown {
                 target: target.generation(),
-                background: scene.background,
+                background: match (scene.transparent, scene.background) {
+                    (true, _) => [0.0; 4],
+                    (false, [r, g, b]) => [r, g, b, 1.0],
+                },
                 eye_dome: scene.eye_dome,
+                moving: scene.moving && scene.eye_dome,
+                casters: casters(scene),
                 order: order(scene),
             };
             let draw = changed || before.as_ref() != Some(&shown);
@@ -192,15 +230,16 @@ impl SceneRenderer {
                 self.clouds.clear();
                 self.meshes.clear();
                 self.lines.clear();
+                self.floor = None;
                 Err(error)
             }
         }
     }
 
     /// Sends what changed; returns whether anything did.
-    fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, size: [u32; 2]) -> Result<bool, GpuError> {
+    fn update(&mut self, gpu: &Gpu, scene: &SceneData, camera: &Camera, part: Part) -> Result<bool, GpuError> {
         let mut done = Counters {
-            uniforms: u64::from(self.view.set(gpu, camera.uniform(size, &scene.cut))),
+            uniforms: u64::from(self.view.set(gpu, camera.uniform(part, &scene.cut, scene.unit_px))),
             ..Counters::default()
         };
         let mut count = |[uploaded, written]: [bool; 2]| {
@@ -231,6 +270,13 @@ impl SceneRenderer {
             count(did);
             self.lines.insert(item.name.clone(), data);
         }
+        match &scene.floor {
+            Some(floor) => {
+                let data = self.floor.get_or_insert_with(|| FloorData::new(gpu, &self.pipelines));
+                count([false, data.update(gpu, floor)]);
+            }
+            None => self.floor = None,
+        }
         self.counters.uploads += done.uploads;
         self.counters.uniforms += done.uniforms;
         Ok(done != Counters::default())
@@ -240,7 +286,14 @@ impl SceneRenderer {
     fn draw(&mut self, gpu: &Gpu, shown: &Shown, target: &Target) {
         let label = Some("Scene::encoder");
         let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label });
-        let over = shown.order.iter().position(|(layer, _)| *layer >= Layer::HiddenOutline);
+        if let Some(floor) = &mut self.floor {
+            let meshes = &self.meshes;
+            let draw = |pass: &mut wgpu::RenderPass<'_>, name: &str| {
+                meshes.get(name).map(|data| data.draw(pass));
+            };
+            floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
+        }
+        let over = shown.order.iter().position(|(layer, _)| *layer >= Layer::Outline);
         let (within, over) = shown.order.split_at(over.unwrap_or(shown.order.len()));
         let edl = self.depth.as_ref().filter(|_| shown.eye_dome).map(|(_, depth)| depth);
         let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
@@ -251,7 +304,7 @@ impl SceneRenderer {
                 {
                     let on = Pass { clear: None, with_depth: false, last: over.is_empty() };
                     let mut pass = target.begin(&mut encoder, on);
-                    pass.set_pipeline(&self.pipelines.edl);
+                    pass.set_pipeline(if shown.moving { &self.pipelines.edl_moving } else { &self.pipelines.edl });
                     pass.set_bind_group(0, &self.view_bindings, &[]);
                     pass.set_bind_group(1, depth, &[]);
                     pass.draw(0..6, 0..1);
@@ -267,9 +320,14 @@ impl SceneRenderer {
 
     fn draw_layers(&self, pass: &mut wgpu::RenderPass<'_>, order: &[(Layer, String)]) {
         pass.set_bind_group(0, &self.view_bindings, &[]);
+        pass.set_stencil_reference(1);
         for (layer, name) in order {
             pass.set_pipeline(match layer {
+                Layer::Floor => &self.pipelines.floor,
                 Layer::Lines => &self.pipelines.lines,
+                Layer::VeilDepth => &self.pipelines.veil[0],
+                Layer::VeilBeside => &self.pipelines.veil[1],
+                Layer::VeilBefore => &self.pipelines.veil[2],
                 Layer::OpaqueMesh | Layer::TranslucentMesh => &self.pipelines.mesh_solid,
                 Layer::Edges | Layer::Outline => &self.pipelines.edges,
                 Layer::HiddenOutline => &self.pipelines.edges_overlay,
@@ -279,17 +337,29 @@ impl SceneRenderer {
                 Layer::OverlayLines => &self.pipelines.lines_overlay,
             });
             match layer {
+                Layer::Floor => self.floor.as_ref().map(|d| d.draw(pass)),
                 Layer::Lines | Layer::OverlayLines => self.lines.get(name).map(|d| d.draw(pass)),
                 Layer::Points | Layer::TranslucentPoints => self.clouds.get(name).map(|d| d.draw(pass)),
                 Layer::Edges | Layer::Outline | Layer::HiddenOutline => {
                     self.meshes.get(name).map(|d| d.draw_edges(pass))
                 }
-                Layer::OpaqueMesh | Layer::TranslucentMesh | Layer::XRayMesh => {
+                Layer::OpaqueMesh
+                | Layer::VeilDepth
+                | Layer::VeilBeside
+                | Layer::VeilBefore
+                | Layer::TranslucentMesh
+                | Layer::XRayMesh => {
                     self.meshes.get(name).map(|d| d.draw(pass))
                 }
             };
         }
     }
+}
+
+/// The meshes that throw a shadow: solid ones, as they stand.
+fn casters(scene: &SceneData) -> Vec<Caster> {
+    let solid = scene.meshes.iter().filter(|m| scene.floor.is_some() && m.style.look == Look::Solid);
+    solid.map(|m| (m.name.clone(), m.revision, view::matrix(&m.style.world_from_mesh))).collect()
 }
 
 /// All items of a scene in the order in which they are drawn; items of one layer keep the order of their list.
@@ -300,6 +370,7 @@ fn order(scene: &SceneData) -> Vec<(Layer, String)> {
     });
     let meshes = scene.meshes.iter().flat_map(|m| {
         let layers: &[Layer] = match (m.style.look, m.style.edges.is_some()) {
+            (Look::Veil, _) => &[Layer::VeilDepth, Layer::VeilBeside, Layer::VeilBefore],
             (Look::XRay, _) => &[Layer::XRayMesh],
             (Look::Outline, _) => &[Layer::Outline, Layer::HiddenOutline],
             (Look::Solid, edges) if m.style.opacity < 1.0 => {
@@ -313,7 +384,8 @@ fn order(scene: &SceneData) -> Vec<(Layer, String)> {
         .clouds
         .iter()
         .map(|c| (if c.style.opacity < 1.0 { Layer::TranslucentPoints } else { Layer::Points }, c.name.clone()));
-    let mut all: Vec<_> = lines.chain(meshes).chain(clouds).collect();
+    let floor = scene.floor.iter().map(|_| (Layer::Floor, String::new()));
+    let mut all: Vec<_> = floor.chain(lines).chain(meshes).chain(clouds).collect();
     all.sort_by_key(|(layer, _)| *layer);
     all
 }

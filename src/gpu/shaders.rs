@@ -9,14 +9,18 @@ use super::{Gpu, GpuError, wgpu};
 pub(crate) const SHADERS: &[(&str, &str)] = &[
     ("common/color.wgsl", include_str!("../../shaders/common/color.wgsl")),
     ("common/edl.wgsl", include_str!("../../shaders/common/edl.wgsl")),
+    ("common/floor.wgsl", include_str!("../../shaders/common/floor.wgsl")),
+    ("common/light.wgsl", include_str!("../../shaders/common/light.wgsl")),
     ("common/stroke.wgsl", include_str!("../../shaders/common/stroke.wgsl")),
     ("common/view.wgsl", include_str!("../../shaders/common/view.wgsl")),
     ("edges.wgsl", include_str!("../../shaders/edges.wgsl")),
     ("edl_many.wgsl", include_str!("../../shaders/edl_many.wgsl")),
     ("edl_one.wgsl", include_str!("../../shaders/edl_one.wgsl")),
+    ("floor.wgsl", include_str!("../../shaders/floor.wgsl")),
     ("lines.wgsl", include_str!("../../shaders/lines.wgsl")),
     ("mesh.wgsl", include_str!("../../shaders/mesh.wgsl")),
     ("points.wgsl", include_str!("../../shaders/points.wgsl")),
+    ("shadow.wgsl", include_str!("../../shaders/shadow.wgsl")),
     ("sheet.wgsl", include_str!("../../shaders/sheet.wgsl")),
 ];
 
@@ -256,8 +260,16 @@ mod tests {
                 size_px,
                 px_per_m,
                 plane_count,
+                unit_px,
+                unused_0,
+                unused_1,
+                unused_2,
                 planes,
             }
+        );
+        check_layout!(
+            "common/floor.wgsl",
+            floor::FloorUniform { color, center, light, shadow, unused_0, unused_1, unused_2 }
         );
         check_layout!("points.wgsl", points::PointVertex { position, payload });
         check_layout!(
@@ -287,7 +299,7 @@ mod tests {
         check_layout!("edges.wgsl", edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });
         check_layout!(
             "edges.wgsl",
-            edges::EdgesUniform { world_from_mesh, color, width_px, creases, unused_0, unused_1 }
+            edges::EdgesUniform { world_from_mesh, color, width_px, creases, dash_px, unused }
         );
         check_layout!("lines.wgsl", lines::LineVertex { position, color });
         check_layout!("lines.wgsl", lines::LinesUniform { world_from_lines, width_px, opacity, unused_0, unused_1 });

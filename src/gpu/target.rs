@@ -14,6 +14,8 @@ pub struct Target {
     resolved_view: wgpu::TextureView,
     multisampled: Option<wgpu::TextureView>,
     depth: wgpu::TextureView,
+    /// The depth without the stencil, for shaders.
+    depth_alone: wgpu::TextureView,
 }
 
 impl Target {
@@ -45,9 +47,11 @@ impl Target {
             let multisampled =
                 (gpu.samples > 1).then(|| view(texture("Target::multisampled", COLOR_FORMAT, gpu.samples, attachment)));
             let depth_usage = attachment | wgpu::TextureUsages::TEXTURE_BINDING;
-            let depth = view(texture("Target::depth", DEPTH_FORMAT, gpu.samples, depth_usage));
+            let depth = texture("Target::depth", DEPTH_FORMAT, gpu.samples, depth_usage);
+            let alone = wgpu::TextureViewDescriptor { aspect: wgpu::TextureAspect::DepthOnly, ..Default::default() };
+            let (depth_alone, depth) = (depth.create_view(&alone), view(depth));
             let generation = GENERATION.fetch_add(1, Ordering::Relaxed);
-            Ok(Self { size, generation, resolved, resolved_view, multisampled, depth })
+            Ok(Self { size, generation, resolved, resolved_view, multisampled, depth, depth_alone })
         })
     }
 
@@ -74,14 +78,14 @@ impl Target {
         self.generation
     }
 
-    /// The finished picture, for sampling: sRGB-encoded, opaque.
+    /// The finished picture, for sampling: sRGB-encoded, premultiplied.
     pub fn view(&self) -> &wgpu::TextureView {
         &self.resolved_view
     }
 
     /// The depth of every sample, for shaders.
     pub(super) fn depth(&self) -> &wgpu::TextureView {
-        &self.depth
+        &self.depth_alone
     }
 
     /// Starts a pass.
@@ -93,12 +97,17 @@ impl Target {
             None => (&self.resolved_view, None, wgpu::StoreOp::Store),
         };
         let color_load = pass.clear.map_or(wgpu::LoadOp::Load, |color| {
-            let [r, g, b] = color.map(f64::from);
-            wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a: 1.0 })
+            let [r, g, b, a] = color.map(f64::from);
+            wgpu::LoadOp::Clear(wgpu::Color { r, g, b, a })
         });
+        let store_depth = if pass.last { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store };
         let depth_ops = wgpu::Operations {
             load: if pass.clear.is_some() { wgpu::LoadOp::Clear(0.0) } else { wgpu::LoadOp::Load },
-            store: if pass.last { wgpu::StoreOp::Discard } else { wgpu::StoreOp::Store },
+            store: store_depth,
+        };
+        let stencil_ops = wgpu::Operations {
+            load: if pass.clear.is_some() { wgpu::LoadOp::Clear(0) } else { wgpu::LoadOp::Load },
+            store: store_depth,
         };
         encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("Scene::pass"),
@@ -111,7 +120,7 @@ impl Target {
             depth_stencil_attachment: pass.with_depth.then_some(wgpu::RenderPassDepthStencilAttachment {
                 view: &self.depth,
                 depth_ops: Some(depth_ops),
-                stencil_ops: None,
+                stencil_ops: Some(stencil_ops),
             }),
             ..Default::default()
         })
@@ -166,8 +175,8 @@ impl Target {
 /// Settings of a pass over the picture.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pass {
-    /// Clears everything to this color (sRGB) first; without one the picture goes on.
-    pub clear: Option<[f32; 3]>,
+    /// Clears everything to this color (sRGB, premultiplied) first; without one the picture goes on.
+    pub clear: Option<[f32; 4]>,
     /// True where it tests against depth.
     pub with_depth: bool,
     /// True where the picture is finished after it.

@@ -105,6 +105,41 @@ impl Plane {
     }
 }
 
+/// A rectangle of a picture: pictures larger than a texture are drawn in several.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Part {
+    /// Width and height of the whole picture, pixels.
+    pub of: [u32; 2],
+    /// Left and upper pixel of the part.
+    pub at: [u32; 2],
+    /// Width and height of the part, pixels.
+    pub size: [u32; 2],
+}
+
+impl Part {
+    /// A picture in one.
+    pub fn whole(size: [u32; 2]) -> Self {
+        Self { of: size, at: [0, 0], size }
+    }
+
+    /// The matrix from clip coordinates of the whole picture to those of the part.
+    fn clip_from_whole(self) -> DMat4 {
+        if self == Self::whole(self.of) {
+            return DMat4::IDENTITY;
+        }
+        let [of, at, size] = [self.of, self.at, self.size].map(|s| DVec2::new(f64::from(s[0]), f64::from(s[1])));
+        let scale = of / size.max(DVec2::ONE);
+        let middle = (at + 0.5 * size) / of.max(DVec2::ONE) * 2.0 - 1.0;
+        // Rows count downwards, clip coordinates upwards.
+        DMat4::from_cols(
+            DVec4::X * scale.x,
+            DVec4::Y * scale.y,
+            DVec4::Z,
+            DVec4::new(-middle.x * scale.x, middle.y * scale.y, 0.0, 1.0),
+        )
+    }
+}
+
 /// A camera that looks at `target` from `distance`. Plain numbers, so that views can be linked and stored.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -117,7 +152,7 @@ pub struct Camera {
     pub yaw_rad: f64,
     /// Elevation of the eye over the horizontal plane, radians in -π/2..π/2; positive = from the wrist's side.
     pub pitch_rad: f64,
-    /// Vertical angle of view, radians.
+    /// Angle of view of the smaller side, radians: views of any shape show the same things.
     pub fov_rad: f64,
     /// Parallel projection of the same size at the target: lengths on the screen can be compared.
     pub orthographic: bool,
@@ -177,8 +212,8 @@ impl Camera {
         (self.yaw_rad, self.pitch_rad) = preset.angles();
     }
 
-    /// Moves so that the box `[smallest, largest]` (meters, world) fills the view from the present side. Does
-    /// nothing for a box that is not finite.
+    /// Moves so that the box `[smallest, largest]` (meters, world) fills the view from any side. Does nothing for a box
+    /// that is not finite.
     pub fn fit(&mut self, bounds: [DVec3; 2], size: [u32; 2]) {
         let [lo, hi] = bounds;
         let radius = 0.5 * (hi - lo).length();
@@ -186,10 +221,30 @@ impl Camera {
             return;
         }
         self.target = 0.5 * (lo + hi);
-        let aspect = aspect(size);
-        let half = (0.5 * self.fov_rad).tan() * aspect.min(1.0);
-        let angle = half.atan();
+        // The rim of a sphere is seen in full where half the smaller side covers its angle; a pixel is left around it.
+        let side = f64::from(size[0].min(size[1]).max(4));
+        let angle = ((0.5 * self.fov_rad).tan() * (1.0 - 2.0 / side)).atan();
         self.distance = (radius.max(1e-3) / angle.sin()).clamp(*DISTANCE.start(), *DISTANCE.end());
+    }
+
+    /// Moves so that these points (meters, world) span `share` of the smaller side of the view from the present side, in
+    /// its middle. Does nothing without a finite point.
+    pub fn frame(&mut self, points: &[DVec3], share: f64) {
+        let axes = self.axes();
+        let along = |p: &DVec3| DVec3::new(p.dot(axes[0]), p.dot(axes[1]), p.dot(axes[2]));
+        let seen: Vec<DVec3> = points.iter().filter(|p| p.is_finite()).map(along).collect();
+        let Some(first) = seen.first() else { return };
+        let [lo, hi] = seen.iter().fold([*first; 2], |[lo, hi], p| [lo.min(*p), hi.max(*p)]);
+        let middle = 0.5 * (lo + hi);
+        self.target = axes[0] * middle.x + axes[1] * middle.y + axes[2] * middle.z;
+        let tan = (0.5 * self.fov_rad).tan() * share.max(1e-3);
+        let needed = |p: &DVec3| {
+            let off = *p - middle;
+            let nearer = if self.orthographic { 0.0 } else { off.z };
+            off.x.abs().max(off.y.abs()) / tan + nearer
+        };
+        let distance = seen.iter().map(needed).fold(1e-3, f64::max);
+        self.distance = distance.clamp(*DISTANCE.start(), *DISTANCE.end());
     }
 
     /// True where every number is one that can be drawn with: stored state is outside data.
@@ -203,7 +258,7 @@ impl Camera {
 
     /// Pixels per meter at the target.
     pub fn px_per_m(&self, size: [u32; 2]) -> f64 {
-        0.5 * f64::from(size[1].max(1)) / ((0.5 * self.fov_rad).tan() * self.distance)
+        0.5 * f64::from(size[0].min(size[1]).max(1)) / ((0.5 * self.fov_rad).tan() * self.distance)
     }
 
     /// The matrix from world to clip coordinates (depth reversed: 1 near, 0 far).
@@ -212,17 +267,17 @@ impl Camera {
         let eye = self.eye();
         let row = |axis: DVec3| axis.extend(-axis.dot(eye));
         let [x, y, z] = [right, up, back].map(row);
-        let aspect = aspect(size);
+        let [width, height] = spans(size);
         let focal = 1.0 / (0.5 * self.fov_rad).tan();
         let rows = if self.orthographic {
             // Parallel rays have no near side.
             let scale = focal / self.distance;
             let reach = ORTHOGRAPHIC_REACH * self.distance;
             let depth = z / (2.0 * reach) + DVec4::W * (0.5 + self.distance / (2.0 * reach));
-            [x * (scale / aspect), y * scale, depth, DVec4::W]
+            [x * (scale / width), y * (scale / height), depth, DVec4::W]
         } else {
             // Infinite far plane.
-            [x * (focal / aspect), y * focal, DVec4::W * (NEAR * self.distance), -z]
+            [x * (focal / width), y * (focal / height), DVec4::W * (NEAR * self.distance), -z]
         };
         DMat4::from_cols(rows[0], rows[1], rows[2], rows[3]).transpose()
     }
@@ -238,8 +293,9 @@ impl Camera {
         let [right, up, back] = self.axes();
         let [width, height] = size.map(|s| f64::from(s.max(1)));
         let half = (0.5 * self.fov_rad).tan();
-        let x = (2.0 * px.x / width - 1.0) * half * aspect(size);
-        let y = (1.0 - 2.0 * px.y / height) * half;
+        let [wide, high] = spans(size);
+        let x = (2.0 * px.x / width - 1.0) * half * wide;
+        let y = (1.0 - 2.0 * px.y / height) * half * high;
         if self.orthographic {
             Ray { origin: self.eye() + (right * x + up * y) * self.distance, direction: -back }
         } else {
@@ -259,8 +315,9 @@ impl Camera {
         Sight { clip_from_grasp: self.clip_from_world(size).as_mat4(), size_px: size, layers, cut }
     }
 
-    /// The camera for the device, with the first [`MAX_PLANES`] planes that cut.
-    pub(super) fn uniform(&self, size: [u32; 2], cut: &[Plane]) -> ViewUniform {
+    /// The camera for the device, with the first [`MAX_PLANES`] planes that cut; `unit_px` pixels are one of a screen.
+    pub(super) fn uniform(&self, part: Part, cut: &[Plane], unit_px: f32) -> ViewUniform {
+        let size = part.of;
         let [_, up, back] = self.axes();
         let eye = if self.orthographic { back.extend(0.0) } else { self.eye().extend(1.0) };
         let at_one = if self.orthographic { 1.0 } else { self.distance };
@@ -271,14 +328,18 @@ impl Camera {
             [NEAR * self.distance, 0.0, 0.0, self.distance]
         };
         ViewUniform {
-            clip_from_world: self.clip_from_world(size).as_mat4().to_cols_array(),
+            clip_from_world: (part.clip_from_whole() * self.clip_from_world(size)).as_mat4().to_cols_array(),
             eye_in_world: eye.as_vec4().to_array(),
             up_in_world: up.extend(0.0).as_vec4().to_array(),
             key_in_world: self.key_light().extend(0.0).as_vec4().to_array(),
             depth: depth.map(|v| v as f32),
-            size_px: size.map(|s| s.max(1) as f32),
+            size_px: part.size.map(|s| s.max(1) as f32),
             px_per_m: (self.px_per_m(size) * at_one) as f32,
             plane_count: cut.len().min(MAX_PLANES) as u32,
+            unit_px: if unit_px.is_finite() { unit_px.max(0.01) } else { 1.0 },
+            unused_0: 0.0,
+            unused_1: 0.0,
+            unused_2: 0.0,
             planes: std::array::from_fn(|i| {
                 cut.get(i).map_or([0.0; 4], |plane| plane.normal.extend(plane.offset_m).as_vec4().to_array())
             }),
@@ -317,9 +378,10 @@ impl Projector {
     }
 }
 
-/// Width over height.
-fn aspect(size: [u32; 2]) -> f64 {
-    f64::from(size[0].max(1)) / f64::from(size[1].max(1))
+/// Width and height in units of the smaller one.
+fn spans(size: [u32; 2]) -> [f64; 2] {
+    let size = size.map(|s| f64::from(s.max(1)));
+    size.map(|s| s / size[0].min(size[1]))
 }
 
 /// The camera as the shaders see it; twin of the struct in `shaders/common/view.wgsl`.
@@ -334,6 +396,10 @@ pub(super) struct ViewUniform {
     pub(super) size_px: [f32; 2],
     pub(super) px_per_m: f32,
     pub(super) plane_count: u32,
+    pub(super) unit_px: f32,
+    pub(super) unused_0: f32,
+    pub(super) unused_1: f32,
+    pub(super) unused_2: f32,
     pub(super) planes: [[f32; 4]; MAX_PLANES],
 }
 

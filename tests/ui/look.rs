@@ -206,6 +206,27 @@ fn pictures_of_the_3d_views() {
     }
 }
 
+/// The 3D views as they open, for looking at.
+#[test]
+#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
+fn pictures_of_the_3d_views_as_they_open() {
+    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
+        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
+        rig.send(prefer(|s| s.hint_dismissed = true));
+        for pair in [30, 6, 17] {
+            rig.send(LibraryCommand::Select(PairId(pair)));
+            rig.send(PredictCommand::Generate);
+            for theme in [Theme::Dark, Theme::Light] {
+                rig.send(prefer(move |s| s.theme = theme));
+                for workspace in [Workspace::Inspect, Workspace::Align] {
+                    rig.send(prefer(move |s| s.workspace = workspace));
+                    rig.shoot(&format!("{name}-3d-{}-{pair}-{theme:?}", workspace.name()).to_lowercase());
+                }
+            }
+        }
+    }
+}
+
 /// Any two imprints against each other, for looking at.
 #[test]
 #[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]

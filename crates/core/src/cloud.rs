@@ -2,10 +2,13 @@
 //!
 //! The imprint is an argument of its own, so that a *predicted* imprint goes through the measured camera.
 
+mod membrane;
+
+pub use membrane::membrane;
+
 use glam::{DVec2, DVec3};
 
 use super::grid::{DepthMap, Mask};
-use super::mesh::TriMesh;
 use super::sample::DepthCamera;
 
 /// Why an imprint cannot be lifted.
@@ -73,8 +76,8 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
         let pixels = imprint.row(y).iter().zip(camera.depth_reference.row(y)).enumerate();
         let mask = mask.map(|mask| mask.row(y));
         for (x, (imprint, reference)) in pixels.filter(|(x, _)| mask.is_none_or(|mask| mask[*x])) {
-            if let Some(point) = lift_depth(*imprint, *reference, camera, x, y) {
-                lifted.points.push(point);
+            if let Some(depth) = usable_depth(*imprint, *reference) {
+                lifted.points.push(lift_depth(f64::from(depth), camera, x, y));
                 lifted.pixels.push([x as u16, y as u16]);
             } else {
                 lifted.invalid += 1;
@@ -86,17 +89,21 @@ pub fn lift(imprint: &DepthMap, camera: &DepthCamera, mask: Option<&Mask>) -> Re
 
 /// The point of one pixel, meters, grasp frame; `None` outside the images and where the depth is unusable.
 pub(crate) fn lift_pixel(imprint: &DepthMap, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
-    lift_depth(*imprint.get(x, y)?, *camera.depth_reference.get(x, y)?, camera, x, y)
+    let depth = usable_depth(*imprint.get(x, y)?, *camera.depth_reference.get(x, y)?)?;
+    Some(lift_depth(f64::from(depth), camera, x, y))
 }
 
+/// Depth along the optical axis, meters, of a pixel whose depth and reference can be right.
 #[inline]
-fn lift_depth(imprint: f32, reference: f32, camera: &DepthCamera, x: usize, y: usize) -> Option<DVec3> {
+fn usable_depth(imprint: f32, reference: f32) -> Option<f32> {
     let depth = reference - imprint;
-    if !(reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0) {
-        return None;
-    }
-    let in_camera = camera.lift(x as f64, y as f64, f64::from(depth));
-    Some(camera.grasp_from_camera.transform_point3(in_camera))
+    (reference.is_finite() && reference > 0.0 && depth.is_finite() && depth > 0.0).then_some(depth)
+}
+
+/// The point of a pixel at a depth along the optical axis, meters, grasp frame.
+#[inline]
+fn lift_depth(depth: f64, camera: &DepthCamera, x: usize, y: usize) -> DVec3 {
+    camera.grasp_from_camera.transform_point3(camera.lift(x as f64, y as f64, depth))
 }
 
 /// The pixel position (column, row; not rounded) that sees a point given in the grasp frame, meters.
@@ -126,33 +133,6 @@ pub(super) fn check(imprint: &DepthMap, camera: &DepthCamera) -> Result<(), Clou
 
 pub(super) fn same_size(what: &'static str, size: [usize; 2], imprint: &DepthMap) -> Result<(), CloudError> {
     if size == imprint.size() { Ok(()) } else { Err(CloudError::Size { what, size, imprint: imprint.size() }) }
-}
-
-/// Neighbors farther apart than this are no surface: the membrane jumps there, or a pixel flies, meters.
-const JUMP_M: f64 = 0.002_5;
-
-/// The surface through points of neighboring pixels (`pixels` in row order, one per point), cut where it jumps. Its
-/// vertices are the points, in their order.
-pub fn surface(points: &[DVec3], pixels: &[[u16; 2]]) -> TriMesh {
-    let vertex = |x: u16, y: u16| {
-        let index = pixels.binary_search_by_key(&(y, x), |p| (p[1], p[0])).ok()?;
-        points.get(index).filter(|p| p.is_finite()).map(|p| (index as u32, *p))
-    };
-    let mut triangles = Vec::new();
-    let mut add = |corners: [Option<(u32, DVec3)>; 3]| {
-        if let [Some(a), Some(b), Some(c)] = corners
-            && [a.1 - b.1, b.1 - c.1, c.1 - a.1].iter().all(|edge| edge.length_squared() <= JUMP_M * JUMP_M)
-        {
-            triangles.push([a.0, b.0, c.0]);
-        }
-    };
-    for &[x, y] in pixels {
-        let (Some(right), Some(below)) = (x.checked_add(1), y.checked_add(1)) else { continue };
-        let (a, b, c, d) = (vertex(x, y), vertex(right, y), vertex(x, below), vertex(right, below));
-        add([a, c, b]);
-        add([b, c, d]);
-    }
-    TriMesh { vertices: points.to_vec(), triangles }
 }
 
 #[cfg(test)]

@@ -12,6 +12,8 @@ pub mod fonts;
 pub mod influence;
 pub mod layers;
 pub mod ledger;
+pub mod space;
 pub mod statistics;
+pub mod still;
 pub mod subject;
 pub mod sweep;

@@ -33,7 +33,9 @@ use crate::app::settings::{SceneSides, prefer};
 use crate::app::state::{Lookup, State};
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
+use crate::gpu::scene::SceneData;
 use crate::gpu::view::{Camera, Preset};
+use crate::spatial;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::made_with;
 use crate::ui::parts::scene_view::{Grip, SceneOutput, SceneView};
@@ -275,7 +277,7 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
-    place_camera(cx, ui, memory, source, &output, scene.bounds());
+    place_camera(cx, ui, memory, source, &output, &scene);
     // A linked camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {
@@ -319,7 +321,7 @@ fn place_camera(
     memory: &mut Memory,
     source: ImprintSource,
     output: &SceneOutput,
-    bounds: Option<[DVec3; 2]>,
+    scene: &SceneData,
 ) {
     let pasted = pasted(ui, output);
     if let Some(camera) = pasted {
@@ -335,16 +337,18 @@ fn place_camera(
         _ => false,
     };
     let place = (output.fit && !aimed) || !memory.views[source as usize].placed;
-    if place && let Some(bounds) = bounds {
+    if place {
         let view = &mut memory.views[source as usize];
-        view.camera.fit(bounds, output.size);
-        view.placed = true;
+        view.camera.frame(&spatial::focus(scene), spatial::FILLED);
+        // Until the model stands where it belongs, what is shown is not yet what is to be looked at.
+        view.placed = !matches!(results::pose(cx.state, source), Lookup::Waiting | Lookup::Stale(_));
     }
     if (output.moved || place || aimed || pasted.is_some()) && cx.state.settings.cameras_linked {
         let camera = memory.views[source as usize].camera;
+        let placed = memory.views[source as usize].placed && memory.clouds[1 - source as usize].is_some();
         let other = &mut memory.views[1 - source as usize];
         other.camera = camera;
-        other.placed |= memory.clouds[1 - source as usize].is_some();
+        other.placed |= placed;
     }
 }
 

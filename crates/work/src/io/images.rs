@@ -177,6 +177,14 @@ pub fn write_rgb8(path: &Path, picture: &RgbGrid) -> Result<(), PictureError> {
     encode(path, &bytes, picture.size(), ExtendedColorType::Rgb8)
 }
 
+/// Writes 8-bit color with opacity, not multiplied.
+///
+/// # Errors
+/// [`PictureError`].
+pub fn write_rgba8(path: &Path, picture: &Grid<[u8; 4]>) -> Result<(), PictureError> {
+    encode(path, picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgba8)
+}
+
 /// A picture as the bytes of a PNG.
 ///
 /// # Errors

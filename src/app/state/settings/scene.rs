@@ -130,9 +130,10 @@ impl SceneLayer {
     pub fn preset(self) -> LayerLook {
         let look = LayerLook::default();
         match self {
-            Self::Membrane => LayerLook { size: LayerSize::Px(1.5), ..look },
-            Self::Surface => LayerLook { shown: false, opacity: 0.5, ..look },
-            Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.4), ..look },
+            Self::Membrane => LayerLook { shown: false, size: LayerSize::Px(1.5), ..look },
+            Self::Surface => LayerLook { opacity: 0.4, ..look },
+            Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.35), ..look },
+            Self::TrueCad => LayerLook { size: LayerSize::Px(1.2), ..look },
             Self::Dropped | Self::Added => LayerLook { size: LayerSize::Mm(0.6), ..look },
             _ => look,
         }

@@ -6,20 +6,19 @@ use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
 use super::{Memory, layers, other_side, rgb, steps};
-use crate::app::keys::{CloudKey, DatasetSeq, ImprintSource};
+use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
 use crate::app::{labels, results};
 use crate::gpu::edges::EdgeStyle;
-use crate::gpu::guides;
-use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
 use crate::gpu::view::Plane;
+use crate::spatial::items;
 use crate::ui::parts::cx::{Cx, side_color};
-use crate::ui::parts::theme::{self, CONTACT, GHOST, Palette};
-use touch2touch_core::cloud::surface;
+use crate::ui::parts::theme::{self, CONTACT, GHOST};
+use touch2touch_core::cloud::membrane;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::PerPad;
 use touch2touch_work::cloud::{Clouds, FingerCloud};
@@ -36,9 +35,9 @@ pub(super) struct SceneCloud {
     pub window: Option<[DVec3; 2]>,
 }
 
-/// The membranes of a cloud as surfaces, made only while they are shown.
+/// The membranes of a cloud as surfaces, made only while they are shown, and not again for another mask.
 pub(super) struct SceneSurface {
-    key: CloudKey,
+    key: PerPad<ImprintKey>,
     revision: u64,
     fingers: PerPad<Arc<TriMesh>>,
 }
@@ -55,22 +54,35 @@ pub(crate) struct SceneMesh {
 
 /// Points for the renderer, made again only for another cloud.
 pub(super) fn update_cloud(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: CloudKey, clouds: &Clouds) {
-    let surfaces = cx.state.settings.scene.layer(SceneLayer::Surface).shown;
-    let held = &mut memory.surfaces[source as usize];
-    if !surfaces {
-        *held = None;
-    } else if held.as_ref().is_none_or(|h| h.key != key) {
-        memory.revision += 1;
-        let fingers =
-            clouds.fingers.as_ref().map(|cloud| cloud.map(|cloud| Arc::new(surface(&cloud.points, &cloud.pixels))));
-        *held = Some(SceneSurface { key: key.clone(), revision: memory.revision, fingers });
-    }
+    update_surface(cx, memory, source, &key);
     let held = &mut memory.clouds[source as usize];
     if held.as_ref().is_some_and(|h| h.key == key) {
         return;
     }
     memory.revision += 1;
     *held = Some(SceneCloud { key, revision: memory.revision, fingers: parts(clouds), window: window(cx, clouds) });
+}
+
+/// The membranes as surfaces, made again only for other imprints.
+fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: &CloudKey) {
+    let held = &mut memory.surfaces[source as usize];
+    if !cx.state.settings.scene.layer(SceneLayer::Surface).shown {
+        *held = None;
+        return;
+    }
+    let key = key.parts.as_ref().map(|part| part.map(|(imprint, _)| imprint.clone()));
+    if held.as_ref().is_some_and(|held| held.key == key) {
+        return;
+    }
+    let mut fingers = PerPad::default();
+    for (pad, imprint) in key.entries() {
+        let camera = results::sample(cx.state).ready().and_then(|sample| sample.pad(pad)?.camera());
+        let imprint = results::imprint_of(cx.state, imprint.clone()).ready();
+        let made = imprint.zip(camera).and_then(|(imprint, camera)| membrane(imprint, camera).ok());
+        fingers[pad] = made.map(Arc::new);
+    }
+    memory.revision += 1;
+    *held = Some(SceneSurface { key, revision: memory.revision, fingers });
 }
 
 /// The points of each finger apart: membrane and contact.
@@ -122,11 +134,13 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
     match layer {
         // The membrane recedes, the contact stands out.
         SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
-        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.45),
+        SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.7),
         SceneLayer::Contact => CONTACT,
         SceneLayer::OtherContact => side_color(p, other_side(source)),
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
         SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => p.good,
+        // Lit from all sides it is darker than its color: before a light ground it begins paler.
+        SceneLayer::Cad if *p == theme::LIGHT => theme::mix(p.cad, Color32::WHITE, 0.5),
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
         SceneLayer::TrueCad => p.strong,
@@ -238,14 +252,8 @@ fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Sce
     let Some(held) = memory.surfaces[source as usize].as_ref().filter(|_| look.shown) else { return };
     let color = rgb(color(cx, source, SceneLayer::Surface));
     for (finger, mesh) in held.fingers.entries() {
-        scene.meshes.push(MeshItem {
-            name: format!("surface {}", cx.state.finger_name(finger)),
-            revision: held.revision,
-            mesh: mesh.clone(),
-            shading: Shading::Smooth,
-            values: Arc::default(),
-            style: MeshStyle { color, opacity: look.opacity, closed: false, ..MeshStyle::default() },
-        });
+        let finger = cx.state.finger_name(finger);
+        scene.meshes.push(items::membrane(&finger, (held.revision, mesh.clone()), color, look.opacity));
     }
 }
 
@@ -351,7 +359,10 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, sce
             mesh: mesh.mesh.clone(),
             shading: Shading::Smooth,
             values: Arc::default(),
-            style: layers::outline(world_from_mesh, color, look),
+            style: match layer {
+                SceneLayer::TrueCad => layers::dashed(world_from_mesh, color, look),
+                _ => layers::outline(world_from_mesh, color, look),
+            },
         };
         if layer == SceneLayer::Cad {
             // Where the points' own colors are looked at, the model lets them through.
@@ -371,37 +382,20 @@ fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, sce
 
 /// The edges of a shaded model of a color.
 pub(crate) fn model_edges(cx: &Cx<'_>, color: Color32) -> EdgeStyle {
-    EdgeStyle { color: rgb(theme::mix(color, cx.p.canvas, 0.7)), opacity: 0.9, width_px: 1.2, creases: true }
+    items::model_edges(rgb(color), rgb(cx.p.canvas))
 }
 
-/// Floor grid and axes.
+/// Floor, grid and axes.
 pub(crate) fn guides(cx: &Cx<'_>, scene: &mut SceneData) {
-    scene.lines.push(LinesItem {
-        name: "grid".into(),
-        revision: u64::from(*cx.p == theme::DARK),
-        segments: grid(cx.p).into(),
-        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.0, opacity: 1.0, overlay: false },
-    });
-    scene.lines.push(LinesItem {
-        name: "axes".into(),
-        revision: 1,
-        segments: guides::axes(axes_origin(), AXIS).into(),
-        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },
-    });
+    let (ground, ink) = (rgb(cx.p.canvas), rgb(cx.p.weak));
+    scene.floor = Some(items::floor(ground, ink));
+    scene.lines.extend(items::guides(ground, ink, u64::from(*cx.p == theme::DARK)));
 }
 
 /// Length of the drawn axes, meters.
-pub(super) const AXIS: f64 = 0.01;
+pub(super) const AXIS: f64 = items::AXIS_M;
 
-/// A corner of the floor grid: in the middle the axes would hide the contact.
+/// A corner of the floor grid.
 pub(super) fn axes_origin() -> DVec3 {
-    DVec3::new(-0.05, -0.05, FLOOR)
-}
-
-/// Height of the floor grid, meters along +z (down).
-const FLOOR: f64 = 0.045;
-
-fn grid(p: &Palette) -> Vec<Segment> {
-    let c = theme::mix(p.canvas, p.weak, 0.45);
-    guides::grid(DVec3::new(0.0, 0.0, FLOOR), [DVec3::X, DVec3::Y], 0.01, 5, [c.r(), c.g(), c.b()])
+    items::axes_origin()
 }

@@ -9,12 +9,12 @@ use super::{Memory, rgb};
 use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
 use crate::app::results;
-use crate::app::settings::{LayerLook, LayerSize};
+use crate::app::settings::LayerLook;
 use crate::app::workbench::Layer;
-use crate::gpu::edges::EdgeStyle;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
-use crate::gpu::mesh::{Look, MeshItem, MeshStyle};
+use crate::gpu::mesh::{MeshItem, MeshStyle};
 use crate::gpu::points::{CloudItem, PointColors, PointSize};
+use crate::spatial::items;
 use crate::ui::panes::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::parts::cx::Cx;
 use touch2touch_core::align::Observability;
@@ -157,11 +157,12 @@ pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item:
 
 /// The look of a model that another one is compared with: its outline alone.
 pub(crate) fn outline(world_from_mesh: DAffine3, color: Color32, look: LayerLook) -> MeshStyle {
-    let width_px = match look.size {
-        LayerSize::Px(px) | LayerSize::Mm(px) => px,
-    };
-    let edges = EdgeStyle { color: rgb(color), opacity: look.opacity, width_px, creases: true };
-    MeshStyle { world_from_mesh, color: rgb(color), look: Look::Outline, edges: Some(edges), ..MeshStyle::default() }
+    items::outline(world_from_mesh, rgb(color), look.opacity, look.size.value())
+}
+
+/// The look of the model at the true pose.
+pub(super) fn dashed(world_from_mesh: DAffine3, color: Color32, look: LayerLook) -> MeshStyle {
+    items::truth(world_from_mesh, rgb(color), look.opacity, look.size.value())
 }
 
 /// Observability of the registered pose of a side.

@@ -23,6 +23,8 @@ use touch2touch_core::units;
 
 /// Correspondences drawn at most: more hide each other.
 const MOST_LINES: usize = 300;
+/// Shorter ones are specks on the model, not lines, meters.
+const SHORTEST_M: f64 = 0.000_3;
 /// The residual of the last color, millimeters; larger ones have it too.
 const RESIDUAL_MM: f32 = 4.0;
 /// Opacity of a correspondence that weighs nothing, and what full weight adds to it.
@@ -57,7 +59,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         return;
     }
     let matches = inspection.counterparts.at(&inspection.points, &tool.model, step, MOST_LINES);
-    let segments = matches.list.iter().filter(|m| m.residual_m > 0.0).filter_map(|m| {
+    let segments = matches.list.iter().filter(|m| m.residual_m > SHORTEST_M).filter_map(|m| {
         let from = *inspection.points.get(m.point)?;
         let [r, g, b, _] = residual_color(cx.p, m.residual_m).to_array();
         let alpha = (255.0 * (OPACITY[0] + OPACITY[1] * m.weight)) as u8;

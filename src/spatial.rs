@@ -1,0 +1,31 @@
+//! The parts of a pair in 3D, as items for the renderer: membrane, contact points, CAD model, true pose, floor. The panes and the
+//! stills put their scenes together from the same ones, and look from the same place.
+//!
+//! It knows the job and the renderer, no window and no state. Without the feature `gui` there is no renderer, and a still
+//! says so.
+
+#[cfg(feature = "gui")]
+pub mod items;
+#[cfg(feature = "gui")]
+pub mod still;
+
+#[cfg(feature = "gui")]
+pub use focus::{FILLED, focus};
+
+#[cfg(feature = "gui")]
+mod focus;
+
+use touch2touch_work::error::TaskError;
+use touch2touch_work::space::DrawSpace;
+
+/// The renderer of stills, on the best graphics device that there is; a software one will do.
+///
+/// # Errors
+/// If there is no device, or the program was built without a renderer.
+pub fn stills() -> Result<Box<dyn DrawSpace>, TaskError> {
+    #[cfg(feature = "gui")]
+    return Ok(Box::new(still::Stills::new()?));
+    #[cfg(not(feature = "gui"))]
+    return Err(TaskError::new("3D picture", "this program was built without the 3D renderer")
+        .with_hint("Build it with the feature gui."));
+}

@@ -1,0 +1,241 @@
+//! Stills: a pair drawn off the screen, in parts where a texture cannot be as large as the picture.
+
+use std::sync::Arc;
+
+use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
+use crate::gpu::pipelines::Pipelines;
+use crate::gpu::points::PointSize;
+use crate::gpu::scene::{SceneData, SceneRenderer};
+use crate::gpu::target::{Picture, Target};
+use crate::gpu::view::{Camera, Part};
+use crate::gpu::{Gpu, GpuError};
+use crate::spatial::{FILLED, focus, items};
+use touch2touch_core::grid::Grid;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::space::{DrawSpace, Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
+
+/// The smaller side of a 3D pane on a screen, pixels: lines, dashes and points of a still are as wide in relation to it.
+const SCREEN_PX: f32 = 460.0;
+/// Samples of a still along each side of a pixel, on top of the device's own.
+const FINE: u32 = 2;
+/// Widest still that gets them; larger ones have pixels enough.
+const MOST_FINE_PX: u32 = 4096;
+/// Largest texture that is drawn at once, pixels along one side: a software device has a gigabyte of them to fill.
+const MOST_TEXTURE_PX: u32 = 4096;
+/// Diameter of a contact point, meters.
+const POINT_M: f32 = 0.000_4;
+/// Opacity of a membrane.
+const VEIL: f32 = 0.42;
+
+/// Colors of a still, sRGB 0..1.
+struct StillColors {
+    ground: [f32; 3],
+    ink: [f32; 3],
+    /// Ink that hardly differs from the ground: grid and floor.
+    weak: [f32; 3],
+    measured: [f32; 3],
+    predicted: [f32; 3],
+    contact: [f32; 3],
+    model: [f32; 3],
+}
+
+/// A color of 8 bits.
+const fn rgb(r: u8, g: u8, b: u8) -> [f32; 3] {
+    [r as f32 / 255.0, g as f32 / 255.0, b as f32 / 255.0]
+}
+
+impl StillColors {
+    fn of(ground: Ground) -> Self {
+        let contact = rgb(0xff, 0x4f, 0xb8);
+        match ground {
+            Ground::White | Ground::Transparent => Self {
+                ground: [1.0; 3],
+                ink: rgb(0x18, 0x1c, 0x22),
+                weak: rgb(0x8a, 0x92, 0x9c),
+                measured: rgb(0x3f, 0x9d, 0xd8),
+                predicted: rgb(0xe8, 0x85, 0x2e),
+                contact,
+                model: rgb(0xd2, 0xd6, 0xd6),
+            },
+            Ground::Black => Self {
+                ground: [0.0; 3],
+                ink: rgb(0xf2, 0xf4, 0xf6),
+                weak: rgb(0x6e, 0x76, 0x80),
+                measured: rgb(0x56, 0xb4, 0xe9),
+                predicted: rgb(0xf5, 0x93, 0x3d),
+                contact,
+                model: rgb(0xc4, 0xca, 0xc8),
+            },
+        }
+    }
+
+    fn side(&self, source: ImprintSource) -> [f32; 3] {
+        match source {
+            ImprintSource::Measured => self.measured,
+            ImprintSource::Predicted => self.predicted,
+        }
+    }
+}
+
+/// Everything that a still shows.
+fn scene(pair: &InSpace, ground: Ground) -> SceneData {
+    let colors = StillColors::of(ground);
+    let mut scene = SceneData {
+        background: colors.ground,
+        transparent: ground == Ground::Transparent,
+        eye_dome: true,
+        ..SceneData::default()
+    };
+    let both = pair.sides.len() > 1;
+    for side in &pair.sides {
+        let color = if both { colors.side(side.source) } else { colors.contact };
+        for (pad, points) in side.contact.entries() {
+            let name = format!("{} {}", pair.rig.pad_key(pad), side.source.key());
+            scene.clouds.push(items::contact(&name, (0, points.clone()), color, (PointSize::Meters(POINT_M), 1.0)));
+        }
+    }
+    // Two membranes of one finger would hide each other.
+    for side in pair.sides.iter().take(1) {
+        for (pad, mesh) in side.membranes.entries() {
+            let name = pair.rig.pad_key(pad);
+            scene.meshes.push(items::membrane(&name, (0, mesh.clone()), colors.side(side.source), VEIL));
+        }
+    }
+    models(pair, &colors, &mut scene);
+    let floor = items::floor(colors.ground, colors.weak);
+    scene.floor = Some(match ground {
+        Ground::Transparent => crate::gpu::floor::Floor { opacity: 0.0, ..floor },
+        _ => floor,
+    });
+    if ground != Ground::Transparent {
+        let [grid, _] = items::guides(colors.ground, colors.weak, 0);
+        scene.lines.push(grid);
+    }
+    scene
+}
+
+/// The model where the first side has it, as outlines where else it could be.
+fn models(pair: &InSpace, colors: &StillColors, scene: &mut SceneData) {
+    let Some(mesh) = &pair.model else { return };
+    let mut add = |name: &str, style: MeshStyle| {
+        scene.meshes.push(MeshItem {
+            name: name.into(),
+            revision: 0,
+            mesh: mesh.clone(),
+            shading: Shading::Smooth,
+            values: Arc::default(),
+            style,
+        });
+    };
+    for (i, SpaceSide { source, pose, .. }) in pair.sides.iter().enumerate() {
+        let Some(world_from_mesh) = pose.as_ref().map(|pose| pose.grasp_from_object.to_affine()) else { continue };
+        let name = format!("CAD {}", source.key());
+        match i {
+            0 => add(&name, MeshStyle {
+                color: colors.model,
+                look: Look::Solid,
+                edges: Some(items::model_edges(colors.model, colors.ink)),
+                ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
+            }),
+            _ => add(&name, items::outline(world_from_mesh, colors.side(*source), 1.0, 1.6)),
+        }
+    }
+    if let Some(truth) = pair.truth {
+        add("CAD true", items::truth(truth.to_affine(), colors.ink, 0.9, 1.2));
+    }
+}
+
+/// The renderer of stills: a device of its own.
+pub struct Stills {
+    gpu: Gpu,
+    pipelines: Arc<Pipelines>,
+}
+
+impl Stills {
+    /// Takes the best device that there is, without a window.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot draw.
+    pub fn new() -> Result<Self, TaskError> {
+        Self::try_new().map_err(|err| TaskError::new("3D picture", err.to_string()))
+    }
+
+    fn try_new() -> Result<Self, GpuError> {
+        let gpu = Gpu::headless()?.smooth();
+        let pipelines = Arc::new(Pipelines::new(&gpu)?);
+        Ok(Self { gpu, pipelines })
+    }
+
+    /// Draws a scene of any size: premultiplied, as the device has it.
+    ///
+    /// # Errors
+    /// If the device fails.
+    pub fn picture(&self, scene: &SceneData, camera: &Camera, size: [u32; 2]) -> Result<Picture, GpuError> {
+        let fine = if size[0].max(size[1]) <= MOST_FINE_PX { FINE } else { 1 };
+        let unit_px = fine as f32 * size[0].min(size[1]) as f32 / SCREEN_PX;
+        let scene = SceneData { unit_px, moving: false, ..scene.clone() };
+        let whole = size.map(|n| n * fine);
+        // What shades a pixel from around it must not end at the border of a part.
+        let margin = ((0.1 * f64::from(whole[0].min(whole[1]))).ceil() as u32).next_multiple_of(fine);
+        let texture = MOST_TEXTURE_PX.min(self.gpu.device.limits().max_texture_dimension_2d);
+        let inner = (texture.saturating_sub(2 * margin).max(256) / fine) * fine;
+        let mut renderer = SceneRenderer::new(&self.gpu, self.pipelines.clone())?;
+        let mut target = Target::new(&self.gpu, [1, 1])?;
+        let mut out = Picture { size, rgba: vec![0; size[0] as usize * size[1] as usize * 4] };
+        for top in (0..whole[1]).step_by(inner as usize) {
+            for left in (0..whole[0]).step_by(inner as usize) {
+                let at = [left, top].map(|n| n.saturating_sub(margin));
+                let end: [u32; 2] = std::array::from_fn(|i| ([left, top][i] + inner + margin).min(whole[i]));
+                let part = Part { of: whole, at, size: [end[0] - at[0], end[1] - at[1]] };
+                target.resize(&self.gpu, part.size)?;
+                renderer.render_part(&self.gpu, &scene, (camera, part), &target)?;
+                lay(&mut out, &target.read(&self.gpu)?, part, ([left, top], inner), fine);
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Takes the inner pixels of a part over, each the mean of `fine` x `fine`.
+fn lay(out: &mut Picture, drawn: &Picture, part: Part, (corner, inner): ([u32; 2], u32), fine: u32) {
+    let [width, height] = out.size;
+    let from = corner.map(|n| n / fine);
+    let to = [(corner[0] + inner).div_ceil(fine).min(width), (corner[1] + inner).div_ceil(fine).min(height)];
+    let row = drawn.size[0] as usize * 4;
+    for (x, y) in (from[1]..to[1]).flat_map(|y| (from[0]..to[0]).map(move |x| (x, y))) {
+        let [left, top] = [x * fine - part.at[0], y * fine - part.at[1]].map(|n| n as usize);
+        let mut sum = [0_u32; 4];
+        for (i, j) in (0..fine as usize).flat_map(|j| (0..fine as usize).map(move |i| (i, j))) {
+            let at = (top + j) * row + (left + i) * 4;
+            for (sum, byte) in sum.iter_mut().zip(&drawn.rgba[at..at + 4]) {
+                *sum += u32::from(*byte);
+            }
+        }
+        let count = fine * fine;
+        let at = (y as usize * width as usize + x as usize) * 4;
+        out.rgba[at..at + 4].copy_from_slice(&sum.map(|sum| ((sum + count / 2) / count) as u8));
+    }
+}
+
+impl DrawSpace for Stills {
+    fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
+        let scene = scene(pair, view.ground);
+        let (yaw, pitch) = (view.angles.yaw_deg.to_radians(), view.angles.pitch_deg.to_radians());
+        let mut camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
+        camera.frame(&focus(&scene), FILLED);
+        camera.yaw_rad += view.turned_deg.to_radians();
+        let drawn = self.picture(&scene, &camera, view.size_px);
+        let drawn = drawn.map_err(|err| TaskError::new("3D picture", err.to_string()))?;
+        let [width, height] = drawn.size.map(|n| n as usize);
+        let pixel = |at: &[u8]| {
+            let alpha = u32::from(at[3]).max(1);
+            let own = |v: u8| (u32::from(v) * 255 / alpha).min(255) as u8;
+            [own(at[0]), own(at[1]), own(at[2]), at[3]]
+        };
+        let pixels = drawn.rgba.chunks_exact(4).map(pixel).collect();
+        let pixels = Grid::from_vec(width, height, pixels)
+            .map_err(|err| TaskError::from_error("3D picture", &err))?;
+        Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(view.size_px) })
+    }
+}
