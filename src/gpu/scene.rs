@@ -348,9 +348,7 @@ impl SceneRenderer {
                 | Layer::VeilBeside
                 | Layer::VeilBefore
                 | Layer::TranslucentMesh
-                | Layer::XRayMesh => {
-                    self.meshes.get(name).map(|d| d.draw(pass))
-                }
+                | Layer::XRayMesh => self.meshes.get(name).map(|d| d.draw(pass)),
             };
         }
     }

@@ -29,12 +29,7 @@ pub fn mix(a: [f32; 3], b: [f32; 3], share: f32) -> [f32; 3] {
 }
 
 /// A membrane: see-through, its nearest layer alone, thin before the model.
-pub fn membrane(
-    finger: &str,
-    (revision, mesh): (u64, Arc<TriMesh>),
-    color: [f32; 3],
-    opacity: f32,
-) -> MeshItem {
+pub fn membrane(finger: &str, (revision, mesh): (u64, Arc<TriMesh>), color: [f32; 3], opacity: f32) -> MeshItem {
     MeshItem {
         name: format!("surface {finger}"),
         revision,
