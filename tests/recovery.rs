@@ -20,7 +20,7 @@ use touch2touch_work::labels::{
 };
 
 /// A folder of two pairs of pictures.
-fn pictures(root: &Path) -> Dataset {
+pub(crate) fn pictures(root: &Path) -> Dataset {
     std::fs::create_dir_all(root).unwrap();
     for name in ["a", "b"] {
         images::write_gray8(&root.join(format!("{name}_bubble.png")), &Grid::from_fn(32, 32, |x, y| (x * 4 + y) as u8))

@@ -1,11 +1,17 @@
 //! A control costs everyone who does not need it: each workspace shows few of them, and what they had is still there.
 
 use eframe::egui::accesskit::Role;
+use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
-use touch2touch::app::command::{LibraryCommand, PredictCommand};
+use strum::IntoEnumIterator as _;
+use touch2touch::app::command::{ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
+use touch2touch::app::export::{FigureRows, Output};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{Workspace, prefer};
+use touch2touch::app::settings::{MaskSource, MaskTool, SceneSides, Workspace, prefer};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::rig::lab;
+use touch2touch_work::io::images;
 
 use super::rig::Rig;
 
@@ -62,4 +68,100 @@ fn each_workspace_shows_few_controls() {
         }
     }
     assert!(crowded.is_empty(), "too many controls: {crowded:?}");
+}
+
+/// Pictures have no depth camera: the 3D pane leaves its room to them, and a data set with one has it back.
+#[test]
+fn a_pane_that_has_nothing_to_show_leaves_its_room() {
+    let folder = tempfile::tempdir().unwrap();
+    let pairs = folder.path().join("pairs");
+    crate::recovery::pictures(&pairs);
+    let Some(mut rig) = Rig::live(SIZE, Place::Path(pairs)) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    let wide = |rig: &Rig| rig.harness.state().places()[&Pane::Compare].width();
+    assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Scene));
+    let alone = wide(&rig);
+    let layout = rig.harness.state().state().settings.layouts.clone();
+    rig.send(LibraryCommand::Open(Place::Demo));
+    assert!(rig.harness.state().state().selection.panes.contains(&Pane::Scene));
+    assert!(wide(&rig) < 0.7 * alone, "{} of {alone}", wide(&rig));
+    assert_eq!(rig.harness.state().state().settings.layouts, layout, "what a person arranged is not touched");
+}
+
+/// A side with nothing to show leaves its room to the other, and the choice is kept for each workspace.
+#[test]
+fn the_3d_pane_has_measured_predicted_or_both() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    let views = |rig: &Rig| {
+        ["measured", "predicted"]
+            .map(|side| rig.harness.query_by_label(&format!("3D view, {side}")).map(|node| node.rect().width()))
+    };
+    let [Some(alone), None] = views(&rig) else { panic!("{:?}", views(&rig)) };
+    rig.send(PredictCommand::Generate);
+    let [Some(measured), Some(predicted)] = views(&rig) else { panic!("{:?}", views(&rig)) };
+    assert!(measured < 0.6 * alone && (measured - predicted).abs() < 2.0, "{alone} {measured} {predicted}");
+    rig.harness.get_by_label("3D: predicted").click();
+    rig.harness.step();
+    rig.settle();
+    assert!(matches!(views(&rig), [None, Some(_)]), "{:?}", views(&rig));
+    rig.send(prefer(|s| s.workspace = Workspace::Align));
+    assert!(matches!(views(&rig), [Some(_), Some(_)]), "{:?}", views(&rig));
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
+    rig.restart(SIZE);
+    assert_eq!(rig.harness.state().state().settings.scene_sides(), SceneSides::Predicted);
+}
+
+/// Nothing below the tools moves when one is chosen, a mask is changed or a proposal is shown.
+#[test]
+fn nothing_in_the_mask_pane_moves_under_the_pointer() {
+    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
+    let place = |rig: &Rig| ["Done and next", "Mask source", "Note"].map(|name| rig.harness.get_by_label(name).rect());
+    let before = place(&rig);
+    for tool in MaskTool::iter() {
+        rig.send(prefer(move |s| s.mask.tool = tool));
+        assert_eq!(place(&rig), before, "{tool:?}");
+    }
+    let (finger, source) = (lab::RIGHT, ImprintSource::Measured);
+    rig.send(LabelsCommand::BeginStroke { finger, source, at_px: [60.0, 40.0], erase: false });
+    rig.send(LabelsCommand::StrokeTo([100.0, 60.0]));
+    rig.send(LabelsCommand::EndStroke);
+    assert!(rig.harness.query_all_by_label_contains("angle ").next().is_some(), "the effect of the stroke is said");
+    assert_eq!(place(&rig), before, "after a stroke");
+    for source in [MaskSource::Threshold, MaskSource::TopPercent, MaskSource::Cad] {
+        rig.send(prefer(move |s| s.mask.choice.source = source));
+        rig.send(ViewCommand::Propose(true));
+        assert_eq!(place(&rig), before, "{source:?}");
+        rig.send(ViewCommand::Propose(false));
+    }
+}
+
+/// Pairs ticked in the list are the rows of the next figure.
+#[test]
+fn ticked_pairs_are_the_rows_of_a_figure() {
+    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    for pair in [PairId(4), PairId(1)] {
+        rig.send(LibraryCommand::Select(pair));
+        rig.harness.key_press_modifiers(Modifiers::CTRL, Key::T);
+        rig.harness.step();
+        rig.settle();
+    }
+    let state = rig.harness.state().state();
+    assert_eq!(state.export.form.rows, FigureRows::Ticked);
+    assert_eq!(state.library.ticked.iter().copied().collect::<Vec<_>>(), [PairId(1), PairId(4)]);
+    // The figure has two rows, and is the one that the verb draws of these pairs.
+    let file = rig.data.join("figure.png");
+    rig.send(ExportCommand::Write(Output::Figure, file.clone()));
+    let drawn = images::read_rgb(&file).unwrap();
+    rig.send(LibraryCommand::Tick(PairId(2)));
+    rig.send(ExportCommand::Write(Output::Figure, file.clone()));
+    let more = images::read_rgb(&file).unwrap();
+    assert!(more.height() > drawn.height() && more.width() == drawn.width(), "{:?} {:?}", drawn.size(), more.size());
+    rig.harness.get_by_label("Take all ticks away").click();
+    rig.harness.step();
+    rig.settle();
+    assert_eq!(rig.harness.state().state().export.form.rows, FigureRows::Selected);
 }

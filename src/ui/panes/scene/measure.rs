@@ -3,7 +3,7 @@
 use eframe::egui::{Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
 use glam::DVec3;
 
-use super::{Memory, nearest};
+use super::{Memory, distance_at, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::results;
@@ -102,14 +102,16 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
     let layer = results::layers(state, source).ready().and_then(|layers| layers.at(picked.finger, cloud, picked.pixel));
     let mm = |v: Option<f32>| v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::text_mm(f64::from(v)));
     let fit = layer.and_then(|(_, fit)| fit);
+    let off = cloud.at_pixel(x, y).and_then(|index| distance_at(cx, source, picked.finger, index, clouds));
     let lines = [
         ("Pixel", format!("{} ({x}, {y})", state.finger_name(picked.finger))),
         ("Depth", mm(depth)),
         ("Imprint", mm(imprint)),
+        ("From the CAD", off.map_or_else(|| cx.keys().fill("[[distances]]"), units::text_mm)),
         ("Residual", mm(fit.map(|f| f.residual_m))),
         ("Weight", fit.map_or("–".to_owned(), |f| format!("{:.2}", f.weight))),
     ];
-    let size = vec2(168.0, 122.0);
+    let size = vec2(168.0, 137.0);
     let place = Rect::from_min_size(rect.right_bottom() - size - vec2(36.0, 30.0), size);
     let builder = UiBuilder::new().max_rect(place).id_salt(("picked", source as usize));
     ui.scope_builder(builder, |ui| {
