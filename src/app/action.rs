@@ -220,7 +220,7 @@ macro_rules! actions {
             _ => does(prefer(|s| s.ghosts ^= true));
         Lens, Mask, "Lens", "Magnifies the imprint under the pointer eight times, or not", [shift(K::M)],
             state => does(ViewCommand::ShowLens(!state.selection.lens));
-        DoneAndNext, Mask, "Done and next", "Marks the pair as done and shows the next unfinished one", [ctrl(K::Enter)],
+        DoneAndNext, Mask, "Done and next", "Marks the pair as done, accepts the automatic masks on screen that nobody corrected, and shows the next unfinished one", [ctrl(K::Enter)],
             state => editable(state, LibraryCommand::DoneAndNext);
         Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)],
             state => editable(state, LabelsCommand::SetReview(Review::Flagged));
