@@ -1,11 +1,11 @@
 //! The room of the panel about the open data set: what it is, what the models are worth on it, and what would better that.
 
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::adapt::{self, AdaptCommand, AdaptPairs};
-use super::command::Command;
 use super::effect::{Access, Effect, Errand};
-use super::keys::{AboutKey, ImprintSource, Revision};
+use super::keys::{DatasetSeq, ImprintSource};
 use super::library::{self, LibraryCommand};
 use super::pane::Pane;
 use super::settings::{self, ColorRange, prefer};
@@ -81,8 +81,10 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
             library::step(state, LibraryCommand::ReadToolAs { tool, unit, replacing }, effects);
         }
         Cure::ReadAs { list } => {
-            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-            tasks::start(state, "Read the data otherwise", ReadOtherwise { source, list }, effects);
+            let Some((seq, source)) = state.library.open.as_ref().map(|open| (open.seq, open.source.clone())) else {
+                return;
+            };
+            tasks::start(state, TaskKind::ReadOtherwise.name(), ReadOtherwise { seq, source, list }, effects);
         }
         Cure::Fit { .. } => {
             stop_trying(state, effects);
@@ -147,18 +149,6 @@ pub(crate) fn fitted_in_use(state: &State) -> Option<&str> {
     now.is_fitted().then_some(now.name.as_str())
 }
 
-/// The key of the lines about the open data set.
-pub(crate) fn about_key(state: &State) -> Option<AboutKey> {
-    let open = state.library.open.as_ref()?;
-    let (pairs, revision) = (open.index().pairs.len(), Revision(state.document.last_revision));
-    Some(AboutKey { dataset: open.seq, pairs, revision, round: state.table.round })
-}
-
-/// The command that opens or closes the panel.
-pub(super) fn toggle(state: &State) -> Option<Command> {
-    state.library.open.as_ref().map(|_| AboutCommand::Show(!state.about.shown).into())
-}
-
 /// Tries the models on a sample.
 pub struct TryModels {
     source: Arc<dyn DataSource>,
@@ -203,27 +193,31 @@ impl Errand for Examine {
 
 /// Has the data set read otherwise than it is stored, and opens it again.
 pub struct ReadOtherwise {
+    seq: DatasetSeq,
     source: Arc<dyn DataSource>,
     list: String,
 }
 
 impl Errand for ReadOtherwise {
-    type End = (std::path::PathBuf, String);
+    /// The data set that it is of, the file that says so, and what it says.
+    type End = (DatasetSeq, PathBuf, String);
     const KIND: TaskKind = TaskKind::ReadOtherwise;
 
     fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
         let what = Self::KIND.name();
         let dataset = self.source.on_disk(what)?;
         let read_as = parse_list(&self.list).map_err(|why| TaskError::new(what, why))?;
-        Ok((doubts::read_otherwise(dataset, &read_as)?, self.list))
+        Ok((self.seq, doubts::read_otherwise(dataset, &read_as)?, self.list))
     }
 
-    fn ended((file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+    fn ended((seq, file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
         let text = match list.as_str() {
             "" => "The data are read as they are stored".to_owned(),
             list => format!("The data are read with {list}"),
         };
         state.log.saved(text, file.clone());
-        library::step(state, LibraryCommand::Reload, effects);
+        if state.library.is_open(*seq) {
+            library::step(state, LibraryCommand::Reload, effects);
+        }
     }
 }

@@ -21,7 +21,7 @@ use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool, Section};
 use super::state::{Absent, State};
-use super::{about, adapt, dial, export, labels, results, train};
+use super::{adapt, dial, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 

@@ -64,7 +64,7 @@ macro_rules! actions {
         Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
             state => opened(state, LibraryCommand::Reload);
         AboutData, File, "About this data", "Says what the open data set is, what the models are worth on it, and what would better that", [],
-            state => about::toggle(state);
+            state => opened(state, AboutCommand::Show(!state.about.shown));
         Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
         Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],
@@ -222,7 +222,7 @@ macro_rules! actions {
             _ => does(prefer(|s| s.ghosts ^= true));
         Lens, Mask, "Lens", "Magnifies the imprint under the pointer eight times, or not", [shift(K::M)],
             state => does(ViewCommand::ShowLens(!state.selection.lens));
-        DoneAndNext, Mask, "Done and next", "Marks the pair as done and shows the next unfinished one", [ctrl(K::Enter)],
+        DoneAndNext, Mask, "Done and next", "Marks the pair as done, accepts the automatic masks on screen that nobody corrected, and shows the next unfinished one", [ctrl(K::Enter)],
             state => editable(state, LibraryCommand::DoneAndNext);
         Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)],
             state => editable(state, LabelsCommand::SetReview(Review::Flagged));

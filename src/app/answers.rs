@@ -165,8 +165,9 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         state.table.round += 1;
     }
     if err.is_cancelled() && !task.outdated {
-        // Before anything was said nothing was done.
-        let kept = Some(task.progress.text).filter(|text| !text.is_empty());
+        // Before anything was said nothing was done; what was left then is left no more.
+        let far = task.progress.text.split(", about").next().unwrap_or_default();
+        let kept = Some(far.to_owned()).filter(|far| !far.is_empty());
         match task.kind {
             TaskKind::Train => state.train.stopped = kept,
             TaskKind::Fit if state.adapt.tune => state.adapt.stopped = kept,

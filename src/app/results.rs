@@ -49,7 +49,7 @@ pub(crate) mod tool;
 pub(crate) mod train_plan;
 pub(crate) mod versus;
 
-pub(crate) use about::want_about;
+pub(crate) use about::{about_key, want_about};
 pub use ambiguity::ambiguity;
 pub(crate) use ambiguity::want_ambiguity;
 pub use basin::basin;

@@ -36,7 +36,9 @@ fn said(doc: &Document) -> Said {
 fn stays(command: &Command) -> bool {
     match command {
         Command::Library(LibraryCommand::Open(_) | LibraryCommand::Reload) => false,
-        Command::Answer(Answer::Ended(_, end)) => !matches!(end.kind, TaskKind::Propose | TaskKind::Import),
+        Command::Answer(Answer::Ended(_, end)) => {
+            !matches!(end.kind, TaskKind::Propose | TaskKind::Import | TaskKind::ReadOtherwise)
+        }
         _ => true,
     }
 }

@@ -50,12 +50,13 @@ fn a_folder_of_ones_own_says_what_it_is_and_esc_puts_that_away() {
     rig.settle();
     assert_ne!(rig.harness.state().state().selection.pair, before);
     // A cure: the range of these imprints, and then there is nothing left to cure about it.
+    rig.send(prefer(|s| s.range.max_m = 0.05));
     let range = rig.harness.state().state().settings.range;
     rig.harness.get_by_label("Fit the range").click();
     rig.harness.step();
     rig.settle();
     let fitted = rig.harness.state().state().settings.range;
-    assert!(fitted != range && fitted.max_m > 0.001 && fitted.max_m < 0.05 && fitted.locked, "{fitted:?}");
+    assert!(fitted != range && fitted.max_m > 0.001 && fitted.max_m < 0.03 && fitted.locked, "{fitted:?}");
     // Every pair, on demand.
     assert!(rig.harness.state().state().about.examined.is_none());
     rig.harness.get_by_label("Examine 4 pairs").click();
@@ -100,7 +101,8 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     let found = state.adapt.result.clone().unwrap();
     let [before, after] = [&found.before, found.closed_form.as_ref().unwrap()].map(|scored| scored.psnr_db.unwrap());
     assert!(found.pairs == 36 && after > before + 5.0, "{before} {after}");
-    rig.harness.get_by_label("As it was trained");
+    // In the table and over the pictures of a touch that was left out.
+    assert_eq!(rig.harness.get_all_by_label("As it was trained").count(), 2);
     rig.harness.get_by_label("Fitted to the others");
     // Used at once: what is on screen is predicted anew.
     assert!(state.results.predictions.iter().next().is_none());

@@ -288,6 +288,7 @@ impl Rig {
 
     /// A studio with the shipped models on a place. `None` as for [`Rig::new`].
     pub(super) fn live(size: [f32; 2], place: Place) -> Option<Self> {
+        crate::support::gpu()?;
         Self::greeting(size, place, false)
     }
 

@@ -1,8 +1,7 @@
 //! The lines about the open data set, as far as they cost no more than a second.
 
-use super::super::about::about_key;
 use super::super::jobs::{Job, Lane};
-use super::super::keys::AboutKey;
+use super::super::keys::{AboutKey, Revision};
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
@@ -19,6 +18,13 @@ impl Computes for AboutKey {
             Ok(facts(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }))
         }))
     }
+}
+
+/// The key of the lines about the open data set.
+pub(crate) fn about_key(state: &State) -> Option<AboutKey> {
+    let open = state.library.open.as_ref()?;
+    let (pairs, revision) = (open.index().pairs.len(), Revision(state.document.last_revision));
+    Some(AboutKey { dataset: open.seq, pairs, revision, round: state.table.round })
 }
 
 /// Asks for them while the panel is looked at.

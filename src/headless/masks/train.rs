@@ -10,6 +10,7 @@ use super::super::args::{DatasetArgs, RegistrationParser, keyed, parse_minutes};
 use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
 use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::units::counted;
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::labels::Labels;
@@ -154,7 +155,7 @@ fn text(trained: &Trained) -> String {
         lines.push(row(before, after, &format!("mean of {}", trained.held_out.len())));
     }
     for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
-        lines.push(format!("{when} on {} grasps that were left out: {}", worth.grasps, worth.text()));
+        lines.push(format!("{when} on {} left out: {}", counted(worth.grasps, "grasp"), worth.text()));
     }
     lines.push(format!(
         "{} masks of {} pairs{}, {} steps, {:.0} s",

@@ -13,6 +13,7 @@ use crate::app::{recipe, results, train};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section};
 use crate::ui::parts::widget::curves;
+use touch2touch_core::units::counted;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::train::{MaskScore, MasksFrom, Trained};
@@ -107,13 +108,14 @@ fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
     match cx.state.look(key) {
         Lookup::Ready(plan) | Lookup::Stale(plan) => {
-            for line in plan.lines() {
+            let nothing = plan.nothing();
+            for line in nothing.as_ref().map_or_else(|| plan.lines(), |nothing| nothing.others.clone()) {
                 say(line, cx.p.text);
             }
             for warning in plan.warnings() {
                 say(warning, cx.p.caution);
             }
-            if let Some(nothing) = plan.nothing() {
+            if let Some(nothing) = nothing {
                 say(format!("Nothing to learn from yet: {}.", nothing.why), cx.p.caution);
                 say(nothing.hint, cx.p.caution);
                 if let Some(cure) = nothing.cure
@@ -184,7 +186,7 @@ fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
         say(format!("not used: {}: {}", remark.name, remark.why), cx.p.caution);
     }
     for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
-        say(format!("{when}: {}, on {} grasps", worth.text(), worth.grasps), cx.p.text);
+        say(format!("{when}: {} on {}", worth.text(), counted(worth.grasps, "grasp")), cx.p.text);
     }
     let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
     let mut select = None;

@@ -5,6 +5,7 @@ use eframe::egui::{self, Color32, Label, RichText, ScrollArea, Ui, vec2};
 
 use crate::app::about;
 use crate::app::command::AboutCommand;
+use crate::app::results;
 use crate::app::settings::prefer;
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
@@ -61,7 +62,7 @@ pub(crate) fn panel(cx: &mut Cx<'_>, ctx: &egui::Context) {
 
 /// The lines that cost next to nothing.
 fn facts<'a>(cx: &Cx<'a>) -> Lookup<'a, Vec<Fact>> {
-    match about::about_key(cx.state) {
+    match results::about_key(cx.state) {
         // What was said before a mask was painted is as good for a moment.
         Some(key) => {
             let of_it = cx.state.results.abouts.iter().filter(|(before, _)| before.dataset == key.dataset);

@@ -380,7 +380,7 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
             TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
-            TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>(("read-as.txt".into(), "swap-fingers".into())),
+            TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into())),
             TaskKind::Train => {
                 let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
                 Ended::of::<Train>((Arc::new(trained()), bundle))

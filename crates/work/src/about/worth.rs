@@ -139,8 +139,11 @@ impl Worth {
     fn of_masks(&self, masks: &MaskWorth) -> Fact {
         let text = format!("{} on {}", masks.text(), counted(masks.grasps, "grasp"));
         let fine = masks.iou >= TOLERABLE_IOU && masks.angle.mean_deg.is_some_and(|deg| deg <= TOLERABLE_DEG);
-        let fact = Fact::plain(Topic::MaskModel, text);
-        if fine { fact } else { fact.graded(Grade::Caution).with_cure(Cure::TrainFromCad { pairs: self.all }) }
+        if fine {
+            return Fact::plain(Topic::MaskModel, text);
+        }
+        // The button stands with the masks.
+        Fact::plain(Topic::MaskModel, format!("{text}; masks from CAD can train it")).graded(Grade::Caution)
     }
 }
 
@@ -155,18 +158,18 @@ mod tests {
     use touch2touch_core::metrics::AngleSummary;
 
     #[test]
-    fn a_bad_mask_model_is_offered_a_training_and_a_good_one_is_not() {
+    fn a_bad_mask_model_is_told_to_learn_and_a_good_one_is_not() {
         let of = |iou, errors: &[f64]| {
             let masks = MaskWorth { grasps: errors.len(), iou, angle: AngleSummary::from_errors(errors) };
             Worth { all: 40, masks: Some(masks), ..Worth::default() }.facts()
         };
         let bad = of(0.6, &[0.01, 0.3]);
         assert_eq!((bad.len(), bad[0].grade), (1, Grade::Caution));
-        assert_eq!(bad[0].cures, [Cure::TrainFromCad { pairs: 40 }]);
         assert!(bad[0].text.contains("IoU 0.60") && bad[0].text.contains("50 % within 5°"), "{}", bad[0].text);
-        assert!(of(0.9, &[0.01, 0.02])[0].cures.is_empty());
+        assert!(bad[0].text.ends_with("masks from CAD can train it"), "{}", bad[0].text);
+        assert_eq!(of(0.9, &[0.01, 0.02])[0].grade, Grade::Plain);
         let lost = of(0.9, &[f64::NAN]);
-        assert!(lost[0].text.contains("no pose found") && !lost[0].cures.is_empty(), "{}", lost[0].text);
+        assert!(lost[0].text.contains("no pose found") && lost[0].grade == Grade::Caution, "{}", lost[0].text);
         let untried = Worth { no_fit: Some("no pair can be used".into()), ..Worth::default() }.facts();
         assert!(untried[0].text.contains("no pair can be used") && untried[0].cures.is_empty());
         assert_eq!((duration(0.2), duration(61.0), duration(600.0)), ("1 s".into(), "61 s".into(), "10 min".into()));
