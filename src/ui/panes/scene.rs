@@ -40,6 +40,7 @@ use crate::ui::parts::widget::empty;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
+use touch2touch_work::space::ViewAngles;
 
 pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(crate) use layers::{DISTANCE_MAP, outline};
@@ -209,6 +210,9 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, pane: Pane
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
     place_camera(cx, ui, memory, source, &output, &scene);
+    let camera = memory.views[source as usize].camera;
+    cx.shared.angles[source as usize] =
+        ViewAngles { yaw_deg: camera.yaw_rad.to_degrees(), pitch_deg: camera.pitch_rad.to_degrees() };
     // A linked camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {

@@ -8,12 +8,15 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
+use crate::app::pane::Kind;
 use crate::app::export;
-use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES};
+use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES, StillAsked};
 use crate::app::keys::ImprintSource;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_work::figure::{FigurePane, FigureTheme};
+use touch2touch_work::space::Ground;
+use touch2touch_work::still::WIDTH_PX;
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
 pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
@@ -180,6 +183,30 @@ pub(crate) fn button(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
     response.accessible_name(format!("Export {}", pane.title())).on_hover_text("Save or copy what this pane shows");
 }
 
+/// Pictures of a 3D view, by ground and size, from where the view looks now.
+fn stills(cx: &mut Cx<'_>, ui: &mut Ui, side: ImprintSource) {
+    ui.label(caption("3D picture with scale bar, name and provenance", cx.p));
+    let angles = cx.shared.angles[side as usize];
+    for (ground, name, on) in [
+        (Ground::White, "white", "on white"),
+        (Ground::Black, "black", "on black"),
+        (Ground::Transparent, "no ground", "without ground"),
+    ] {
+        ui.horizontal(|ui| {
+            for (width_px, text) in [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")] {
+                let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
+                let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
+                let tip = format!("Save as PNG of {width_px} x {width_px} pixels {on}, in the direction of this view");
+                if button.on_hover_text(tip).clicked() {
+                    cx.push(ExportCommand::Place(Output::Still(StillAsked { side, width_px, ground, angles })));
+                    ui.close();
+                }
+            }
+            ui.label(caption(name, cx.p));
+        });
+    }
+}
+
 /// Menu of the files that a pane offers.
 pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
     ui.set_min_width(190.0);
@@ -200,6 +227,10 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
                 }
             }
         });
+        ui.separator();
+    }
+    if let Kind::Scene(side) = pane.kind() {
+        stills(cx, ui, side);
         ui.separator();
     }
     let sides: &[Action] = match pane.side() {

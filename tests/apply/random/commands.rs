@@ -18,7 +18,7 @@ use touch2touch::app::command::{
 use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
-use touch2touch::app::export::{FigureForm, Output};
+use touch2touch::app::export::{FigureForm, Output, StillAsked};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
@@ -60,6 +60,7 @@ use touch2touch_work::job::{PreviewPicture, Progress};
 use touch2touch_work::labels::Operation;
 use touch2touch_work::propose::Batch;
 use touch2touch_work::queue::QueueBy;
+use touch2touch_work::space::{Ground, ViewAngles};
 use touch2touch_work::subject::Subject;
 use touch2touch_work::sweep::{Dial, Setting};
 use touch2touch_work::tool::UnitSet;
@@ -289,11 +290,17 @@ fn mask_choice() -> impl Strategy<Value = ExportChoice> {
 
 fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
+    let still = (source(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>());
+    let still = still.prop_map(|(side, width_px, ground, [yaw_deg, pitch_deg])| {
+        let angles = ViewAngles { yaw_deg, pitch_deg };
+        StillAsked { side, width_px, ground, angles }
+    });
     prop_oneof![
         Just(Output::Figure),
         Just(Output::Case),
         Just(Output::Masks),
         source().prop_map(Output::Pair),
+        still.prop_map(Output::Still),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
 }
