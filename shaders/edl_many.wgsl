@@ -13,16 +13,21 @@ fn depth_at(at: vec2<i32>) -> f32 {
     return textureLoad(depths, at, 0).x;
 }
 
-fn all_behind(at: vec2<f32>, own: f32) -> f32 {
+@fragment
+fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+    let own = depth_at(vec2<i32>(at.xy));
+    if own <= 0.0 {
+        discard;
+    }
     var behind = 0.0;
     for (var i = 0; i < NEIGHBORS; i++) {
-        behind += meters_behind(own, depth_at(neighbor(at, i)));
+        behind += meters_behind(own, depth_at(neighbor(at.xy, i)));
     }
-    return behind;
+    return shade(behind);
 }
 
 @fragment
-fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
+fn fs_hollows(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
     let own = depth_at(vec2<i32>(at.xy));
     if own <= 0.0 {
         discard;
@@ -34,15 +39,5 @@ fn fs_main(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
             hollows += hollow(own, depth_at(inside(at.xy + way)), depth_at(inside(at.xy - way)), j);
         }
     }
-    return shade(all_behind(at.xy, own), hollows);
-}
-
-// While the view turns: the neighbors alone.
-@fragment
-fn fs_moving(@builtin(position) at: vec4<f32>) -> @location(0) vec4<f32> {
-    let own = depth_at(vec2<i32>(at.xy));
-    if own <= 0.0 {
-        discard;
-    }
-    return shade(all_behind(at.xy, own), 0.0);
+    return shade_hollows(hollows);
 }

@@ -4,7 +4,7 @@
 #import <common/light.wgsl>
 
 // The share of its opacity that a veil keeps before something solid.
-const VEIL_THIN: f32 = 0.2;
+const VEIL_THIN: f32 = 0.14;
 
 struct MeshUniform {
     world_from_mesh: mat4x4<f32>,
@@ -92,7 +92,7 @@ fn veil(in: Varying) -> vec4<f32> {
     normal = normal * select(-1.0, 1.0, dot(normal, to_eye) >= 0.0);
     let away = 1.0 - clamp(dot(normal, to_eye), 0.0, 1.0);
     let alpha = mix(mesh.color.a, min(mesh.color.a * 1.7, 1.0), away * away);
-    return vec4<f32>(lit(mesh.color.rgb, light_on(normal), 0.7 * gloss_on(normal, to_eye)), alpha);
+    return vec4<f32>(lit(mesh.color.rgb, 0.3 + 0.7 * light_on(normal), 0.7 * gloss_on(normal, to_eye)), alpha);
 }
 
 @fragment

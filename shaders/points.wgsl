@@ -103,7 +103,7 @@ fn fs_main(in: Varying) -> @location(0) vec4<f32> {
         let up = view.up_in_world.xyz;
         let depth = sqrt(max(1.0 - dot(in.corner, in.corner), 0.0));
         let normal = normalize(cross(up, in.to_eye) * in.corner.x + up * in.corner.y + in.to_eye * depth);
-        return vec4<f32>(lit(in.color.rgb, light_on(normal), gloss_on(normal, in.to_eye)), in.color.a);
+        return vec4<f32>(lit(in.color.rgb, 0.4 + 0.6 * light_on(normal), gloss_on(normal, in.to_eye)), in.color.a);
     }
     return in.color;
 }

@@ -7,6 +7,7 @@ mod influence;
 mod proposals;
 mod random;
 mod recipes;
+mod stills;
 mod verbs;
 mod verdicts;
 

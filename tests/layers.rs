@@ -22,6 +22,11 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
         &["egui::", "rfd", "crate::app", "crate::ui", "touch2touch_work", "crate::headless"],
         "the renderer knows domain types only",
     ),
+    (
+        "src/spatial",
+        &["egui::", "rfd", "crate::app", "crate::ui", "crate::headless"],
+        "what a pair shows in 3D knows the job and the renderer",
+    ),
     ("src/headless", &["eframe", "egui", "wgpu"], "verbs have no window"),
     ("src/ui", &["std::fs", "crate::headless"], "panes look up, format and draw"),
 ];

@@ -56,8 +56,13 @@ fn hollow(own: f32, one: f32, other: f32, j: i32) -> f32 {
     return clamp(0.5 * (a + b) / size, 0.0, 1.0) * near;
 }
 
-// Black, as opaque as the sum over all neighbors and hollows says; never quite, because a color must stay readable.
-fn shade(meters: f32, hollows: f32) -> vec4<f32> {
-    let light = exp(-meters / (f32(NEIGHBORS) * REACH * view.depth.w) - DARK * hollows / f32(HOLLOWS * LINES));
+// Black, as opaque as the sum over all neighbors says; never quite, because a color must stay readable.
+fn shade(meters: f32) -> vec4<f32> {
+    let light = exp(-meters / (f32(NEIGHBORS) * REACH * view.depth.w));
     return vec4<f32>(0.0, 0.0, 0.0, min(1.0 - light, 0.75));
+}
+
+// Black, as opaque as the sum over all hollows says.
+fn shade_hollows(hollows: f32) -> vec4<f32> {
+    return vec4<f32>(0.0, 0.0, 0.0, 1.0 - exp(-DARK * hollows / f32(HOLLOWS * LINES)));
 }

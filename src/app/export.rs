@@ -4,10 +4,12 @@ mod command;
 mod setup;
 
 pub use super::keys::ImportForm;
-pub use super::state::export::{FigureForm, FigureRows, Output};
+pub use super::state::export::{FigureForm, FigureRows, Output, StillAsked};
 pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 pub use command::{equivalent, equivalent_words};
-pub(crate) use setup::{CaseView, can_draw, case_setup, figure_recipes, figure_setup, in_figure, picture_setup};
+pub(crate) use setup::{
+    CaseView, can_draw, case_setup, figure_recipes, figure_setup, in_figure, picture_setup, space_recipe, still_setup,
+};
 pub use setup::{PairExport, case_lacks, pair_export};
 
 use std::path::PathBuf;
@@ -24,6 +26,7 @@ use super::state::tasks::TaskKind;
 use super::state::view::UiRequest;
 use super::tasks::{self, Write};
 use super::{library, predict, results, settings};
+use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
@@ -34,6 +37,9 @@ use touch2touch_work::figure::{FigureSetup, figure};
 use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::case_file;
 use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::PairLabels;
+use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
+use touch2touch_work::still::still;
 
 /// A command to what is taken away.
 #[derive(Clone, Debug)]
@@ -214,6 +220,18 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             });
             tasks::start(state, "Export the pair", write, effects);
         }
+        Output::Still(asked) => {
+            let Some((setup, open)) = still_setup(state, asked).zip(state.library.open.as_ref()) else { return };
+            let source = open.source.clone();
+            let write = Write::new(Lane::Models, "Still", ended(file, "png"), move |file, access, cx| {
+                let drawer = spatial::stills()?;
+                let dataset = source.on_disk("Still")?;
+                let done = still(dataset, &setup, access.services.models(), &*drawer, &file, cx)?;
+                let [width, height] = done.size_px;
+                Ok((format!("Saved {} ({width} x {height} pixels)", file.display()), file))
+            });
+            tasks::start(state, "Draw the still", write, effects);
+        }
         Output::Picture { pane, scale, error_m } => {
             let Some(setup) = picture_setup(state, pane, scale, error_m) else { return };
             let ending = if scale.is_some() { "png" } else { "svg" };
@@ -231,7 +249,7 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
     let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else {
         return state.log.error(&TaskError::new(title, "no data set is open"));
     };
-    let recipes = figure_recipes(state, &setup);
+    let (recipes, space) = (figure_recipes(state, &setup), space_recipe(state, &setup));
     let write = Write::new(Lane::Models, "Figure", file, move |file, access, cx| {
         let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
             let mut made = PerPad::default();
@@ -248,7 +266,17 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
             }
             Ok(made)
         };
-        let written = figure(source.on_disk("Figure")?, &setup, predict, cx)?.write(&file)?;
+        let dataset = source.on_disk("Figure")?;
+        let drawer = space.as_ref().map(|_| spatial::stills()).transpose()?;
+        let in_space = |pair: PairId, sample: &Sample, view: &SpaceView, cx: &JobCx| {
+            let lacks = || TaskError::new("Figure", "there is no 3D renderer");
+            let ((recipe, labels), by) = space.as_ref().zip(drawer.as_deref()).ok_or_else(lacks)?;
+            let none = PairLabels::default();
+            let labels = labels.iter().find(|(of, _)| *of == pair).map_or(&none, |(_, labels)| labels);
+            let input = SpaceInput { dataset, pair, recipe, labels, models: access.services.models() };
+            pictured(input, sample, view, by, cx)
+        };
+        let written = figure(dataset, &setup, predict, in_space, cx)?.write(&file)?;
         let [width, height] = written.size_px;
         Ok((format!("Saved {} ({width} x {height} pixels)", file.display()), file))
     });

@@ -139,7 +139,7 @@ impl State {
 
     /// True where a 3D view of a side is on screen.
     pub(super) fn shows_scene(&self, side: ImprintSource) -> bool {
-        self.needs(Demand::Scene) && self.settings.scene_sides().list().contains(&side)
+        self.needs(Demand::Scene) && self.settings.scene_sides().sides().contains(&side)
     }
 
     /// True where a pane on screen shows something of the selected pair.

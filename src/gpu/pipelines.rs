@@ -40,10 +40,10 @@ pub struct Pipelines {
     pub(super) lines: wgpu::RenderPipeline,
     /// Hidden by nothing.
     pub(super) lines_overlay: wgpu::RenderPipeline,
-    /// Darkens what lies behind its neighbors or in a hollow; reads the depth and so has none.
+    /// Darkens what lies behind its neighbors; reads the depth and so has none.
     pub(super) edl: wgpu::RenderPipeline,
-    /// The same while the camera moves, without the hollows.
-    pub(super) edl_moving: wgpu::RenderPipeline,
+    /// Darkens what lies in a hollow, the same way.
+    pub(super) hollows: wgpu::RenderPipeline,
 }
 
 /// Settings that differ between the pipelines.
@@ -208,7 +208,7 @@ impl Pipelines {
                     ..pulled
                 }),
                 edl: build(Variant { ..screen }),
-                edl_moving: build(Variant { label: "Edl::moving", fragment: "fs_moving", ..screen }),
+                hollows: build(Variant { label: "Edl::hollows", fragment: "fs_hollows", ..screen }),
                 floor_sampler: gpu.device.create_sampler(&wgpu::SamplerDescriptor {
                     label: Some("Floor::sampler"),
                     mag_filter: wgpu::FilterMode::Linear,

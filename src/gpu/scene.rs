@@ -293,29 +293,41 @@ impl SceneRenderer {
             };
             floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
         }
-        let over = shown.order.iter().position(|(layer, _)| *layer >= Layer::Outline);
-        let (within, over) = shown.order.split_at(over.unwrap_or(shown.order.len()));
-        let edl = self.depth.as_ref().filter(|_| shown.eye_dome).map(|(_, depth)| depth);
-        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
-        match edl {
-            None => self.draw_layers(&mut target.begin(&mut encoder, whole), &shown.order),
-            Some(depth) => {
-                self.draw_layers(&mut target.begin(&mut encoder, Pass { last: false, ..whole }), within);
-                {
-                    let on = Pass { clear: None, with_depth: false, last: over.is_empty() };
-                    let mut pass = target.begin(&mut encoder, on);
-                    pass.set_pipeline(if shown.moving { &self.pipelines.edl_moving } else { &self.pipelines.edl });
-                    pass.set_bind_group(0, &self.view_bindings, &[]);
-                    pass.set_bind_group(1, depth, &[]);
-                    pass.draw(0..6, 0..1);
-                }
-                if !over.is_empty() {
-                    self.draw_layers(&mut target.begin(&mut encoder, Pass { clear: None, ..whole }), over);
-                }
-            }
-        }
+        self.draw_shaded(&mut encoder, shown, target);
         gpu.queue.submit([encoder.finish()]);
         self.counters.renders += 1;
+    }
+
+    /// Draws everything in passes, with the shading by depth between them: hollows in the meshes, which points would fill
+    /// with copies of themselves, then what lies behind its neighbors.
+    fn draw_shaded(&self, encoder: &mut wgpu::CommandEncoder, shown: &Shown, target: &Target) {
+        let whole = Pass { clear: Some(shown.background), with_depth: true, last: true };
+        let Some(depth) = self.depth.as_ref().filter(|_| shown.eye_dome).map(|(_, depth)| depth) else {
+            return self.draw_layers(&mut target.begin(encoder, whole), &shown.order);
+        };
+        let until = |layer: Layer| shown.order.partition_point(|(of, _)| *of < layer);
+        let [points, over] = [until(Layer::Points), until(Layer::Outline)];
+        let (meshes, rest) = shown.order.split_at(points);
+        let (points, over) = rest.split_at(over - points);
+        self.draw_layers(&mut target.begin(encoder, Pass { last: false, ..whole }), meshes);
+        let shade = |encoder: &mut wgpu::CommandEncoder, pipeline, last| {
+            let mut pass = target.begin(encoder, Pass { clear: None, with_depth: false, last });
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &self.view_bindings, &[]);
+            pass.set_bind_group(1, depth, &[]);
+            pass.draw(0..6, 0..1);
+        };
+        // What moves is drawn without: nobody sees it.
+        if !shown.moving && meshes.iter().any(|(layer, _)| *layer == Layer::OpaqueMesh) {
+            shade(encoder, &self.pipelines.hollows, false);
+        }
+        if !points.is_empty() {
+            self.draw_layers(&mut target.begin(encoder, Pass { clear: None, last: false, ..whole }), points);
+        }
+        shade(encoder, &self.pipelines.edl, over.is_empty());
+        if !over.is_empty() {
+            self.draw_layers(&mut target.begin(encoder, Pass { clear: None, ..whole }), over);
+        }
     }
 
     fn draw_layers(&self, pass: &mut wgpu::RenderPass<'_>, order: &[(Layer, String)]) {

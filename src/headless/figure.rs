@@ -7,13 +7,20 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use super::args::{DatasetArgs, FingerArg, keyed};
+use super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
+use super::contact_mask::{MaskArgs, labels_of};
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
+use crate::spatial;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::sample::Sample;
+use touch2touch_work::error::TaskError;
 use touch2touch_work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
-use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::job::JobCx;
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
 
 /// Arguments of `figure`.
 #[derive(Debug, Args)]
@@ -23,7 +30,7 @@ pub(super) struct FigureArgs {
     /// The pairs, top to bottom: names, or parts of names that no other pair has, with commas between them.
     #[arg(long, value_name = "A,B", value_delimiter = ',', required = true)]
     pairs: Vec<String>,
-    /// The columns, left to right, with commas between them.
+    /// The columns, left to right, with commas between them; those that begin with `3d:` need a graphics device.
     #[arg(long, value_name = "A,B", value_delimiter = ',', value_parser = parse_pane(), default_value = "gelslim,measured,predicted,error")]
     panes: Vec<FigurePane>,
     /// The finger, or `both` for a row of each.
@@ -50,6 +57,11 @@ pub(super) struct FigureArgs {
     /// Leave out what the GelSlim sees of an imprint, the dashed rectangle.
     #[arg(long)]
     no_window: bool,
+    /// The registration of poses in 3D.
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
+    registration: RegistrationChoice,
+    #[command(flatten)]
+    mask: MaskArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -107,13 +119,25 @@ pub(super) fn run(args: &FigureArgs) -> VerbResult {
     };
     let predicted = setup.look.panes.iter().any(|pane| pane.is_predicted());
     let imprint = if predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
-    let recipe = args.model.recipe(imprint, &dataset.rig)?;
+    let in_space = setup.look.panes.iter().any(|pane| pane.space().is_some());
+    let recipe = match in_space {
+        true => args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?,
+        false => args.model.recipe(imprint, &dataset.rig)?,
+    };
+    let drawer = in_space.then(spatial::stills).transpose()?;
+    let all_labels = Labels::of(&dataset);
     if let Some((bundle, config)) = &recipe.generator {
         setup.shift = recipe.shift;
         setup.note = note(&bundle.name, config, setup.shift);
     }
+    let space = |pair: PairId, sample: &Sample, view: &SpaceView, cx: &JobCx| {
+        let labels = labels_of(&all_labels, &dataset.index.pairs[pair.0 as usize].name, &output);
+        let input = SpaceInput { dataset: &dataset, pair, recipe: &recipe, labels: &labels, models: &models };
+        let by = drawer.as_deref().ok_or_else(|| TaskError::new("Figure", "there is no 3D renderer"))?;
+        pictured(input, sample, view, by, cx)
+    };
     let drawn =
-        figure(&dataset, &setup, |_, sample, cx| recipe.generating()?.pair(&models, sample, cx), &output.job())?;
+        figure(&dataset, &setup, |_, sample, cx| recipe.generating()?.pair(&models, sample, cx), space, &output.job())?;
     let report = Report { file: &args.out, figure: drawn.write(&args.out)?, note: &setup.note };
     output.finish(&report, || {
         let [width, height] = report.figure.size_px;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{chain, compared, files, labels, posed, tables, watched};
-use super::{exchange, influence, proposals, recipes};
+use super::{exchange, influence, proposals, recipes, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -58,6 +58,7 @@ fn held(verb: &str) -> Option<Held> {
             files::a_random_recipe_draws_the_same_pictures_by_button_and_verb,
             super::figures_and_pictures_are_the_same_files_in_both,
         ]),
+        "still" => By(&[stills::pictures_in_3d_are_the_same_files_in_both]),
         "export" => By(&[
             files::a_random_recipe_exports_the_same_files_by_button_and_verb,
             super::a_pair_in_files_is_the_same_in_both,

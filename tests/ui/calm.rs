@@ -8,7 +8,7 @@ use touch2touch::app::command::{ExportCommand, LabelsCommand, LibraryCommand, Pa
 use touch2touch::app::export::{FigureRows, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{MaskSource, MaskTool, SceneSides, Workspace, prefer};
+use touch2touch::app::settings::{MaskSource, MaskTool, SpacePane, Workspace, prefer};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::images;
@@ -109,7 +109,7 @@ fn the_3d_pane_has_measured_predicted_or_both() {
     assert!(matches!(views(&rig), [Some(_), Some(_)]), "{:?}", views(&rig));
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.restart(SIZE);
-    assert_eq!(rig.harness.state().state().settings.scene_sides(), SceneSides::Predicted);
+    assert_eq!(rig.harness.state().state().settings.scene_sides(), SpacePane::Predicted);
 }
 
 /// Nothing below the tools moves when one is chosen, a mask is changed or a proposal is shown.

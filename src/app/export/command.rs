@@ -188,7 +188,7 @@ fn placed(state: &State, subject: &Subject) -> Subject {
 }
 
 /// The recipe of what is shown of an imprint: by the prediction on screen, or the one that would be made.
-fn recipe_shown(state: &State, imprint: ImprintSource) -> Recipe {
+pub(super) fn recipe_shown(state: &State, imprint: ImprintSource) -> Recipe {
     let finger = state.selection.finger;
     let shown = results::chosen(state, finger).cloned().or_else(|| recipe::prediction(state, state.touch_key(finger)?));
     let shown = shown.and_then(|key| Some((state.library.bundle(&key.bundle)?.clone(), key)));

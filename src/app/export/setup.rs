@@ -9,9 +9,10 @@ use strum::IntoEnumIterator as _;
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
 use super::super::pane::{Kind, Pane};
 use super::super::state::State;
-use super::super::state::export::FigureRows;
+use super::super::state::export::{FigureRows, StillAsked};
 use super::super::state::settings::{GelView, Settings};
 use super::super::{recipe, results};
+use super::command::recipe_shown;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -21,10 +22,12 @@ use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::figure::{FigurePane, FigureSetup, FigureTheme, note};
+use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{ModelName, Recipe};
+use touch2touch_work::still::StillSetup;
 use touch2touch_work::tool::NamedTool;
 
 /// The view of the studio on a case.
@@ -156,6 +159,32 @@ fn with_note(state: &State, setup: FigureSetup) -> FigureSetup {
         several => format!("{} and {} other ways", several[0], several.len() - 1),
     };
     FigureSetup { note, ..setup }
+}
+
+/// A picture of the selected pair in 3D, by the recipe of what is shown.
+pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup> {
+    Some(StillSetup {
+        pair: state.selection.pair?,
+        pane: asked.pane,
+        recipe: recipe_shown(state, *asked.pane.sides().last()?),
+        labels: state.document.pair(state.pair_name()).cloned().unwrap_or_default(),
+        ground: asked.ground,
+        angles: asked.angles,
+        width_px: asked.width_px,
+        turntable: None,
+    })
+}
+
+/// Recipe and labels of the pairs that a figure shows in 3D; `None` where it has no such column.
+pub(crate) fn space_recipe(state: &State, setup: &FigureSetup) -> Option<(Recipe, Vec<(PairId, PairLabels)>)> {
+    let predicted = setup.look.panes.iter().filter(|pane| pane.space().is_some()).any(|pane| pane.is_predicted());
+    setup.look.panes.iter().find(|pane| pane.space().is_some())?;
+    let side = if predicted { ImprintSource::Predicted } else { ImprintSource::Measured };
+    let labels = setup.pairs.iter().filter_map(|pair| {
+        let name = &state.library.entry(*pair)?.name;
+        Some((*pair, state.document.pair(name).cloned().unwrap_or_default()))
+    });
+    Some((recipe_shown(state, side), labels.collect()))
 }
 
 /// The predictions that a figure shows: the one shown for a touch, else what the settings would make of it.

@@ -5,6 +5,7 @@ use super::super::pane::Pane;
 use touch2touch_work::export::ExportChoice;
 use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
 use touch2touch_work::io::case_file;
+use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
 
 /// Pairs of the list that a figure may take.
 pub(crate) const MOST_PAIRS: usize = 50;
@@ -87,6 +88,19 @@ pub struct ExportState {
     pub predict: bool,
 }
 
+/// A picture of the selected pair in 3D, as a person asks for it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StillAsked {
+    /// The imprints.
+    pub pane: SpacePane,
+    /// Width and height, pixels.
+    pub width_px: u32,
+    /// The ground.
+    pub ground: Ground,
+    /// Direction of the view.
+    pub angles: ViewAngles,
+}
+
 /// Something to be written once the place is chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Output {
@@ -101,6 +115,8 @@ pub enum Output {
         /// Half the range of the colors of errors, meters.
         error_m: f32,
     },
+    /// The selected pair in 3D.
+    Still(StillAsked),
     /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
     Pair(ImprintSource),
     /// The selected pair with everything that its results depend on.
@@ -113,6 +129,7 @@ impl Output {
     /// The request, as the title of a dialog.
     pub fn title(self) -> &'static str {
         match self {
+            Self::Still(_) => "Save the 3D picture (.png)",
             Self::Figure => "Save the figure (.png or .svg)",
             Self::Case => "Save the case (.t2tcase)",
             Self::Masks => "Export masks to a folder",
@@ -126,6 +143,7 @@ impl Output {
     pub fn file_name(self) -> Option<String> {
         match self {
             Self::Figure => Some("figure.png".into()),
+            Self::Still(asked) => Some(format!("3d-{}.png", asked.pane.name().to_lowercase())),
             Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
             Self::Case => Some(format!("case.{}", case_file::ENDING)),
             Self::Pair(_) | Self::Masks => None,

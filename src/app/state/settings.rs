@@ -12,7 +12,7 @@ use super::super::action::{Action, Bindings};
 use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
-use scene::{SceneLook, SceneSides};
+use scene::SceneLook;
 use touch2touch_core::colormap;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
@@ -25,6 +25,7 @@ use touch2touch_work::labels::system_person;
 pub use touch2touch_work::mask::{MaskChoice, MaskSource};
 pub use touch2touch_work::propose::ProposalSource;
 use touch2touch_work::repeats;
+pub use touch2touch_work::space::SpacePane;
 use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
@@ -80,7 +81,7 @@ pub struct Settings {
     /// The look of the 3D views.
     pub scene: SceneLook,
     /// The sides that have a 3D view, where a person chose them for a workspace.
-    pub sides: std::collections::BTreeMap<Workspace, SceneSides>,
+    pub sides: std::collections::BTreeMap<Workspace, SpacePane>,
     /// The GelSlim image that is shown.
     pub gel: GelView,
     /// The comparison of each workspace.
@@ -228,10 +229,10 @@ impl Settings {
 
     /// The sides that have a 3D view in the workspace in front: where masks are drawn and where scores are read there is
     /// room for one.
-    pub fn scene_sides(&self) -> SceneSides {
+    pub fn scene_sides(&self) -> SpacePane {
         self.sides.get(&self.workspace).copied().unwrap_or(match self.workspace {
-            Workspace::Label | Workspace::Evaluate => SceneSides::Measured,
-            Workspace::Inspect | Workspace::Align | Workspace::Adapt => SceneSides::Both,
+            Workspace::Label | Workspace::Evaluate => SpacePane::Measured,
+            Workspace::Inspect | Workspace::Align | Workspace::Adapt => SpacePane::Both,
         })
     }
 

@@ -29,7 +29,7 @@ use crate::app::action::Action;
 use crate::app::command::{CameraPreset, Command, Hover, Pane, ViewCommand};
 use crate::app::keys::{DatasetSeq, ImprintSource};
 use crate::app::results;
-use crate::app::settings::{SceneSides, prefer};
+use crate::app::settings::{SpacePane, prefer};
 use crate::app::state::{Lookup, State};
 use crate::app::workbench::WorkbenchCommand;
 use crate::gpu::pick::nearest_point;
@@ -44,6 +44,7 @@ use crate::ui::parts::widget::empty;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
 use touch2touch_work::cloud::Clouds;
+use touch2touch_work::space::ViewAngles;
 
 pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(crate) use layers::{DISTANCE_MAP, outline};
@@ -193,7 +194,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 
 /// The sides that are chosen, without those that have nothing to show beside one that has.
 fn sides_shown(state: &State) -> Vec<ImprintSource> {
-    let chosen = state.settings.scene_sides().list();
+    let chosen = state.settings.scene_sides().sides();
     let there = |side: &&ImprintSource| !matches!(results::cloud(state, **side), Lookup::Absent(_));
     let shown: Vec<ImprintSource> = chosen.iter().filter(there).copied().collect();
     if shown.is_empty() { chosen.first().copied().into_iter().collect() } else { shown }
@@ -216,7 +217,7 @@ fn beside(area: Rect, count: usize) -> Vec<Rect> {
 fn choose_sides(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.spacing_mut().item_spacing.x = 2.0;
     let now = cx.state.settings.scene_sides();
-    for sides in SceneSides::iter() {
+    for sides in SpacePane::iter() {
         let button =
             Button::selectable(now == sides, RichText::new(sides.name()).size(SMALL)).min_size(vec2(0.0, 18.0));
         let tip =
@@ -278,6 +279,9 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
     }
     let mut scene = build::scene_of(cx, memory, source, seconds);
     place_camera(cx, ui, memory, source, &output, &scene);
+    let camera = memory.views[source as usize].camera;
+    cx.shared.angles[source as usize] =
+        ViewAngles { yaw_deg: camera.yaw_rad.to_degrees(), pitch_deg: camera.pitch_rad.to_degrees() };
     // A linked camera may be drawn before the one that leads it: it moves in the next frame.
     let pass = ui.ctx().cumulative_pass_nr();
     if output.moved {

@@ -18,6 +18,7 @@ use crate::app::state::State;
 use crate::app::state::tasks::{Task, Ticket};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
+use touch2touch_work::space::ViewAngles;
 
 /// Context of a pane while it is drawn.
 pub(crate) struct Cx<'a> {
@@ -147,6 +148,8 @@ pub(crate) struct Shared {
     pub textures: Textures,
     /// Dialogs.
     pub dialogs: Dialogs,
+    /// Directions in which the 3D views look, by side.
+    pub angles: [ViewAngles; 2],
     /// The number under the pointer, for the status bar and the clipboard.
     pub readout: Option<String>,
     /// True where a pane has the pixel under the pointer in this frame.
@@ -164,6 +167,7 @@ impl Shared {
             views: Views::default(),
             textures: Textures::default(),
             dialogs: Dialogs::new(native_dialogs),
+            angles: [ViewAngles::default(); 2],
             readout: None,
             hover_claimed: false,
             saved: Saved::default(),

@@ -9,11 +9,14 @@ use strum::IntoEnumIterator as _;
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
 use crate::app::export;
-use crate::app::export::{FigureForm, FigureRows, MOST_PAIRS, Output, SCALES};
+use crate::app::export::{FigureForm, FigureRows, MOST_PAIRS, Output, SCALES, StillAsked};
 use crate::app::keys::ImprintSource;
+use crate::app::pane::Kind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
 use touch2touch_work::figure::{FigurePane, FigureTheme};
+use touch2touch_work::space::Ground;
+use touch2touch_work::still::WIDTH_PX;
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
 pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
@@ -183,6 +186,31 @@ fn preview(cx: &Cx<'_>, ui: &mut Ui, [columns, rows]: [usize; 2], size: [u32; 2]
     }
 }
 
+/// Pictures of a 3D view, by ground and size, from where the view looks now.
+fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let pane = cx.state.settings.scene_sides();
+    ui.label(caption("3D picture with scale bar, name and provenance", cx.p));
+    let angles = cx.shared.angles[cx.state.workbench.side as usize];
+    for (ground, name, on) in [
+        (Ground::White, "white", "on white"),
+        (Ground::Black, "black", "on black"),
+        (Ground::Transparent, "no ground", "without ground"),
+    ] {
+        ui.horizontal(|ui| {
+            for (width_px, text) in [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")] {
+                let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
+                let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
+                let tip = format!("Save as PNG of {width_px} x {width_px} pixels {on}, in the direction of this view");
+                if button.on_hover_text(tip).clicked() {
+                    cx.push(ExportCommand::Place(Output::Still(StillAsked { pane, width_px, ground, angles })));
+                    ui.close();
+                }
+            }
+            ui.label(caption(name, cx.p));
+        });
+    }
+}
+
 /// Menu of the files that a pane offers.
 pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
     if export::in_figure(cx.state, pane).is_some() {
@@ -202,6 +230,10 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
                 }
             }
         });
+        ui.separator();
+    }
+    if pane.kind() == Kind::Scene {
+        stills(cx, ui);
         ui.separator();
     }
     let sides: &[Action] = match pane.side() {

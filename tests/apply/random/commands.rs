@@ -19,7 +19,7 @@ use touch2touch::app::command::{
 use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
-use touch2touch::app::export::{FigureForm, FigureRows, Output};
+use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
@@ -32,7 +32,7 @@ use touch2touch::app::services::{Followed, Services as _};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     Change, ColorMap, ColorRange, GelView, GenerateSettings, Last, LayerLook, LayerSize, MaskChoice, MaskSettings,
-    MaskSource, MaskTool, SceneLayer, SceneLook, SceneSides, Settings, Theme, Versus, VersusMode, Workspace,
+    MaskSource, MaskTool, SceneLayer, SceneLook, Settings, SpacePane, Theme, Versus, VersusMode, Workspace,
 };
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
@@ -62,6 +62,7 @@ use touch2touch_work::job::{PreviewPicture, Progress};
 use touch2touch_work::labels::Operation;
 use touch2touch_work::propose::Batch;
 use touch2touch_work::queue::QueueBy;
+use touch2touch_work::space::{Ground, ViewAngles};
 use touch2touch_work::subject::Subject;
 use touch2touch_work::sweep::{Dial, Setting};
 use touch2touch_work::tool::UnitSet;
@@ -249,7 +250,7 @@ fn change() -> impl Strategy<Value = Change> {
         1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
         1 => any::<u32>().prop_map(|v| prefer(move |s| s.cache_mib = v)),
         1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
-        1 => any_of::<SceneSides>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
+        1 => any_of::<SpacePane>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
         1 => any_of::<GelView>().prop_map(|gel| prefer(move |s| s.gel = gel)),
         1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
         1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
@@ -311,11 +312,17 @@ fn mask_choice() -> impl Strategy<Value = ExportChoice> {
 
 fn output() -> impl Strategy<Value = Output> {
     let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
+    let still = (any_of::<SpacePane>(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>());
+    let still = still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg])| {
+        let angles = ViewAngles { yaw_deg, pitch_deg };
+        StillAsked { pane, width_px, ground, angles }
+    });
     prop_oneof![
         Just(Output::Figure),
         Just(Output::Case),
         Just(Output::Masks),
         source().prop_map(Output::Pair),
+        still.prop_map(Output::Still),
         picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
     ]
 }

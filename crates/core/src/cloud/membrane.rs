@@ -9,7 +9,7 @@ use crate::mesh::TriMesh;
 use crate::sample::DepthCamera;
 
 /// Neighbors whose depths differ by more are no surface: the membrane jumps there, or a pixel flies, meters.
-const JUMP_M: f64 = 0.003;
+const JUMP_M: f64 = 0.005;
 /// Pixels between the corners of the triangles: what is smoothed has no more to show.
 const STEP: usize = 2;
 /// Largest hole that is closed, pixels; a hole at the border of the picture is none.
@@ -18,7 +18,7 @@ const HOLE: usize = 600;
 const SWEEPS: usize = 60;
 /// Passes of the smoothing: pixels between the taps, and the deviation over depths, meters. Wider and stricter from pass to
 /// pass: noise lies within, the flank of a contact beyond.
-const PASSES: [(usize, f64); 3] = [(1, 0.002_5), (2, 0.001_5), (4, 0.000_9)];
+const PASSES: [(usize, f64); 3] = [(1, 0.003), (2, 0.002_5), (4, 0.002)];
 /// Weights of the taps from the middle outwards.
 const TAPS: [f64; 3] = [6.0, 4.0, 1.0];
 

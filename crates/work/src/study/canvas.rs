@@ -14,7 +14,7 @@ use touch2touch_core::grid::{Grid, RgbGrid};
 /// Family of the letters; a viewer of the SVG takes its own.
 pub(crate) const FAMILY: &str = "sans-serif";
 /// Pixels of the drawing per pixel of the PNG along one side: their mean smooths edges, which the backend does not.
-const FINE: usize = 2;
+pub(crate) const FINE: usize = 2;
 
 /// Result of drawing, with the error of the backend that it is drawn on.
 pub type Drawn<B> = Result<(), DrawingAreaErrorKind<<B as DrawingBackend>::ErrorType>>;

@@ -11,6 +11,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::canvas;
 use super::compare::{of_pad, tile_of};
+use super::space::{SpacePane, SpacePicture, SpaceView};
 use crate::error::TaskError;
 use crate::imprint::{color, imprint_of};
 use crate::io::atomic;
@@ -70,9 +71,31 @@ pub enum FigurePane {
     Predicted,
     /// Predicted minus measured.
     Error,
+    /// The pair in 3D by its measured imprint.
+    #[serde(rename = "3d:measured")]
+    #[strum(serialize = "3d:measured")]
+    SpaceMeasured,
+    /// The pair in 3D by its predicted imprint.
+    #[serde(rename = "3d:predicted")]
+    #[strum(serialize = "3d:predicted")]
+    SpacePredicted,
+    /// The pair in 3D by both.
+    #[serde(rename = "3d:both")]
+    #[strum(serialize = "3d:both")]
+    SpaceBoth,
 }
 
 impl FigurePane {
+    /// The imprints of a column in 3D.
+    pub fn space(self) -> Option<SpacePane> {
+        match self {
+            Self::SpaceMeasured => Some(SpacePane::Measured),
+            Self::SpacePredicted => Some(SpacePane::Predicted),
+            Self::SpaceBoth => Some(SpacePane::Both),
+            _ => None,
+        }
+    }
+
     /// Name on the command line and in files.
     pub fn key(self) -> &'static str {
         self.into()
@@ -88,18 +111,22 @@ impl FigurePane {
             Self::Measured => "Measured imprint".into(),
             Self::Predicted => "Predicted imprint".into(),
             Self::Error => "Error".into(),
+            Self::SpaceMeasured => "3D, measured".into(),
+            Self::SpacePredicted => "3D, predicted".into(),
+            Self::SpaceBoth => "3D, both".into(),
         }
     }
 
     /// True where something has to be predicted for it.
     pub fn is_predicted(self) -> bool {
-        matches!(self, Self::Predicted | Self::Error)
+        matches!(self, Self::Predicted | Self::Error | Self::SpacePredicted | Self::SpaceBoth)
     }
 
     fn sensor(self, rig: &Rig) -> Option<&Sensor> {
         match self {
             Self::GelSlim | Self::Raw | Self::Reference => rig.color(),
             Self::Measured | Self::Predicted | Self::Error => rig.depth(),
+            Self::SpaceMeasured | Self::SpacePredicted | Self::SpaceBoth => None,
         }
     }
 }
@@ -263,8 +290,8 @@ pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
     format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }
 
-/// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers; it is asked only where a column
-/// needs one.
+/// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers, `space` with its picture in 3D; they
+/// are asked only where a column needs one.
 ///
 /// # Errors
 /// If it would be empty or too large, a pair cannot be read, a prediction fails, or the job was told to stop.
@@ -272,6 +299,7 @@ pub fn figure(
     dataset: &Dataset,
     setup: &FigureSetup,
     mut predict: impl FnMut(PairId, &Arc<Sample>, &JobCx) -> Result<PerPad<Prediction>, TaskError>,
+    mut space: impl FnMut(PairId, &Sample, &SpaceView, &JobCx) -> Result<SpacePicture, TaskError>,
     cx: &JobCx,
 ) -> Result<Figure, TaskError> {
     let look = &setup.look;
@@ -288,13 +316,20 @@ pub fn figure(
             .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
         let predicted = look.panes.iter().any(|pane| pane.is_predicted());
         let made = if predicted { predict(pair, &sample, cx)? } else { PerPad::default() };
+        let mut in_space = Vec::new();
+        for pane in look.panes.iter().filter_map(|pane| pane.space()) {
+            in_space.push((pane, space(pair, &sample, &sheet::space_view(look, pane, &dataset.rig), cx)?));
+        }
         let tile = if predicted { tile_of(dataset, pair, &sample)? } else { None };
         for &finger in &setup.fingers {
             if sample.pad(finger).is_none() {
                 continue;
             }
             let drawn = made.get(finger).map(|made| (made, setup.shift));
-            let cells = look.panes.iter().map(|pane| cell(*pane, &sample, finger, drawn, tile.as_ref(), look));
+            let cells = look.panes.iter().map(|pane| match pane.space() {
+                Some(of) => Ok(space_cell(&mut in_space, of)),
+                None => cell(*pane, &sample, finger, drawn, tile.as_ref(), look),
+            });
             let cells = cells.collect::<Result<_, TaskError>>()?;
             rows.push(Row { name: name.clone(), finger: sample.rig.pad_key(finger).into_owned(), cells });
         }
@@ -303,6 +338,16 @@ pub fn figure(
     let of = rows.iter().map(|row| [row.name.clone(), row.finger.clone()]).collect();
     let count = rows.len();
     Ok(Figure { sheet: FigureLayout::new(look.clone(), &rows, &setup.note, &dataset.rig), rows: count, of })
+}
+
+/// A picture in 3D. It shows all fingers, and so stands in the first row of a pair alone.
+fn space_cell(pictures: &mut Vec<(SpacePane, SpacePicture)>, pane: SpacePane) -> Cell {
+    let Some(at) = pictures.iter().position(|(of, _)| *of == pane) else {
+        return Cell { picture: Err("as above".into()), px_per_m: None, window: None, note: String::new() };
+    };
+    let (_, picture) = pictures.remove(at);
+    let pixels = picture.pixels.map(|[r, g, b, _]| [*r, *g, *b]);
+    Cell { picture: Ok(pixels), px_per_m: Some(picture.px_per_m), window: None, note: String::new() }
 }
 
 /// One picture, in the colors and the orientation of its pane.
@@ -354,6 +399,7 @@ fn cell(
             },
             None => absent("no prediction"),
         },
+        FigurePane::SpaceMeasured | FigurePane::SpacePredicted | FigurePane::SpaceBoth => absent("drawn in 3D"),
     };
     let sensor = pane.sensor(&sample.rig);
     let width = picture.as_ref().ok().map(|picture: &Rgb8| picture.width() as f64);
@@ -451,7 +497,12 @@ mod tests {
 
     fn drawn(setup: &FigureSetup) -> Result<Figure, TaskError> {
         let never = |_, _: &Arc<Sample>, _: &JobCx| panic!("nothing has to be predicted");
-        figure(&Dataset::demo(), setup, never, &JobCx::unwatched())
+        // A plain color tells that a picture was asked for at the size of its cell.
+        let space = |_, _: &Sample, view: &SpaceView, _: &JobCx| {
+            let [w, h] = view.size_px.map(|n| n as usize);
+            Ok(SpacePicture { pixels: touch2touch_core::grid::Grid::filled(w, h, [9, 99, 199, 255]), px_per_m: 2000.0 })
+        };
+        figure(&Dataset::demo(), setup, never, space, &JobCx::unwatched())
     }
 
     #[test]
@@ -485,6 +536,21 @@ mod tests {
         let shown = mean(&|x, y| f64::from(image[(left + 4 + x * 4, top + off + 4 + y * 2)][0]));
         let meant = mean(&|x, y| f64::from(gel[(5 + x * 4 * 427 / 350, 5 + y * 2 * 427 / 350)][0]));
         assert!((shown - meant).abs() < 3.0, "{shown} {meant}");
+    }
+
+    #[test]
+    fn a_column_in_3d_is_drawn_once_for_a_pair_with_its_own_scale() {
+        let setup = setup(&[FigurePane::Measured, FigurePane::SpaceMeasured], 2.0);
+        let figure = drawn(&setup).unwrap();
+        let image = figure.pixels().unwrap();
+        let [left, top] = sheet::corner(1, 0, 193.0).map(|units| (units * 2.0) as usize);
+        for (x, y) in [(3, 3), (340, 3), (3, 380), (170, 190)] {
+            assert_eq!(image[(left + x, top + y)], [9.0, 99.0, 199.0], "({x}, {y})");
+        }
+        let [left, top] = sheet::corner(1, 1, 193.0).map(|units| (units * 2.0) as usize);
+        assert_eq!(image[(left + 30, top + 30)], [255.0; 3], "the second finger's row has none of its own");
+        let text = figure.svg().unwrap();
+        assert!(text.contains("as above") && text.contains("3D, measured"));
     }
 
     #[test]

@@ -43,6 +43,15 @@ pub enum SpacePane {
 }
 
 impl SpacePane {
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Measured => "Measured",
+            Self::Predicted => "Predicted",
+            Self::Both => "Both",
+        }
+    }
+
     /// The imprints.
     pub fn sides(self) -> &'static [ImprintSource] {
         match self {

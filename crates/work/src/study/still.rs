@@ -30,7 +30,9 @@ pub const MOST_FRAMES: u32 = 3600;
 /// Width of a still in units of its letters.
 const UNITS: f64 = 480.0;
 /// Height of the strip of letters, units.
-const STRIP: f64 = 30.0;
+const STRIP: f64 = 40.0;
+/// Letters of a line of the note, and its most lines.
+const NOTE: (usize, usize) = (92, 2);
 /// Round lengths of scale bars, millimeters.
 const LENGTHS_MM: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 
@@ -137,7 +139,7 @@ struct StillStrip {
     /// Width and height, units.
     size: [u32; 2],
     name: String,
-    note: String,
+    note: Vec<String>,
     /// Length in units, with its text.
     bar: Option<(f64, String)>,
 }
@@ -147,14 +149,21 @@ impl StillStrip {
         let per_mm = px_per_mm * UNITS / f64::from(width_px.max(1));
         let bar = LENGTHS_MM.iter().rev().find(|mm| **mm * per_mm <= UNITS / 4.0);
         let bar = bar.filter(|_| per_mm > 0.0).map(|mm| (mm * per_mm, format!("{mm} mm")));
-        // What does not fit is said by the report.
-        let most = 84;
-        let note = match note.chars().count() {
-            n if n > most => note.chars().take(most - 1).chain(['…']).collect(),
-            _ => note.to_owned(),
-        };
-        Self { size: [UNITS as u32, STRIP as u32], name: name.to_owned(), note, bar }
+        Self { size: [UNITS as u32, STRIP as u32], name: name.to_owned(), note: lines(note), bar }
     }
+}
+
+/// A note in lines, broken between its parts; what does not fit is said by the report.
+fn lines(note: &str) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for part in note.split(" · ") {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + part.chars().count() + 3 <= NOTE.0 => *line += &format!(" · {part}"),
+            _ => lines.push(part.to_owned()),
+        }
+    }
+    lines.truncate(NOTE.1);
+    lines
 }
 
 impl Drawing for StillStrip {
@@ -164,8 +173,11 @@ impl Drawing for StillStrip {
 
     fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
         let left = |units: f64| paper.letters(units, BLACK).pos(Pos::new(HPos::Left, VPos::Bottom));
-        paper.text([10.0, STRIP - 16.0], &left(8.5), &self.name)?;
-        paper.text([10.0, STRIP - 6.0], &left(7.5), &self.note)?;
+        let top = STRIP - 6.0 - 9.0 * self.note.len() as f64;
+        paper.text([10.0, top - 1.0], &left(8.5), &self.name)?;
+        for (line, y) in self.note.iter().zip(1..) {
+            paper.text([10.0, top + 9.0 * f64::from(y)], &left(7.0), line)?;
+        }
         if let Some((length, text)) = &self.bar {
             let (right, y) = (UNITS - 10.0, STRIP - 8.0);
             paper.line(&[[right - length, y], [right, y]], BLACK, 1.2)?;

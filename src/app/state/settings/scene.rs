@@ -5,42 +5,7 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::super::keys::ImprintSource;
-
 use touch2touch_core::units::clamp_or;
-
-/// The sides that have a 3D view: each its own, beside the other.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]
-#[serde(rename_all = "snake_case")]
-pub enum SceneSides {
-    /// The measured imprint.
-    Measured,
-    /// The predicted imprint.
-    Predicted,
-    /// One view each.
-    #[default]
-    Both,
-}
-
-impl SceneSides {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Measured => "Measured",
-            Self::Predicted => "Predicted",
-            Self::Both => "Both",
-        }
-    }
-
-    /// The sides, from left to right.
-    pub fn list(self) -> &'static [ImprintSource] {
-        match self {
-            Self::Measured => &[ImprintSource::Measured],
-            Self::Predicted => &[ImprintSource::Predicted],
-            Self::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
-        }
-    }
-}
 
 /// Something that 3D views draw and a person can switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]

@@ -5,6 +5,7 @@ use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::super::canvas::{Drawing, Drawn, Paper, Raster};
+use super::super::space::{Ground, SpacePane, SpaceView, ViewAngles};
 use super::{FigureLook, FigurePane, FigureTheme, Row};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::grid::Grid;
@@ -12,6 +13,10 @@ use touch2touch_core::rig::Rig;
 
 /// Width of a picture, units: one for each pixel of the lab's imprints.
 const WIDE: f64 = 175.0;
+/// Height of a picture in 3D over its width.
+const TALL: f64 = 1.1;
+/// Fewest pixels of a picture in 3D per unit: an SVG is looked at closely.
+const FEWEST: f64 = 4.0;
 /// Between pictures.
 const GAP: f64 = 6.0;
 /// Around everything.
@@ -75,10 +80,28 @@ struct Bar {
 /// The height that all pictures get, units.
 fn height(look: &FigureLook, rig: &Rig) -> f64 {
     let shape = |pane: &FigurePane| {
+        if pane.space().is_some() {
+            return Some(WIDE * TALL);
+        }
         let sensor = pane.sensor(rig)?;
         Some((WIDE * sensor.height as f64 / sensor.width.max(1) as f64).clamp(WIDE / 4.0, WIDE * 2.0))
     };
     look.panes.iter().filter_map(shape).fold(0.0, f64::max).max(WIDE / 4.0).round()
+}
+
+/// View of a picture in 3D: of as many pixels as its place has while it is drawn.
+pub(super) fn space_view(look: &FigureLook, pane: SpacePane, rig: &Rig) -> SpaceView {
+    let per_unit = (look.scale * super::super::canvas::FINE as f64).max(FEWEST);
+    SpaceView {
+        pane,
+        ground: match look.theme {
+            FigureTheme::Light => Ground::White,
+            FigureTheme::Dark => Ground::Black,
+        },
+        angles: ViewAngles::default(),
+        turned_deg: 0.0,
+        size_px: [WIDE, height(look, rig)].map(|units| (units * per_unit).round() as u32),
+    }
 }
 
 fn bars(look: &FigureLook) -> Vec<(&'static str, ColorMap, Range)> {

@@ -1,0 +1,44 @@
+//! Pictures in 3D: the same bytes by the menu of a pane and by the verbs.
+
+use touch2touch::app::export::{FigureRows, StillAsked};
+use touch2touch_work::figure::FigurePane;
+use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
+
+use super::*;
+
+#[test]
+pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
+    // Without a device both say so.
+    #[cfg(feature = "gui")]
+    if crate::support::gpu().is_none() {
+        return;
+    }
+    let home = tempfile::tempdir().unwrap();
+    let at = |name: &str| home.path().join(name);
+    let mut studio = Studio::open(Place::Demo, home.path());
+    let angles = ViewAngles { yaw_deg: 40.0, pitch_deg: 12.5 };
+    let asked = StillAsked { pane: SpacePane::Measured, width_px: 320, ground: Ground::Transparent, angles };
+    studio.send(ExportCommand::Write(Output::Still(asked), at("studio.png")).into());
+    let form = FigureForm {
+        rows: FigureRows::Selected,
+        scale: 1,
+        panes: vec![FigurePane::SpaceMeasured],
+        ..FigureForm::default()
+    };
+    studio.send(ExportCommand::SetForm(form).into());
+    studio.send(ExportCommand::Write(Output::Figure, at("studio-figure.png")).into());
+    let name = studio.state.pair_name().to_owned();
+    let verb = |arguments: &[&str], file: &str| {
+        json(&[arguments, &["--out", at(file).to_str().unwrap()]].concat(), home.path())
+    };
+    let still = ["still", "demo", "--pair", &name, "--width", "320", "--ground", "transparent", "--view", "40,12.5"];
+    let said = verb(&still, "verb.png");
+    assert_eq!(said["size_px"], serde_json::json!([320, 320]), "{said}");
+    let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
+    let figure = ["figure", "demo", "--pairs", &name, "--panes", "3d:measured", "--scale", "1", "--finger", &finger];
+    verb(&figure, "verb-figure.png");
+    for end in [".png", "-figure.png"] {
+        let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}{end}"))).unwrap());
+        assert!(a.len() > 5000 && a == b, "{end}: {} and {} bytes", a.len(), b.len());
+    }
+}
