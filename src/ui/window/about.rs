@@ -17,6 +17,8 @@ use touch2touch_work::about::{Cure, Examined, Fact, Grade, SAMPLE, Worth};
 
 /// Width of the panel, points.
 const WIDE: f32 = 520.0;
+/// Share of the window that the list takes at first.
+const LIST: f32 = 0.165;
 /// Width of the names of the facts, points.
 const NAMES: f32 = 84.0;
 /// Faults that are listed; the verb lists all.
@@ -33,9 +35,10 @@ pub(crate) fn panel(cx: &mut Cx<'_>, ctx: &egui::Context) {
     }
     let mut open = true;
     let window = egui::Window::new("About this data").id(egui::Id::unique("about this data")).open(&mut open);
-    let window = window.collapsible(false).resizable(false).default_pos([232.0, 64.0]);
+    let room = ctx.content_rect();
+    // Beside the list, over the pictures.
+    let window = window.collapsible(false).resizable(false).default_pos([LIST * room.width() + 20.0, 64.0]);
     window.show(ctx, |ui| {
-        let room = ctx.content_rect();
         ui.set_width(WIDE.min(room.width() - 48.0));
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         let tall = room.height() - 150.0;
@@ -107,8 +110,11 @@ fn glance(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn line(cx: &mut Cx<'_>, ui: &mut Ui, fact: &Fact) {
     named(cx, ui, fact.topic.name(), |cx, ui| {
         ui.add(Label::new(RichText::new(&fact.text).color(color(cx.p, fact.grade))).wrap());
-        if !fact.cures.is_empty() {
-            ui.horizontal_wrapped(|ui| fact.cures.iter().for_each(|one| cure(cx, ui, one)));
+        // Colors that fit already need no cure.
+        let needed = |cure: &&Cure| !matches!(cure, Cure::FitRange { .. }) || about::can(cx.state, cure);
+        let cures: Vec<&Cure> = fact.cures.iter().filter(needed).collect();
+        if !cures.is_empty() {
+            ui.horizontal_wrapped(|ui| cures.into_iter().for_each(|one| cure(cx, ui, one)));
         }
     });
 }

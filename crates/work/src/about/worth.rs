@@ -114,7 +114,7 @@ impl Worth {
         let Some(before) = db(&fit.before) else {
             return Fact::plain(Topic::Generator, "no prediction could be compared with its measurement");
         };
-        let angle = |scored: &Scored| Some(scored.angle?.mean_deg?);
+        let angle = |scored: &Scored| scored.angle.and_then(|angle| angle.mean_deg);
         let posed = angle(&fit.before).map_or(String::new(), |deg| format!(", pose {deg:.1}° off"));
         let mut text = format!("{before:.1} dB{posed} on {}", counted(fit.pairs, "pair"));
         let Some(after) = fit.closed_form.as_ref().and_then(db) else { return Fact::plain(Topic::Generator, text) };
