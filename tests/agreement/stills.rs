@@ -7,12 +7,10 @@ use touch2touch_work::space::{Ground, ViewAngles};
 use super::*;
 
 #[test]
+#[cfg_attr(not(feature = "gui"), ignore = "without the renderer there is no still")]
 pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
-    // Without a device both say so.
     #[cfg(feature = "gui")]
-    if crate::support::gpu().is_none() {
-        return;
-    }
+    let Some(_device) = crate::support::gpu() else { return };
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name);
     let mut studio = Studio::open(Place::Demo, home.path());
