@@ -25,7 +25,6 @@ use touch2touch_core::mesh::TriMesh;
 
 use crate::support;
 
-
 const SIZE: [u32; 2] = [320, 240];
 const BACKGROUND: [u8; 3] = [26, 28, 33];
 

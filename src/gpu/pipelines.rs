@@ -146,9 +146,7 @@ impl Pipelines {
                 depth: Depth::Absent,
                 ..pulled
             };
-            let veil = |label, fragment, depth, stencil| {
-                build(Variant { label, fragment, depth, stencil, ..lit })
-            };
+            let veil = |label, fragment, depth, stencil| build(Variant { label, fragment, depth, stencil, ..lit });
             Ok(Self {
                 points: build(Variant { ..pulled }),
                 points_translucent: build(Variant {
@@ -159,12 +157,7 @@ impl Pipelines {
                     ..pulled
                 }),
                 mesh_solid: build(Variant { ..lit }),
-                mesh_xray: build(Variant {
-                    label: "Mesh::xray",
-                    depth: Depth::Tests,
-                    stencil: Stencil::Unused,
-                    ..lit
-                }),
+                mesh_xray: build(Variant { label: "Mesh::xray", depth: Depth::Tests, stencil: Stencil::Unused, ..lit }),
                 veil: [
                     veil("Veil::depth", "fs_depth", Depth::Only, Stencil::Unused),
                     veil("Veil::beside", "fs_veil", Depth::Equals, Stencil::Beside),

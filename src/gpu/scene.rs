@@ -201,7 +201,7 @@ impl SceneRenderer {
         let result = gpu.guarded("drawing a 3D view", || {
             let changed = self.update(gpu, scene, camera, part)?;
             if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
-                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth())));
+                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth_alone())));
             }
             let shown = Shown {
                 target: target.generation(),
@@ -289,7 +289,9 @@ impl SceneRenderer {
         if let Some(floor) = &mut self.floor {
             let meshes = &self.meshes;
             let draw = |pass: &mut wgpu::RenderPass<'_>, name: &str| {
-                meshes.get(name).map(|data| data.draw(pass));
+                if let Some(data) = meshes.get(name) {
+                    data.draw(pass);
+                }
             };
             floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
         }
@@ -360,9 +362,7 @@ impl SceneRenderer {
                 | Layer::VeilBeside
                 | Layer::VeilBefore
                 | Layer::TranslucentMesh
-                | Layer::XRayMesh => {
-                    self.meshes.get(name).map(|d| d.draw(pass))
-                }
+                | Layer::XRayMesh => self.meshes.get(name).map(|d| d.draw(pass)),
             };
         }
     }

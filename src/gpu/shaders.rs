@@ -297,10 +297,7 @@ mod tests {
             mesh::MeshUniform { world_from_mesh, color, xray, scalar, lo, hi, map, closed, unused_0, unused_1 }
         );
         check_layout!("edges.wgsl", edges::EdgeVertex { a, always, b, unused, normal_a, normal_b });
-        check_layout!(
-            "edges.wgsl",
-            edges::EdgesUniform { world_from_mesh, color, width_px, creases, dash_px, unused }
-        );
+        check_layout!("edges.wgsl", edges::EdgesUniform { world_from_mesh, color, width_px, creases, dash_px, unused });
         check_layout!("lines.wgsl", lines::LineVertex { position, color });
         check_layout!("lines.wgsl", lines::LinesUniform { world_from_lines, width_px, opacity, unused_0, unused_1 });
     }

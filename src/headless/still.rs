@@ -59,7 +59,8 @@ pub(super) struct StillArgs {
 
 /// Reads `YAW,PITCH` in degrees.
 fn parse_view(text: &str) -> Result<ViewAngles, String> {
-    let two = text.split_once(',').and_then(|(yaw, pitch)| Some([yaw.trim().parse().ok()?, pitch.trim().parse().ok()?]));
+    let two =
+        text.split_once(',').and_then(|(yaw, pitch)| Some([yaw.trim().parse().ok()?, pitch.trim().parse().ok()?]));
     match two {
         Some([yaw_deg, pitch_deg]) if f64::is_finite(yaw_deg) && f64::abs(pitch_deg) <= 90.0 => {
             Ok(ViewAngles { yaw_deg, pitch_deg })
@@ -102,8 +103,7 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
     setup.check()?;
     let drawer = spatial::stills()?;
     let models = args.model.models();
-    let report =
-        Report { pair: &name, still: still(&dataset, &setup, &models, &*drawer, &args.out, &output.job())? };
+    let report = Report { pair: &name, still: still(&dataset, &setup, &models, &*drawer, &args.out, &output.job())? };
     output.finish(&report, || {
         let [width, height] = report.still.size_px;
         let count = report.still.files.len();

@@ -132,12 +132,15 @@ fn models(pair: &InSpace, colors: &StillColors, scene: &mut SceneData) {
         let Some(world_from_mesh) = pose.as_ref().map(|pose| pose.grasp_from_object.to_affine()) else { continue };
         let name = format!("CAD {}", source.key());
         match i {
-            0 => add(&name, MeshStyle {
-                color: colors.model,
-                look: Look::Solid,
-                edges: Some(items::model_edges(colors.model, colors.ink)),
-                ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
-            }),
+            0 => add(
+                &name,
+                MeshStyle {
+                    color: colors.model,
+                    look: Look::Solid,
+                    edges: Some(items::model_edges(colors.model, colors.ground)),
+                    ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
+                },
+            ),
             _ => add(&name, items::outline(world_from_mesh, colors.side(*source), 1.0, 1.6)),
         }
     }
@@ -234,8 +237,7 @@ impl DrawSpace for Stills {
             [own(at[0]), own(at[1]), own(at[2]), at[3]]
         };
         let pixels = drawn.rgba.chunks_exact(4).map(pixel).collect();
-        let pixels = Grid::from_vec(width, height, pixels)
-            .map_err(|err| TaskError::from_error("3D picture", &err))?;
+        let pixels = Grid::from_vec(width, height, pixels).map_err(|err| TaskError::from_error("3D picture", &err))?;
         Ok(SpacePicture { pixels, px_per_m: camera.px_per_m(view.size_px) })
     }
 }

@@ -18,15 +18,13 @@ fn a_dashed_outline_has_gaps_and_a_whole_one_none() {
     let back = view.camera.axes()[2];
     let (v, u) = back.any_orthonormal_pair();
     for (revision, dash_px) in [(1, 0.0), (2, 12.0)] {
-        let edges =
-            EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: false, dash_px };
+        let edges = EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: false, dash_px };
         let style = MeshStyle { look: Look::Outline, edges: Some(edges), ..MeshStyle::default() };
         let item = MeshItem { revision, ..mesh_item(square(DVec3::ZERO, back, 0.02), style) };
         let picture = view.picture(&SceneData { meshes: vec![item], ..scene() });
         // Along one side, without its ends.
-        let greens: Vec<bool> = (-90..=90)
-            .map(|i| at(&view, &picture, v * 0.02 + u * (f64::from(i) * 0.0002))[1] > 200)
-            .collect();
+        let greens: Vec<bool> =
+            (-90..=90).map(|i| at(&view, &picture, v * 0.02 + u * (f64::from(i) * 0.0002))[1] > 200).collect();
         let gaps = greens.windows(2).filter(|two| two[0] && !two[1]).count();
         let share = greens.iter().filter(|on| **on).count() as f64 / greens.len() as f64;
         match dash_px == 0.0 {

@@ -8,10 +8,10 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
-use crate::app::pane::Kind;
 use crate::app::export;
 use crate::app::export::{FigureForm, MOST_PAIRS, Output, SCALES, StillAsked};
 use crate::app::keys::ImprintSource;
+use crate::app::pane::Kind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_work::figure::{FigurePane, FigureTheme};

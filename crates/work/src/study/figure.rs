@@ -345,7 +345,13 @@ pub fn figure(
 /// A picture in 3D. It shows all fingers, and so stands in the first row of a pair alone.
 fn space_cell(pictures: &mut Vec<(SpacePane, SpacePicture)>, pane: SpacePane) -> Cell {
     let Some(at) = pictures.iter().position(|(of, _)| *of == pane) else {
-        return Cell { picture: Err("as above".into()), px_per_m: None, own_scale: true, window: None, note: String::new() };
+        return Cell {
+            picture: Err("as above".into()),
+            px_per_m: None,
+            own_scale: true,
+            window: None,
+            note: String::new(),
+        };
     };
     let (_, picture) = pictures.remove(at);
     let pixels = picture.pixels.map(|[r, g, b, _]| [*r, *g, *b]);

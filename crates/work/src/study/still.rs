@@ -110,8 +110,7 @@ pub fn still(
         .load(setup.pair)
         .map(Arc::new)
         .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
-    let input =
-        SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
+    let input = SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
     let pair = in_space(input, &sample, setup.pane.sides(), cx)?;
     let frames = setup.turntable.unwrap_or(1);
     let size_px = [setup.width_px; 2];
@@ -120,8 +119,7 @@ pub fn still(
         cx.check(WHAT)?;
         cx.progress(u64::from(frame), u64::from(frames), name.clone());
         let turned_deg = 360.0 * f64::from(frame) / f64::from(frames);
-        let view =
-            SpaceView { pane: setup.pane, ground: setup.ground, angles: setup.angles, turned_deg, size_px };
+        let view = SpaceView { pane: setup.pane, ground: setup.ground, angles: setup.angles, turned_deg, size_px };
         let mut picture = by.draw(&pair, &view)?;
         done.px_per_mm = picture.px_per_m * 1e-3;
         letter(&mut picture.pixels, setup.ground, &StillStrip::new(&name, &pair.note, done.px_per_mm, setup.width_px))?;

@@ -4,8 +4,8 @@ use plotters::prelude::*;
 use plotters::style::FontTransform;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::super::space::{Ground, SpacePane, SpaceView, ViewAngles};
 use super::super::canvas::{Drawing, Drawn, Paper, Raster};
+use super::super::space::{Ground, SpacePane, SpaceView, ViewAngles};
 use super::{FigureLook, FigurePane, FigureTheme, Row};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::grid::Grid;
@@ -165,7 +165,8 @@ impl FigureLayout {
                     let place =
                         [corner[0] + (WIDE - w * fit) / 2.0, corner[1] + (high - h * fit) / 2.0, w * fit, h * fit];
                     laid.place = place;
-                    laid.scale_bar = cell.px_per_m.filter(|_| y == 0 || cell.own_scale).and_then(|px| scale_bar(px * fit * 1e-3));
+                    laid.scale_bar =
+                        cell.px_per_m.filter(|_| y == 0 || cell.own_scale).and_then(|px| scale_bar(px * fit * 1e-3));
                     laid.window = cell.window.map(|[cx, cy, w, h]| {
                         let at = |center: f64, half: f64, from: f64| from + (center + 0.5 + half) * fit;
                         [
