@@ -11,6 +11,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::canvas;
 use super::compare::{of_pad, tile_of};
+pub use super::space::note;
 use super::space::{SpacePane, SpacePicture, SpaceView};
 use crate::error::TaskError;
 use crate::imprint::{color, imprint_of};
@@ -22,7 +23,6 @@ use crate::prediction::Prediction;
 use sheet::FigureLayout;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::picture::{self, Rgb8};
 use touch2touch_core::postprocess::ShiftMode;
@@ -285,11 +285,6 @@ pub struct FigureFile {
     pub range_mm: [f32; 2],
     /// Half the range of the colors of errors, millimeters.
     pub error_mm: f32,
-}
-
-/// The line below a figure: what made its predictions.
-pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
-    format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }
 
 /// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers, `space` with its picture in 3D; they

@@ -271,8 +271,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let setup = StillSetup { turntable: Some(4), width_px: 64, ..setup() };
         let new = folder.path().join("frames");
-        let done =
-            still(&Dataset::demo(), &setup, &Models::new(None), &Plain, &new, &JobCx::unwatched()).unwrap();
+        let done = still(&Dataset::demo(), &setup, &Models::new(None), &Plain, &new, &JobCx::unwatched()).unwrap();
         let colors = done.files.iter().map(|file| image::open(file).unwrap().into_rgba8().get_pixel(32, 40).0[0]);
         assert_eq!(colors.collect::<Vec<_>>(), [0, 63, 127, 191]);
         assert!(done.files[3].ends_with("frame_0004.png"));
