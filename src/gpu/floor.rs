@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use super::buffer::Uniform;
+use super::context::SHADOW_FORMAT;
 use super::pipelines::Pipelines;
 use super::{Gpu, wgpu};
 
@@ -27,8 +28,6 @@ pub struct Floor {
 const SIDE: u32 = 256;
 /// Towards the light that throws the shadow, world: from above (negative z) and a little from the side.
 const LIGHT: [f32; 3] = [-0.25, -0.35, -1.0];
-/// What the shadow is made of: the share of each pixel that lies in it.
-pub(super) const SHADOW_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
 /// Twin of the struct in `shaders/common/floor.wgsl`.
 #[repr(C)]

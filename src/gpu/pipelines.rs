@@ -1,7 +1,6 @@
 //! The render pipelines, built once per device and shared by all views.
 
-use super::context::{COLOR_FORMAT, DEPTH_FORMAT};
-use super::floor::SHADOW_FORMAT;
+use super::context::{COLOR_FORMAT, DEPTH_FORMAT, SHADOW_FORMAT};
 use super::vertex::VERTEX_LAYOUT;
 use super::{Gpu, GpuError, shaders, wgpu};
 

@@ -94,7 +94,7 @@ pub struct Counters {
 #[derive(Debug)]
 pub struct SceneRenderer {
     /// Points drawn while the camera moves, over all clouds: every n-th, so that orbiting stays smooth. Preset by
-    /// what draws them: a million on a graphics card, 40 thousand (about 30 ms on two cores) in software.
+    /// what draws them: a million on a graphics card, 20 thousand (about 15 ms on two cores) in software.
     pub moving_points: u32,
     pipelines: Arc<Pipelines>,
     view: Uniform<ViewUniform>,
@@ -155,7 +155,7 @@ impl SceneRenderer {
                 entries: &[wgpu::BindGroupEntry { binding: 0, resource: view.buffer.as_entire_binding() }],
             });
             Ok(Self {
-                moving_points: if gpu.software { 40_000 } else { 1_000_000 },
+                moving_points: if gpu.software { 20_000 } else { 1_000_000 },
                 pipelines,
                 view,
                 view_bindings,
@@ -201,7 +201,7 @@ impl SceneRenderer {
         let result = gpu.guarded("drawing a 3D view", || {
             let changed = self.update(gpu, scene, camera, part)?;
             if scene.eye_dome && self.depth.as_ref().is_none_or(|(of, _)| *of != target.generation()) {
-                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth())));
+                self.depth = Some((target.generation(), self.pipelines.bind_depth(gpu, target.depth_alone())));
             }
             let shown = Shown {
                 target: target.generation(),
@@ -212,7 +212,7 @@ impl SceneRenderer {
                 eye_dome: scene.eye_dome,
                 moving: scene.moving && scene.eye_dome,
                 casters: casters(scene),
-                order: order(scene),
+                order: order(scene, gpu.software && scene.moving),
             };
             let draw = changed || before.as_ref() != Some(&shown);
             if draw {
@@ -289,7 +289,9 @@ impl SceneRenderer {
         if let Some(floor) = &mut self.floor {
             let meshes = &self.meshes;
             let draw = |pass: &mut wgpu::RenderPass<'_>, name: &str| {
-                meshes.get(name).map(|data| data.draw(pass));
+                if let Some(data) = meshes.get(name) {
+                    data.draw(pass);
+                }
             };
             floor.throw(&mut encoder, &self.pipelines, &shown.casters, draw);
         }
@@ -373,13 +375,15 @@ fn casters(scene: &SceneData) -> Vec<Caster> {
 }
 
 /// All items of a scene in the order in which they are drawn; items of one layer keep the order of their list.
-fn order(scene: &SceneData) -> Vec<(Layer, String)> {
+/// `hasty`: what is hardly seen is left out, because a program draws and the camera moves.
+fn order(scene: &SceneData, hasty: bool) -> Vec<(Layer, String)> {
     let lines = scene.lines.iter().map(|l| {
         let layer = if l.style.overlay { Layer::OverlayLines } else { Layer::Lines };
         (layer, l.name.clone())
     });
     let meshes = scene.meshes.iter().flat_map(|m| {
         let layers: &[Layer] = match (m.style.look, m.style.edges.is_some()) {
+            (Look::Veil, _) if hasty => &[Layer::VeilDepth, Layer::VeilBeside],
             (Look::Veil, _) => &[Layer::VeilDepth, Layer::VeilBeside, Layer::VeilBefore],
             (Look::XRay, _) => &[Layer::XRayMesh],
             (Look::Outline, _) => &[Layer::Outline, Layer::HiddenOutline],

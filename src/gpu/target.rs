@@ -84,7 +84,7 @@ impl Target {
     }
 
     /// The depth of every sample, for shaders.
-    pub(super) fn depth(&self) -> &wgpu::TextureView {
+    pub(super) fn depth_alone(&self) -> &wgpu::TextureView {
         &self.depth_alone
     }
 

@@ -51,9 +51,10 @@ pub fn contact(
     CloudItem { name: format!("{CONTACT}{finger}"), revision, points, colors: PointColors::One, style }
 }
 
-/// The edges of a shaded model of a color before a ground.
+/// The edges of a shaded model of a color before a ground: darker than the model before either.
 pub fn model_edges(color: [f32; 3], ground: [f32; 3]) -> EdgeStyle {
-    EdgeStyle { color: mix(color, ground, 0.7), opacity: 0.8, width_px: 1.2, creases: true, dash_px: 0.0 }
+    let dark = if is_dark(ground) { ground } else { [0.0; 3] };
+    EdgeStyle { color: mix(color, dark, 0.7), opacity: 0.75, width_px: 1.2, creases: true, dash_px: 0.0 }
 }
 
 /// The look of a model that another one is compared with: its outline alone.

@@ -137,7 +137,7 @@ fn models(pair: &InSpace, colors: &StillColors, scene: &mut SceneData) {
                 MeshStyle {
                     color: colors.model,
                     look: Look::Solid,
-                    edges: Some(items::model_edges(colors.model, colors.ink)),
+                    edges: Some(items::model_edges(colors.model, colors.ground)),
                     ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
                 },
             ),

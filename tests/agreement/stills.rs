@@ -5,14 +5,14 @@ use touch2touch_work::figure::FigurePane;
 use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
 
 use super::*;
+#[cfg(feature = "gui")]
+use crate::support;
 
 #[test]
+#[cfg_attr(not(feature = "gui"), ignore = "without the renderer there is no still")]
 pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
-    // Without a device both say so.
     #[cfg(feature = "gui")]
-    if crate::support::gpu().is_none() {
-        return;
-    }
+    let Some(_device) = support::gpu() else { return };
     let home = tempfile::tempdir().unwrap();
     let at = |name: &str| home.path().join(name);
     let mut studio = Studio::open(Place::Demo, home.path());

@@ -45,6 +45,7 @@ static TABLE: &[(&str, How)] = &[
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
     ("touch2touch figure", How::Run(&[], "--steps 1", &[0])),
+    ("touch2touch still", How::Run(&[("4", "1"), ("180", "2")], "--steps 1", &[0])),
     ("touch2touch export", How::Run(&[], "", &[0])),
     ("touch2touch case make", How::Run(&[], "--steps 1", &[0])),
     ("touch2touch case check", How::Run(&[], "", &[0])),
@@ -134,6 +135,7 @@ impl Stage {
                 ("FITTED", "--out") => at(&format!("fitted {number}")),
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
                 ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.md", _) => at(&format!("{number} {word}")),
+                ("STILL.png", _) => at(&format!("{number} still.png")),
                 ("FIGURE.svg", _) => at(&format!("{number} figure.svg")),
                 ("CASE.t2tcase", _) => at("case.t2tcase"),
                 ("PY", _) => "/no/such/python".to_owned(),

@@ -73,16 +73,16 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     let legend = rig.harness.get_by_label("Legend").rect().center();
     rig.click_at(legend);
     let before = colors(&mut rig);
-    let at = rig.harness.get_by_label("Show membrane, points, measured").rect().center();
+    let at = rig.harness.get_by_label("Show membrane, surface, measured").rect().center();
     rig.click_at(at);
-    assert!(!state(&rig).settings.scene.layer(SceneLayer::Membrane).shown);
+    assert!(!state(&rig).settings.scene.layer(SceneLayer::Surface).shown);
     assert!(colors(&mut rig).len() < before.len());
     rig.click_at(at);
     assert!(state(&rig).settings.scene.layers.is_empty(), "as at first is not stored");
     let surface = Action::MembraneSurface.command(state(&rig)).unwrap();
     rig.send(surface);
     let look = &state(&rig).settings.scene;
-    assert!(look.layer(SceneLayer::Surface).shown && !look.layer(SceneLayer::Membrane).shown);
+    assert!(!look.layer(SceneLayer::Surface).shown && look.layer(SceneLayer::Membrane).shown, "points in its place");
     assert!(colors(&mut rig).len() > 100);
     rig.shoot("test-surface");
     // Every row has its menu.

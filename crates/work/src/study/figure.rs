@@ -11,6 +11,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::canvas;
 use super::compare::{of_pad, tile_of};
+pub use super::space::note;
 use super::space::{SpacePane, SpacePicture, SpaceView};
 use crate::error::TaskError;
 use crate::imprint::{color, imprint_of};
@@ -22,7 +23,6 @@ use crate::prediction::Prediction;
 use sheet::FigureLayout;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::picture::{self, Rgb8};
 use touch2touch_core::postprocess::ShiftMode;
@@ -244,6 +244,8 @@ struct Cell {
     picture: Result<Rgb8, String>,
     /// Pixels per meter.
     px_per_m: Option<f64>,
+    /// True where each row has a scale of its own.
+    own_scale: bool,
     /// Window of the color sensor in it: center and size, pixels.
     window: Option<[f64; 4]>,
     /// A figure of it, in a corner.
@@ -283,11 +285,6 @@ pub struct FigureFile {
     pub range_mm: [f32; 2],
     /// Half the range of the colors of errors, millimeters.
     pub error_mm: f32,
-}
-
-/// The line below a figure: what made its predictions.
-pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
-    format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }
 
 /// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers, `space` with its picture in 3D; they
@@ -343,11 +340,17 @@ pub fn figure(
 /// A picture in 3D. It shows all fingers, and so stands in the first row of a pair alone.
 fn space_cell(pictures: &mut Vec<(SpacePane, SpacePicture)>, pane: SpacePane) -> Cell {
     let Some(at) = pictures.iter().position(|(of, _)| *of == pane) else {
-        return Cell { picture: Err("as above".into()), px_per_m: None, window: None, note: String::new() };
+        return Cell {
+            picture: Err("as above".into()),
+            px_per_m: None,
+            own_scale: true,
+            window: None,
+            note: String::new(),
+        };
     };
     let (_, picture) = pictures.remove(at);
     let pixels = picture.pixels.map(|[r, g, b, _]| [*r, *g, *b]);
-    Cell { picture: Ok(pixels), px_per_m: Some(picture.px_per_m), window: None, note: String::new() }
+    Cell { picture: Ok(pixels), px_per_m: Some(picture.px_per_m), own_scale: true, window: None, note: String::new() }
 }
 
 /// One picture, in the colors and the orientation of its pane.
@@ -411,7 +414,7 @@ fn cell(
     if sample.scale == Scale::Assumed && note.is_empty() && pane.sensor(&sample.rig) == sample.rig.depth() {
         note = "assumed scale".into();
     }
-    Ok(Cell { picture, px_per_m, window, note })
+    Ok(Cell { picture, px_per_m, own_scale: false, window, note })
 }
 
 impl Figure {

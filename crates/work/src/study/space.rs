@@ -7,7 +7,6 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::figure::note;
 use crate::error::TaskError;
 use crate::feel::{Touch, feel};
 use crate::io::dataset::Dataset;
@@ -19,9 +18,11 @@ use crate::recipe::{Recipe, Stage};
 use crate::tool::load_tool;
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::units;
@@ -212,6 +213,11 @@ pub fn in_space(
         rig: sample.rig.clone(),
         note: notes.join(" · "),
     })
+}
+
+/// The line below a figure: what made its predictions.
+pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
+    format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }
 
 /// `measured 3.2° ± 0.5° (true 3.1°), joint`.

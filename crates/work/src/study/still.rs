@@ -113,6 +113,10 @@ pub fn still(
     let input = SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
     let pair = in_space(input, &sample, setup.pane.sides(), cx)?;
     let frames = setup.turntable.unwrap_or(1);
+    if setup.turntable.is_some() {
+        std::fs::create_dir_all(out)
+            .map_err(|err| TaskError::new(WHAT, format!("cannot make the folder: {err} ({})", out.display())))?;
+    }
     let size_px = [setup.width_px; 2];
     let mut done = StillFiles { files: Vec::new(), size_px, px_per_mm: 0.0, note: pair.note.clone() };
     for frame in 0..frames {
@@ -266,8 +270,8 @@ mod tests {
     fn a_turntable_is_numbered_frames_all_around() {
         let folder = tempfile::tempdir().unwrap();
         let setup = StillSetup { turntable: Some(4), width_px: 64, ..setup() };
-        let done =
-            still(&Dataset::demo(), &setup, &Models::new(None), &Plain, folder.path(), &JobCx::unwatched()).unwrap();
+        let new = folder.path().join("frames");
+        let done = still(&Dataset::demo(), &setup, &Models::new(None), &Plain, &new, &JobCx::unwatched()).unwrap();
         let colors = done.files.iter().map(|file| image::open(file).unwrap().into_rgba8().get_pixel(32, 40).0[0]);
         assert_eq!(colors.collect::<Vec<_>>(), [0, 63, 127, 191]);
         assert!(done.files[3].ends_with("frame_0004.png"));

@@ -216,6 +216,6 @@ pub(super) fn uncertainty(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesIte
         name: "uncertainty".into(),
         revision,
         segments: segments.into(),
-        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 2.0, opacity: 1.0, overlay: true },
+        style: LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.2, opacity: 0.9, overlay: true },
     })
 }

@@ -165,7 +165,8 @@ impl FigureLayout {
                     let place =
                         [corner[0] + (WIDE - w * fit) / 2.0, corner[1] + (high - h * fit) / 2.0, w * fit, h * fit];
                     laid.place = place;
-                    laid.scale_bar = cell.px_per_m.filter(|_| y == 0).and_then(|px| scale_bar(px * fit * 1e-3));
+                    laid.scale_bar =
+                        cell.px_per_m.filter(|_| y == 0 || cell.own_scale).and_then(|px| scale_bar(px * fit * 1e-3));
                     laid.window = cell.window.map(|[cx, cy, w, h]| {
                         let at = |center: f64, half: f64, from: f64| from + (center + 0.5 + half) * fit;
                         [
