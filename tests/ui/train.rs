@@ -93,7 +93,8 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
     rig.harness.get_by_label_contains("no mask was corrected or accepted");
     rig.harness.get_by_label("Take masks from CAD");
     rig.shoot("train-nothing");
-    // Done on a right automatic mask accepts it.
+    // Done on a right automatic mask accepts it, on both fingers where both are looked at.
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     for pair in 0..2 {
         rig.send(LibraryCommand::Select(PairId(pair)));
         rig.send(LibraryCommand::DoneAndNext);
@@ -106,6 +107,7 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
         assert_eq!((stored.review, stored.masks.len()), (Review::Done, 2), "{name}");
         assert!(stored.masks.values().all(|mask| mask.base().starts_with("Accepted")), "{name}");
     }
+    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
     rig.harness.get_by_label_contains(
         "all pairs with masks to learn from are kept for tests by the data set (2 pairs, 4 masks)",
     );
@@ -115,7 +117,8 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
     assert!(rig.harness.state().state().train.form.choice.test_in_train);
     rig.harness.get_by_label_contains("to learn from: 2 masks of 1 pair");
     rig.shoot("train-cured");
-    // One undo takes mark and masks back.
+    // One undo takes mark and masks back, where they are looked at.
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(LibraryCommand::Select(PairId(0)));
     rig.send(LabelsCommand::Undo);
     let stored = labels.load(&names[0]).unwrap();

@@ -64,19 +64,16 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 }
 
 /// Title of what is open.
-fn title(cx: &mut Cx<'_>, ui: &mut Ui) {
+fn title(cx: &Cx<'_>, ui: &mut Ui) {
     let library = &cx.state.library;
     let title = match (&library.opening, &library.open) {
         (Some(place), _) => format!("Opening {place}…"),
         (None, Some(open)) => open.source.title().to_owned(),
         (None, None) => return,
     };
-    let about = Action::AboutData;
-    let link = egui::Link::new(RichText::new(&title).color(cx.p.strong));
-    let link = ui.add_enabled(about.command(cx.state).is_some(), link);
-    if link.on_hover_text(format!("{title}. {}", cx.keys().help(about))).clicked() {
-        cx.act(about);
-    }
+    let label = egui::Label::new(RichText::new(&title).color(cx.p.strong)).truncate();
+    ui.add(label)
+        .on_hover_text(format!("{title}. The menu Open has others, and says what this is; or drop a folder here"));
 }
 
 fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {

@@ -82,6 +82,9 @@ fn sign(tool: MaskTool) -> Icon {
     }
 }
 
+/// Height of a line that may have a number to drag or none, points: what lies below stays where it is.
+const LINE: f32 = 24.0;
+
 /// The tools in a row; below them the number of the one in hand, and the way back.
 fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
     const GAP: f32 = 2.0;
@@ -102,7 +105,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
     });
     ui.horizontal(|ui| {
-        ui.set_height(22.0);
+        ui.set_height(LINE);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             ui.spacing_mut().item_spacing.x = GAP;
             undo(cx, ui);
@@ -168,7 +171,7 @@ fn undo(cx: &mut Cx<'_>, ui: &mut Ui) {
         let button = icon::Button { icon, key: "", name: action.name(), enabled, on: false };
         let what = what.map_or(String::new(), |what| format!(" {what}"));
         let tip = cx.keys().behind(&format!("{}{what}", action.name()), action);
-        if button.show(ui, vec2(24.0, 22.0)).on_hover_text(tip).clicked() {
+        if button.show(ui, vec2(24.0, LINE)).on_hover_text(tip).clicked() {
             cx.act(action);
         }
     }

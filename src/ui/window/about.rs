@@ -52,7 +52,7 @@ pub(crate) fn panel(cx: &mut Cx<'_>, ctx: &egui::Context) {
             ui.add_space(4.0);
             let mut always = cx.state.settings.about_own_data;
             let tick = ui.checkbox(&mut always, caption("open this with every folder of my own", cx.p));
-            let tip = "It is in the menu of the list's title and in the palette, too: About this data";
+            let tip = "It is in the menus of Open and of the list and in the palette, too: About this data";
             if tick.on_hover_text(tip).changed() {
                 cx.push(prefer(move |s| s.about_own_data = always));
             }

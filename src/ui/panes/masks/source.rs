@@ -5,7 +5,7 @@ use crate::app::settings::prefer;
 use eframe::egui::{self, RichText, Slider, Ui};
 use strum::IntoEnumIterator as _;
 
-use super::slider_mm;
+use super::{LINE, slider_mm};
 use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{MaskChoice, MaskSettings, MaskSource, ProposalSource};
@@ -22,7 +22,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings.mask;
     let mut new = settings.clone();
     ui.horizontal(|ui| {
-        ui.set_height(22.0);
+        ui.set_height(LINE);
         ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
         number(ui, &mut new);
     });
