@@ -1,14 +1,16 @@
 //! The room of what is taken away: figures and pictures.
 
+mod column;
 mod command;
 mod setup;
 
 pub use super::keys::ImportForm;
 pub use super::state::export::{FigureForm, FigureRows, Output, StillAsked};
 pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
+pub(crate) use column::in_figure;
 pub use command::{equivalent, equivalent_words};
 pub(crate) use setup::{
-    CaseView, can_draw, case_setup, figure_recipes, figure_setup, in_figure, picture_setup, space_recipe, still_setup,
+    CaseView, can_draw, case_setup, figure_recipes, figure_setup, picture_setup, space_recipe, still_setup,
 };
 pub use setup::{PairExport, case_lacks, pair_export};
 

@@ -124,6 +124,7 @@ fn nothing_in_the_mask_pane_moves_under_the_pointer() {
         rig.send(prefer(move |s| s.mask.tool = tool));
         assert_eq!(place(&rig), before, "{tool:?}");
     }
+    rig.send(prefer(|s| s.mask.tool = MaskTool::Brush));
     let (finger, source) = (lab::RIGHT, ImprintSource::Measured);
     rig.send(LabelsCommand::BeginStroke { finger, source, at_px: [60.0, 40.0], erase: false });
     rig.send(LabelsCommand::StrokeTo([100.0, 60.0]));

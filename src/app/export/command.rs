@@ -8,6 +8,7 @@ use super::super::state::adapt::AdaptPairs;
 use super::super::state::library::Place;
 use super::super::state::settings::ColorMap;
 use super::super::{adapt, dial, recipe, results};
+use super::column::in_figure;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
@@ -56,8 +57,8 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
     };
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
-        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus) if super::in_figure(state, pane).is_some() => {
-            let shown = super::in_figure(state, pane)?;
+        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus) if in_figure(state, pane).is_some() => {
+            let shown = in_figure(state, pane)?;
             let both = state.selection.both_fingers;
             let range = state.settings.range;
             let words = verb("figure")

@@ -7,11 +7,12 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
-use super::super::pane::{Kind, Pane};
+use super::super::pane::Pane;
 use super::super::state::State;
 use super::super::state::export::{FigureRows, StillAsked};
-use super::super::state::settings::{GelView, Settings};
+use super::super::state::settings::Settings;
 use super::super::{recipe, results};
+use super::column::in_figure;
 use super::command::recipe_shown;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
@@ -21,7 +22,7 @@ use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigurePane, FigureSetup, FigureTheme, note};
+use touch2touch_work::figure::{FigureSetup, FigureTheme, note};
 use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
@@ -115,22 +116,6 @@ pub(crate) fn figure_setup(state: &State) -> FigureSetup {
     let fingers = if form.both_fingers { state.rig().pad_list() } else { vec![state.selection.finger] };
     let look = state.settings.figure_look(form.panes.clone(), form.error_m, form.theme, f64::from(form.scale));
     with_note(state, FigureSetup { pairs, fingers, shift: state.settings.shift, look, note: String::new() })
-}
-
-/// The column of a figure that shows the same as a pane; `None` of panes that are no pictures.
-pub(crate) fn in_figure(state: &State, pane: Pane) -> Option<FigurePane> {
-    let settings = &state.settings;
-    Some(match pane.kind() {
-        Kind::Color => match settings.gel {
-            GelView::Difference => FigurePane::GelSlim,
-            GelView::Raw => FigurePane::Raw,
-            GelView::Reference => FigurePane::Reference,
-        },
-        Kind::Imprint(ImprintSource::Measured) => FigurePane::Measured,
-        Kind::Imprint(ImprintSource::Predicted) => FigurePane::Predicted,
-        Kind::Versus if settings.compared().is_error() => FigurePane::Error,
-        _ => return None,
-    })
 }
 
 /// One pane of the selected pair, with the fingers that it shows.
