@@ -184,10 +184,17 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     });
     memory.hovered = None;
     let sides = sides_shown(cx.state);
+    // The pose in hand stands below the pictures, not on them, and has the width of all.
+    let in_hand = sides.iter().copied().find(|side| hands::strip_height(cx.state, *side) > 0.0);
+    let footer = in_hand.map_or(0.0, |side| hands::strip_height(cx.state, side).min(area.height() / 2.0));
+    let (area, foot) = area.split_top_bottom_at_y(area.bottom() - footer);
     for (side, place) in sides.iter().zip(beside(area, sides.len())) {
         let mut child = ui.new_child(UiBuilder::new().max_rect(place).id_salt(("view", *side as usize)));
         child.set_clip_rect(place.intersect(ui.clip_rect()));
         one_side(cx, &mut child, memory, *side, sides.first() == Some(side));
+    }
+    if let Some(side) = in_hand {
+        hands::strip(cx, ui, side, foot);
     }
     strip::show(cx, ui, column);
 }
@@ -256,12 +263,7 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         (false, _) if memory.gizmo.holds(source) => Grip::Primary,
         (false, _) => Grip::Nothing,
     };
-    // The strip of the pose in hand and the line of the prediction stand below the picture, not on it.
-    let area = ui.available_rect_before_wrap();
-    let (area, made) = made_with::split(cx, area, source == ImprintSource::Predicted);
-    let footer = hands::strip_height(cx.state, source).min(area.height() / 2.0);
-    let picture = area.with_max_y(area.bottom() - footer);
-    let strip = picture.with_min_y(picture.bottom()).with_max_y(area.bottom());
+    let (picture, made) = made_with::split(cx, ui.available_rect_before_wrap(), source == ImprintSource::Predicted);
     let builder = UiBuilder::new().max_rect(picture);
     let output = ui.scope_builder(builder, |ui| memory.views[source as usize].interact(ui, label, held)).inner;
     if output.pointer.is_some() {
@@ -309,7 +311,6 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
     let rect = output.response.rect;
     measure::marks(cx, ui, memory, source, &output);
     gizmo::show(cx, ui, memory, source, &output);
-    hands::strip(cx, ui, source, strip);
     if let Some(clouds) = lookup.shown() {
         draw::show(cx, ui, memory, source, &output, clouds);
     }

@@ -309,8 +309,10 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     let histogram = picture.histogram.clone();
     over(cx, &output, versus, finger);
     let light = Color32::from_gray(235);
-    output.caption(Align2::LEFT_TOP, &format!("{} minus {}", versus.a.label(), versus.b.label()), light);
-    output.caption(Align2::LEFT_BOTTOM, &finger_text(cx.state, finger), light);
+    // In a narrow pane the corners at the bottom have room for one line.
+    let finger_text = finger_text(cx.state, finger).to_lowercase();
+    let text = format!("{} minus {}, {finger_text}", versus.a.label(), versus.b.label());
+    output.caption(Align2::LEFT_TOP, &text, light);
     output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
     let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
     let split = compared.split.map(|s| format!(": seen {}, invented {}", part(s.seen.mae), part(s.invented.mae)));

@@ -1,7 +1,8 @@
 //! The line below each pane that shows a prediction: model, steps and seed; and where the settings in force would make
 //! another one, that it is so, and the way to the new one.
 
-use eframe::egui::{Align2, Button, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
+use eframe::egui::text::{LayoutJob, TextWrapping};
+use eframe::egui::{Button, FontId, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use super::cx::Cx;
 use super::theme::SMALL;
@@ -84,8 +85,11 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
     // Names are long, and differ at their ends.
     let left = (room.width() - 12.0 - width(lead) - width(&settings)).max(40.0);
     let shown = format!("{lead}{}{settings}", cut_in_the_middle(model, left, width));
-    let start = room.left_center() + vec2(6.0, 0.0);
-    painter.text(start, Align2::LEFT_CENTER, shown, FontId::proportional(SMALL), color);
+    let mut job = LayoutJob::simple_singleline(shown, FontId::proportional(SMALL), color);
+    job.wrap = TextWrapping::truncate_at_width(room.width() - 8.0);
+    let galley = painter.layout_job(job);
+    let start = room.left_center() + vec2(6.0, -0.5 * galley.size().y);
+    painter.galley(start, galley, color);
     let response = ui.interact(room, ui.scope_id().with((title, "made with")), Sense::hover());
     response.widget_info(|| eframe::egui::WidgetInfo::labeled(eframe::egui::Role::Label, true, &text));
     response.on_hover_text(format!("{text}. {tip}"));

@@ -36,7 +36,7 @@ fn shares(workspace: Workspace) -> Shares {
         Workspace::Align => Shares {
             columns: [0.13, 0.64, 0.23],
             middle: [1.2, 0.8],
-            top: [1.7, 1.0, 1.0],
+            top: [1.45, 1.0, 1.0],
             right: [1.2, 0.8],
             ..shares
         },
