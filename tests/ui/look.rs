@@ -34,7 +34,7 @@ fn every_workspace_draws_in_both_themes() {
     rig.send(PredictCommand::Generate);
     for theme in [Theme::Dark, Theme::Light] {
         rig.send(prefer(move |s| s.theme = theme));
-        for workspace in [Workspace::Inspect, Workspace::Align, Workspace::Label, Workspace::Evaluate] {
+        for workspace in Workspace::iter() {
             rig.send(prefer(move |s| s.workspace = workspace));
             rig.shoot(&format!("test-{}-{theme:?}", workspace.name()).to_lowercase());
             let image = rig.harness.render().unwrap();
@@ -116,6 +116,8 @@ fn pictures_for_the_docs() {
             rig.send(PredictCommand::Generate);
         }
         rig.shoot(&format!("{name}-demo-evaluate"));
+        rig.send(prefer(|s| s.workspace = Workspace::Adapt));
+        rig.shoot(&format!("{name}-demo-adapt"));
         rig.send(prefer(|s| s.theme = Theme::Light));
         rig.send(prefer(|s| s.workspace = Workspace::Inspect));
         rig.shoot(&format!("{name}-demo-light"));

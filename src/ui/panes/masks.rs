@@ -179,18 +179,18 @@ fn undo(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// Room for two lines about what was done last: the proposal where one is shown, else the effect of the last change.
 fn said(cx: &Cx<'_>, ui: &mut Ui) {
-    const LINES: f32 = 30.0;
+    const LINES: f32 = 28.0;
     let size = vec2(ui.available_width(), LINES);
     let (place, _) = ui.allocate_exact_size(size, egui::Sense::hover());
-    ui.scope_builder(egui::UiBuilder::new().max_rect(place), |ui| {
-        ui.set_clip_rect(place.intersect(ui.clip_rect()));
-        ui.spacing_mut().item_spacing.y = 0.0;
-        if results::proposes(cx.state) {
-            source::said(cx, ui);
-        } else {
-            effect(cx, ui);
-        }
-    });
+    // A child of its own: what it holds does not move what lies below.
+    let mut ui = ui.new_child(egui::UiBuilder::new().max_rect(place));
+    ui.set_clip_rect(place.intersect(ui.clip_rect()));
+    ui.spacing_mut().item_spacing.y = 0.0;
+    if results::proposes(cx.state) {
+        source::said(cx, &mut ui);
+    } else {
+        effect(cx, &mut ui);
+    }
 }
 
 fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
@@ -379,7 +379,7 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = 4.0;
         let text = RichText::new(current.name()).color(review_color(cx.p, current));
         ui.add_enabled_ui(editable, |ui| {
-            let combo = egui::ComboBox::from_id_salt("review").width(84.0).selected_text(text);
+            let combo = egui::ComboBox::from_id_salt("review").width(100.0).selected_text(text).truncate();
             let response = combo.show_ui(ui, |ui| {
                 for review in Review::iter() {
                     if ui.selectable_label(review == current, review.name()).clicked() {

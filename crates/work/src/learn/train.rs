@@ -262,7 +262,7 @@ impl TrainPlan {
         let mut hint = hint.to_owned();
         if cure == Some(TrainCure::FromCad) {
             hint += &format!(
-                " Or take masks from the CAD models at the true poses (--from cad), where {} may have them.",
+                " Or take masks from the CAD models at the true poses, where {} may have them.",
                 pairs(self.by_cad)
             );
         }
