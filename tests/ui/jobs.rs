@@ -1,19 +1,19 @@
-//! Jobs of a working day by clicks and keys, with the actions that they take. None may take more than eight.
+//! Jobs of a working day by clicks and keys, with the actions that they may take.
 
 use eframe::egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::labels::Review;
 use touch2touch::app::results;
-use touch2touch::app::settings::prefer;
+use touch2touch::app::settings::{Workspace, prefer};
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
+use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::labels::Labels;
 use touch2touch_work::subject::Subject;
 
 use super::rig::Rig;
-
-/// The most actions that a job may take.
-const MOST: usize = 8;
 
 /// A person at work: each click and each key is one action.
 struct Person {
@@ -59,7 +59,6 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     let shown = results::chosen(person.state(), lab::RIGHT).expect("a prediction").bundle.clone();
     let shown = person.state().library.bundle(&shown).unwrap().name.clone();
     let other = models.into_iter().find(|name| *name != shown).expect("a second generator");
-    person.click("Compare");
     person.click("B: Measured");
     person.click(&other);
     let versus = person.state().settings.compared();
@@ -68,7 +67,7 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     let found =
         results::subjects_compared(person.state(), &versus.a, &versus.b, lab::RIGHT).ready().expect("the figures");
     assert!(found.mae_m > 0.0);
-    assert!(person.actions <= MOST, "{} actions", person.actions);
+    assert!(person.actions <= 3, "{} actions", person.actions);
     person.rig.shoot("job-two-models");
 }
 
@@ -107,5 +106,23 @@ fn the_distance_between_the_model_and_the_tip_is_read() {
     person.actions += 1;
     assert!(read.len() > 5, "the status bar says the distance of the point under the pointer");
     assert!(read.iter().any(|apart| *apart < 0.006), "to the digits that are shown: {read:?}");
-    assert!(person.actions <= MOST, "{} actions", person.actions);
+    assert!(person.actions <= 2, "{} actions", person.actions);
+}
+
+#[test]
+fn ten_right_masks_take_one_action_each() {
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 5) else { return };
+    rig.send(prefer(|s| (s.hint_dismissed, s.workspace) = (true, Workspace::Label)));
+    for _ in 0..10 {
+        rig.harness.key_press_modifiers(Modifiers::CTRL, Key::Enter);
+        rig.harness.step();
+        rig.settle();
+    }
+    let state = rig.harness.state().state();
+    assert_eq!(state.document.reviews.values().filter(|review| **review == Review::Done).count(), 10);
+    let labels = Labels::of(&Dataset::open(&rig.data).unwrap());
+    for pair in state.library.pairs() {
+        let masks = labels.load(&pair.name).unwrap().masks;
+        assert!(masks.len() == 2 && masks.values().all(|mask| mask.base().starts_with("Accepted")), "{}", pair.name);
+    }
 }
