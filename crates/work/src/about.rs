@@ -1,5 +1,5 @@
 //! Facts about a data set for whoever opens it: sensors, pairs, tools, depths, labels, faults, and the worth of the models
-//! on a sample of it ([`worth`]); each with what would better it ([`Cure`]). The verb `doctor` and the studio's panel say
+//! on a sample of it ([`worth()`]); each with what would better it ([`Cure`]). The verb `doctor` and the studio's panel say
 //! the same lines.
 
 mod cure;
