@@ -43,16 +43,16 @@ pub(super) struct LayerColors {
 }
 
 impl LayerColors {
-    /// Counts of contact points by distance, from one end of the color map to the other; those beyond are in the last
-    /// ones. `None` of what is not painted with distances.
+    /// Counts of contact points by distance, from one end of the color map to the other; those beyond are left out.
+    /// `None` of what is not painted with distances.
     pub(super) fn histogram(&self) -> Option<[usize; BARS]> {
         self.surface.as_ref()?;
         let mut counts = [0; BARS];
         for (_, colors) in self.fingers.entries() {
             let PointColors::Scalar(values) = colors else { continue };
-            for value in values.iter().filter(|value| value.is_finite()) {
+            for value in values.iter().filter(|value| (self.range.lo..self.range.hi).contains(value)) {
                 let share = (value - self.range.lo) / (self.range.hi - self.range.lo);
-                counts[((share * BARS as f32).max(0.0) as usize).min(BARS - 1)] += 1;
+                counts[((share * BARS as f32) as usize).min(BARS - 1)] += 1;
             }
         }
         Some(counts)
