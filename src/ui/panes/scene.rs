@@ -177,11 +177,15 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     let (area, column) = full.split_left_right_at_x((full.right() - strip::WIDTH).max(full.left()));
     let (head, area) = area.split_top_bottom_at_y((area.top() + HEAD).min(area.bottom()));
     ui.scope_builder(UiBuilder::new().max_rect(head.shrink2(vec2(4.0, 2.0))), |ui| {
-        ui.horizontal_centered(|ui| {
-            choose_sides(cx, ui);
-            section::bar(cx, ui);
-        });
+        ui.horizontal_centered(|ui| choose_sides(cx, ui));
     });
+    // What cuts has a row of its own: in a narrow pane there is none to share.
+    let cut = if section::is_shown(cx.state) { HEAD } else { 0.0 };
+    let (bar, area) = area.split_top_bottom_at_y((area.top() + cut).min(area.bottom()));
+    if cut > 0.0 {
+        let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("section"));
+        section::bar(cx, &mut ui);
+    }
     memory.hovered = None;
     let sides = sides_shown(cx.state);
     // The pose in hand stands below the pictures, not on them, and has the width of all.

@@ -247,6 +247,11 @@ impl DrawnMask {
         self.marks.base().text()
     }
 
+    /// True where a person said of an automatic mask that it is right, and drew nothing.
+    pub(crate) fn is_merely_accepted(&self) -> bool {
+        !self.marks.has_hand_work() && matches!(self.marks.base(), Provenance::Accepted { .. })
+    }
+
     /// The pixels of which it says nothing: those that are ignored, and with `manual_checked` all that no person painted.
     pub fn unsaid(&self, manual_checked: bool) -> Option<Mask> {
         let ignored = self.marks.ignored();

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::agreement::{Compared, compare_labels};
-use super::labels::{Labels, Record, Review, working_seconds};
+use super::labels::{DrawnMask, Labels, PairLabels, Record, Review, working_seconds};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::io::digest::sha256;
@@ -91,7 +91,15 @@ pub fn repeats(
     let done = done.filter_map(|(pair, records)| Some((done_at(records, person)?, pair.clone()))).collect();
     let mut out = Repeats { masks: Vec::new(), due: due(done, &repeated, person, share) };
     for compared in compare_labels(dataset, labels, &again)?.masks {
-        if repeated.get(&compared.pair) == Some(&Review::Done) {
+        if repeated.get(&compared.pair) != Some(&Review::Done) {
+            continue;
+        }
+        let [first, second] = [labels.load(&compared.pair)?, again.load(&compared.pair)?];
+        let pad = dataset.rig.pad_of_key(&compared.finger);
+        let accepted =
+            |of: &PairLabels| pad.and_then(|pad| of.measured(pad)).is_some_and(DrawnMask::is_merely_accepted);
+        // The same automatic mask accepted twice says nothing about how far one agrees with oneself.
+        if !(accepted(&first) && accepted(&second)) {
             let first = journals.get(&compared.pair).map_or(0, |records| working_seconds(records));
             let second = working_seconds(&again.records(&compared.pair)?);
             out.masks.push(Repeat { compared, seconds: [first, second] });

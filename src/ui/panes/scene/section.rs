@@ -5,18 +5,21 @@ use eframe::egui::{Button, RichText, Slider, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::command::Command;
+use crate::app::state::State;
 use crate::app::workbench::{SECTION_REACH_M, Section, SectionAxis, WorkbenchCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use touch2touch_core::units;
 
-/// What cuts all views, while a plane does or only the window is shown.
+/// True where a plane cuts the views, or only the window is shown.
+pub(super) fn is_shown(state: &State) -> bool {
+    state.workbench.section.is_some() || state.settings.scene.only_window
+}
+
+/// What cuts all views, and the way back.
 pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui) {
     let only_window = cx.state.settings.scene.only_window;
     let section = cx.state.workbench.section;
-    if section.is_none() && !only_window {
-        return;
-    }
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.add_space(4.0);
