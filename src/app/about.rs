@@ -108,7 +108,7 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
     }
 }
 
-/// What is started in its place must not wait for it.
+/// Ends the trial of the models: something else takes its place and must not wait for it.
 fn stop_trying(state: &mut State, effects: &mut Vec<Effect>) {
     if let Some((ticket, _)) = state.tasks.of_kind(TaskKind::TryModels) {
         tasks::step(state, tasks::TasksCommand::Cancel(ticket), effects);

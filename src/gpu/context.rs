@@ -9,7 +9,7 @@ use super::{GpuError, wgpu};
 pub const COLOR_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 /// Depth is reversed (1 near, 0 far); the stencil says where something solid was drawn, so that a veil before it is thin.
 pub(crate) const DEPTH_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Depth24PlusStencil8;
-/// What a shadow is made of: the share of each pixel that lies in it.
+/// Texels of a shadow: the share of each pixel that lies in it.
 pub(super) const SHADOW_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::R8Unorm;
 
 /// A device with its queue, and what the renderer needs to know about them. Cheap to clone.

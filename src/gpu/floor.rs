@@ -12,7 +12,7 @@ use super::{Gpu, wgpu};
 /// A floor to be shown.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Floor {
-    /// Its middle, meters, world; it is level.
+    /// The middle, meters, world; the floor is level.
     pub center: DVec3,
     /// Half its width, meters.
     pub reach_m: f64,

@@ -52,7 +52,7 @@ pub enum Look {
     Solid,
     /// Lets all of them through; its rim is stronger than its faces.
     XRay,
-    /// Its nearest layer alone, see-through; thin before something solid.
+    /// The nearest layer alone, see-through; thin before something solid.
     Veil,
     /// No faces: [`MeshStyle::edges`] alone, faint where something is in front.
     Outline,

@@ -1,4 +1,4 @@
-//! What makes a 3D picture worth a page: dashes, veils, shadows, grounds, parts and samples.
+//! The looks of a 3D picture worth a page: dashes, veils, shadows, grounds, parts and samples.
 
 use super::*;
 use touch2touch::gpu::floor::Floor;

@@ -17,7 +17,7 @@ use super::rig::Rig;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
-/// What a pointer can press, drag or type into.
+/// True of a role that a pointer can press, drag or type into.
 fn is_control(role: Role) -> bool {
     matches!(
         role,

@@ -81,7 +81,7 @@ pub enum Grade {
 pub struct Fact {
     /// Subject.
     pub topic: Topic,
-    /// What there is to say, in words with units.
+    /// Words of it, with units.
     pub text: String,
     /// Degree to which it should trouble somebody.
     pub grade: Grade,

@@ -47,7 +47,7 @@ pub struct AdaptState {
     pub result: Option<Arc<Adapted>>,
     /// The bundle of the result.
     pub bundle: Option<Arc<str>>,
-    /// How far a fit was when it was told to stop: the same goes on from there.
+    /// Progress of a fit that was told to stop: the same goes on from there.
     pub stopped: Option<String>,
 }
 

@@ -61,6 +61,6 @@ pub struct TrainState {
     pub result: Option<Arc<Trained>>,
     /// The bundle of the result.
     pub bundle: Option<Arc<str>>,
-    /// How far a training was when it was told to stop: the same goes on from there.
+    /// Progress of a training that was told to stop: the same goes on from there.
     pub stopped: Option<String>,
 }

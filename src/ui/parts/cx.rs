@@ -82,6 +82,17 @@ impl Cx<'_> {
         response
     }
 
+    /// A row of a menu for an action, with its key behind the name; `on` marks what is in force.
+    pub(crate) fn menu_row(&mut self, ui: &mut Ui, action: Action, on: bool) -> Response {
+        let button = egui::Button::new(action.name()).shortcut_text(self.keys().text(action)).selected(on);
+        let response = ui.add_enabled(action.command(self.state).is_some(), button).accessible_name(action.name());
+        let response = response.on_hover_text(action.tooltip());
+        if response.clicked() {
+            self.act(action);
+        }
+        response
+    }
+
     /// Progress of a task, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
     /// stopping keeps.
     pub(crate) fn stoppable(

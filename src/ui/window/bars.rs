@@ -81,13 +81,8 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
             Action::Reload,
             Action::Follow,
         ] {
-            let keys = cx.keys().text(action);
             let on = action == Action::Follow && cx.state.library.follow.is_some();
-            let button = egui::Button::new(action.name()).shortcut_text(keys).selected(on);
-            let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
-            if response.on_hover_text(action.tooltip()).clicked() {
-                cx.act(action);
-            }
+            cx.menu_row(ui, action, on);
         }
     });
     response.on_hover_text("Open a data set, export and import masks, train on them");

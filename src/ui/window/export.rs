@@ -242,20 +242,9 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         None if pane.is_of_pair() => &[Action::ExportMeasured, Action::ExportPredicted],
         None => &[],
     };
-    for action in [Action::Figure].iter().chain(sides).chain(&[Action::SaveCase]).copied() {
-        let keys = cx.keys().text(action);
-        let button = egui::Button::new(action.name()).shortcut_text(keys);
-        let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
-        if response.on_hover_text(action.tooltip()).clicked() {
-            cx.act(action);
-            ui.close();
-        }
-    }
-    if matches!(pane, Pane::Results | Pane::Table) {
-        let action = Action::ExportTable;
-        let button = ui.add_enabled(action.command(cx.state).is_some(), egui::Button::new(action.name()));
-        if button.on_hover_text(action.tooltip()).clicked() {
-            cx.act(action);
+    let table: &[Action] = if matches!(pane, Pane::Results | Pane::Table) { &[Action::ExportTable] } else { &[] };
+    for action in [Action::Figure].iter().chain(sides).chain(&[Action::SaveCase]).chain(table).copied() {
+        if cx.menu_row(ui, action, false).clicked() {
             ui.close();
         }
     }

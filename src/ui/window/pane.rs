@@ -107,13 +107,8 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
         *maximized = if whole { None } else { Some(pane) };
         ui.close();
     }
-    if pane == Pane::Browser {
-        let about = Action::AboutData;
-        let button = ui.add_enabled(about.command(cx.state).is_some(), egui::Button::new(about.name()));
-        if button.on_hover_text(about.tooltip()).clicked() {
-            cx.act(about);
-            ui.close();
-        }
+    if pane == Pane::Browser && cx.menu_row(ui, Action::AboutData, false).clicked() {
+        ui.close();
     }
     let controls = controls(cx, pane);
     if !controls.is_empty() {

@@ -1,4 +1,4 @@
-//! Where masks come from, in one list: the automatic sources, in force where nothing is drawn, and what is only proposed.
+//! Sources of masks, in one list: the automatic ones, in force where nothing is drawn, and what is only proposed.
 
 use crate::app::results;
 use crate::app::settings::prefer;

@@ -40,23 +40,21 @@ pub(super) struct LayerColors {
     fingers: PerPad<PointColors>,
     /// Of distances: the model's painted surface, and the pose that it is of.
     surface: Option<(Arc<TriMesh>, Arc<[f32]>, DAffine3)>,
+    /// Of distances: the contact points by distance, along the range.
+    pub histogram: Option<[usize; BARS]>,
 }
 
-impl LayerColors {
-    /// Counts of contact points by distance, from one end of the color map to the other; those beyond are left out.
-    /// `None` of what is not painted with distances.
-    pub(super) fn histogram(&self) -> Option<[usize; BARS]> {
-        self.surface.as_ref()?;
-        let mut counts = [0; BARS];
-        for (_, colors) in self.fingers.entries() {
-            let PointColors::Scalar(values) = colors else { continue };
-            for value in values.iter().filter(|value| (self.range.lo..self.range.hi).contains(value)) {
-                let share = (value - self.range.lo) / (self.range.hi - self.range.lo);
-                counts[((share * BARS as f32) as usize).min(BARS - 1)] += 1;
-            }
+/// Counts of values from one end of a range to the other; those beyond, and those that are no numbers, are left out.
+fn counted(points: &PerPad<PointColors>, range: Range) -> [usize; BARS] {
+    let mut counts = [0; BARS];
+    for (_, colors) in points.entries() {
+        let PointColors::Scalar(values) = colors else { continue };
+        for value in values.iter().filter(|value| (range.lo..range.hi).contains(value)) {
+            let share = (value - range.lo) / (range.hi - range.lo);
+            counts[((share * BARS as f32) as usize).min(BARS - 1)] += 1;
         }
-        Some(counts)
     }
+    counts
 }
 
 /// The colors of distances: blue inside, red outside.
@@ -91,6 +89,7 @@ pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         range: Range { lo: 0.0, hi: layers.range_m as f32 },
         fingers: layers.fits.as_ref().map(|fits| fits.map(colors)),
         surface: None,
+        histogram: None,
     });
 }
 
@@ -106,20 +105,19 @@ fn update_distances(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     let (key, reach) = ((key, Layer::Distance), cx.state.settings.scene.distance_m);
     let range = Range { lo: -reach, hi: reach };
     if let Some(held) = held.as_mut().filter(|h| h.key == key) {
-        held.range = range;
+        if held.range != range {
+            held.range = range;
+            held.histogram = Some(counted(&held.fingers, range));
+        }
         return;
     }
     let painted = &deviation.surface;
     let surface =
         (Arc::new(painted.mesh.clone()), painted.values.as_slice().into(), deviation.grasp_from_object.to_affine());
     memory.revision += 1;
-    *held = Some(LayerColors {
-        key,
-        revision: memory.revision,
-        range,
-        fingers: deviation.points.as_ref().map(|points| points.map(|d| PointColors::Scalar(d.as_slice().into()))),
-        surface: Some(surface),
-    });
+    let fingers = deviation.points.as_ref().map(|points| points.map(|d| PointColors::Scalar(d.as_slice().into())));
+    let histogram = Some(counted(&fingers, range));
+    *held = Some(LayerColors { key, revision: memory.revision, range, fingers, surface: Some(surface), histogram });
 }
 
 /// Paints the model with its distances to the contact points, where it stands at the pose that they are of.

@@ -106,10 +106,10 @@ fn unfolded(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
     });
 }
 
-/// How many contact points have which distance, above the bar of their colors.
+/// Histogram of the contact points by distance, above the bar of their colors.
 fn histogram(cx: &Cx<'_>, painter: &Painter, memory: &Memory, source: ImprintSource, rect: Rect) {
     const HIGH: f32 = 26.0;
-    let Some(counts) = memory.layer_colors[source as usize].as_ref().and_then(|colors| colors.histogram()) else {
+    let Some(counts) = memory.layer_colors[source as usize].as_ref().and_then(|colors| colors.histogram) else {
         return;
     };
     let (bar, most) = (bar(rect), counts.iter().copied().max().unwrap_or(0).max(1) as f32);

@@ -16,7 +16,7 @@ pub(super) fn is_shown(state: &State) -> bool {
     state.workbench.section.is_some() || state.settings.scene.only_window
 }
 
-/// What cuts all views, and the way back.
+/// The plane that cuts all views, and the way back.
 pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui) {
     let only_window = cx.state.settings.scene.only_window;
     let section = cx.state.workbench.section;

@@ -1,6 +1,6 @@
 //! The strip beside the 3D views: views, what is shown, what is measured.
 
-use eframe::egui::{self, Button, Popup, PopupCloseBehavior, Rect, Ui, UiBuilder, vec2};
+use eframe::egui::{self, Popup, PopupCloseBehavior, Rect, Ui, UiBuilder, vec2};
 use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
@@ -74,32 +74,24 @@ fn switch(cx: &mut Cx<'_>, ui: &mut Ui, icon: Icon, action: Action, on: bool) {
     }
 }
 
-/// A row of a menu for an action, with its key; `on` marks what is in force.
-fn row(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, on: bool) {
-    let button = Button::new(action.name()).shortcut_text(cx.keys().text(action)).selected(on);
-    let response = ui.add_enabled(action.command(cx.state).is_some(), button).accessible_name(action.name());
-    if response.on_hover_text(action.tooltip()).clicked() {
-        cx.act(action);
-    }
-}
-
-/// Where to look from.
+/// Menu of the places to look from.
 fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
     let button = sign(ui, icon::Button { icon: Icon::Views, key: "", name: "Views", enabled: true, on: false });
     let button = button.on_hover_text("Seven cameras, fit, parallel or in perspective");
     Popup::menu(&button).show(|ui| {
         ui.set_min_width(190.0);
         for action in VIEWS {
-            row(cx, ui, action, false);
+            cx.menu_row(ui, action, false);
         }
         ui.separator();
-        row(cx, ui, Action::Parallel, cx.state.settings.scene.orthographic);
-        row(cx, ui, Action::LinkCameras, cx.state.settings.cameras_linked);
-        row(cx, ui, Action::CopyCamera, false);
+        let settings = &cx.state.settings;
+        cx.menu_row(ui, Action::Parallel, settings.scene.orthographic);
+        cx.menu_row(ui, Action::LinkCameras, settings.cameras_linked);
+        cx.menu_row(ui, Action::CopyCamera, false);
     });
 }
 
-/// What is drawn, and what else the contact points can be painted with.
+/// Menu of the layers, and of what the contact points can be painted with.
 fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
     let painted = cx.state.workbench.layer;
     let on = !matches!(painted, Layer::None | Layer::Distance);
@@ -131,7 +123,7 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
             (Action::EyeDome, edl),
             (Action::AnimateWeakest, cx.state.workbench.animate_weakest),
         ] {
-            row(cx, ui, action, on);
+            cx.menu_row(ui, action, on);
         }
     });
 }

@@ -143,7 +143,7 @@ pub struct Button<'a> {
     pub icon: Icon,
     /// The key; empty without one.
     pub key: &'a str,
-    /// What a screen reader says.
+    /// The name that a screen reader says.
     pub name: &'a str,
     /// True where it can be pressed.
     pub enabled: bool,
