@@ -222,10 +222,18 @@ mod tests {
         module
     }
 
+    /// A shared part may call a function that its importers bring, so parts are tried inside the shaders that use them.
     #[test]
-    fn every_shader_is_valid() {
-        for (entry, _) in SHADERS {
+    fn every_shader_is_valid_and_every_part_is_in_one() {
+        let (parts, entries): (Vec<&str>, Vec<&str>) =
+            SHADERS.iter().map(|(path, _)| *path).partition(|path| path.starts_with("common/"));
+        let mut used: Vec<String> = Vec::new();
+        for entry in entries {
             validated(entry);
+            used.extend(resolve(SHADERS, entry).unwrap().files);
+        }
+        for part in parts {
+            assert!(used.iter().any(|file| file == part), "no shader imports {part}");
         }
     }
 
