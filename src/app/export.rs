@@ -10,7 +10,7 @@ pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 pub(crate) use column::in_figure;
 pub use command::{equivalent, equivalent_words};
 pub(crate) use setup::{
-    CaseView, can_draw, case_setup, figure_recipes, figure_setup, picture_setup, space_recipe, still_setup,
+    CaseView, can_draw, case_setup, compared, figure_recipes, figure_setup, picture_setup, space_recipe, still_setup,
 };
 pub use setup::{PairExport, case_lacks, pair_export};
 
@@ -33,9 +33,10 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::case;
+use touch2touch_work::depict::apart;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::ExportChoice;
-use touch2touch_work::figure::{FigureSetup, figure};
+use touch2touch_work::figure::{FigureMakers, FigurePane, FigureSetup, figure};
 use touch2touch_work::infer::bundle::Ends;
 use touch2touch_work::io::case_file;
 use touch2touch_work::job::JobCx;
@@ -225,12 +226,14 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
         Output::Still(asked) => {
             let Some((setup, open)) = still_setup(state, asked).zip(state.library.open.as_ref()) else { return };
             let source = open.source.clone();
-            let write = Write::new(Lane::Models, "Still", ended(file, "png"), move |file, access, cx| {
+            let file = if asked.turntable.is_none() { ended(file, "png") } else { file };
+            let write = Write::new(Lane::Models, "Still", file, move |file, access, cx| {
                 let drawer = spatial::stills()?;
                 let dataset = source.on_disk("Still")?;
                 let done = still(dataset, &setup, access.services.models(), &*drawer, &file, cx)?;
-                let [width, height] = done.size_px;
-                Ok((format!("Saved {} ({width} x {height} pixels)", file.display()), file))
+                let ([width, height], count) = (done.size_px, done.files.len());
+                let frames = if count == 1 { String::new() } else { format!("{count} frames of ") };
+                Ok((format!("Saved {} ({frames}{width} x {height} pixels)", file.display()), file))
             });
             tasks::start(state, "Draw the still", write, effects);
         }
@@ -252,6 +255,10 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
         return state.log.error(&TaskError::new(title, "no data set is open"));
     };
     let (recipes, space) = (figure_recipes(state, &setup), space_recipe(state, &setup));
+    let compared = match setup.look.panes.contains(&FigurePane::Compare).then(|| compared(state)).transpose() {
+        Ok(compared) => compared,
+        Err(why) => return state.log.error(&TaskError::new(title, why)),
+    };
     let write = Write::new(Lane::Models, "Figure", file, move |file, access, cx| {
         let predict = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| {
             let mut made = PerPad::default();
@@ -278,7 +285,12 @@ fn draw(state: &mut State, title: &str, setup: FigureSetup, file: PathBuf, effec
             let input = SpaceInput { dataset, pair, recipe, labels, models: access.services.models() };
             pictured(input, sample, view, by, cx)
         };
-        let written = figure(dataset, &setup, predict, in_space, cx)?.write(&file)?;
+        let apart = |pair: PairId, sample: &Arc<Sample>, cx: &JobCx| match &compared {
+            Some(compared) => apart(compared, (dataset, pair), sample, access.services.models(), cx),
+            None => Ok(PerPad::default()),
+        };
+        let makers = FigureMakers { predict, space: in_space, apart };
+        let written = figure(dataset, &setup, makers, cx)?.write(&file)?;
         let [width, height] = written.size_px;
         Ok((format!("Saved {} ({width} x {height} pixels)", file.display()), file))
     });

@@ -56,7 +56,7 @@ pub fn bundle(state: &State, kind: BundleKind) -> Result<&BundleInfo, Absent> {
     let (name, absent) = match kind {
         BundleKind::Generator => (state.settings.generate.bundle.as_deref(), Absent::NoGenerator),
         BundleKind::Mask => (state.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
-        BundleKind::Classifier => (None, Absent::NoClassifier),
+        BundleKind::Classifier | BundleKind::Features => (None, Absent::NoClassifier),
     };
     let rig = state.rig();
     let lacking = state.library.lacking.as_ref().is_some_and(|(_, lacking)| Some(&**lacking) == name);

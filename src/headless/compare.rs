@@ -1,6 +1,5 @@
 //! `touch2touch compare`: any two imprints of a pair against each other; the numbers behind the studio's Compare pane.
 
-use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -17,20 +16,17 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_core::rig::{PadId, PerPad, Text};
-use touch2touch_core::sample::Sample;
+use touch2touch_core::rig::Text;
 use touch2touch_core::units::{fixed, mm};
-use touch2touch_work::compare::{Comparison, Depicted, beside, between, tile_of};
+use touch2touch_work::compare::{Comparison, Depicted, between};
+use touch2touch_work::depict::{SubjectImprints, depict};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::fan::seeds_of;
-use touch2touch_work::feel::{Felt, Touch, feel};
+use touch2touch_work::feel::Touch;
 use touch2touch_work::io::npz;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::models::Models;
-use touch2touch_work::on_pad::OnPad;
 use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::Stage;
+use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::subject::{MadeFrom, Subject};
 use touch2touch_work::tool::load_tool;
 
@@ -129,68 +125,17 @@ struct Report {
     notes: Vec<Finding>,
 }
 
-/// A subject as this pair has it.
-struct Found {
-    felt: Felt,
-    tile: Option<DepthMap>,
-}
-
-impl Found {
-    fn depicted<'a>(
-        &'a self,
-        sample: &Sample,
-        pad: PadId,
-        tile: Option<&'a DepthMap>,
-    ) -> anyhow::Result<Option<Depicted<'a>>> {
-        let Some(imprint) = &self.felt.imprints[pad] else { return Ok(None) };
-        if let Some(own) = &self.tile {
-            return Ok(Some(Depicted { imprint, tile: Some(Cow::Borrowed(own)) }));
-        }
-        let drawn = self.felt.predictions[pad].as_ref().map(|made| (made, self.felt.recipe().shift));
-        Ok(Some(Depicted::predicted(imprint, drawn, sample, pad, tile)?))
-    }
-}
-
-/// Makes what a subject asks for.
-fn find(args: &CompareArgs, subject: &Subject, touch: Touch<'_>, models: &Models) -> anyhow::Result<Found> {
-    let Touch { dataset, pair, sample, .. } = touch;
-    let cx = JobCx::unwatched();
-    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
-    let made_from = subject.made_from(|generator| {
+/// Origin of a subject's imprint by these options.
+pub(super) fn made_from(
+    subject: &Subject,
+    model: &ModelArgs,
+    recipe: impl Fn(&ModelArgs) -> anyhow::Result<Recipe>,
+) -> anyhow::Result<MadeFrom> {
+    subject.made_from(|generator| {
         let own_mapping = subject.change().is_some_and(|change| change.shift.is_some());
-        let model = if own_mapping { args.model.without_mapping() } else { args.model.clone() };
-        let model = generator.map_or_else(|| model.clone(), |name| model.with_generator(name));
-        recipe(&model, ImprintSource::Predicted)
-    })?;
-    match made_from {
-        MadeFrom::Measurement => {
-            let recipe = recipe(&args.model, ImprintSource::Measured)?;
-            let tile = tile_of(dataset, pair, sample)?;
-            Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile })
-        }
-        MadeFrom::Picture => {
-            let recipe = recipe(&args.model, ImprintSource::Measured)?;
-            let found = beside(dataset, pair, sample)?;
-            let found = found.ok_or_else(|| anyhow::anyhow!("there is no NAME_vqvae.png beside this pair"))?;
-            // Picture pairs have one finger.
-            let pads = sample.rig.pads().map(|pad| sample.pad(pad).map(|_| found.imprint.clone()));
-            Ok(Found { felt: Felt::of_imprints(&recipe, pads.collect()), tile: Some(found.tile) })
-        }
-        MadeFrom::Prediction(recipe) => {
-            Ok(Found { felt: feel(touch, &recipe, Stage::Imprint, models, &cx)?, tile: None })
-        }
-        MadeFrom::Mean(recipes) => {
-            let recipe = recipes.first().ok_or_else(|| anyhow::anyhow!("{subject}: no seed is asked for"))?;
-            let mut imprints = PerPad::default();
-            for (pad, _) in sample.pads.entries() {
-                if recipe.generating()?.picture(sample, pad)?.is_some() {
-                    let made = seeds_of(OnPad { sample, pad }, recipe, recipes.len(), models, &cx)?;
-                    imprints[pad] = Some(made.ensemble.spread.mean);
-                }
-            }
-            Ok(Found { felt: Felt::of_imprints(recipe, imprints), tile: None })
-        }
-    }
+        let model = if own_mapping { model.without_mapping() } else { model.clone() };
+        recipe(&generator.map_or_else(|| model.clone(), |name| model.with_generator(name)))
+    })
 }
 
 pub(super) fn run(args: &CompareArgs) -> VerbResult {
@@ -211,14 +156,18 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let tool = tool.as_ref().map(|loaded| &loaded.model);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
     let models = args.model.models();
-    let found = [find(args, &args.a, touch, &models)?, find(args, &args.b, touch, &models)?];
-    let measured = find(args, &Subject::Measured, touch, &models)?;
+    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
+    let measuring = recipe(&args.model, ImprintSource::Measured)?;
+    let find = |subject: &Subject| -> anyhow::Result<SubjectImprints> {
+        let from = made_from(subject, &args.model, |model| recipe(model, ImprintSource::Predicted))?;
+        Ok(depict(&from, &measuring, touch, &models, &JobCx::unwatched())?)
+    };
+    let (found, measured) = ([find(&args.a)?, find(&args.b)?], find(&Subject::Measured)?);
     let tile = measured.tile.as_ref();
     let mut fingers = Vec::new();
     for pad in sample.rig.pads() {
-        let depicted = |found| Found::depicted(found, &sample, pad, tile);
-        let (Some(a), Some(b)) = (depicted(&found[0])?, depicted(&found[1])?) else { continue };
-        let truth = depicted(&measured)?;
+        let [a, b, truth] = [&found[0], &found[1], &measured].map(|found| found.of_pad(&sample, pad, tile));
+        let (Some(a), Some(b), truth) = (a?, b?, truth?) else { continue };
         let against = |subject: &Subject, of: &Depicted<'_>| -> anyhow::Result<Option<Figures>> {
             match &truth {
                 Some(truth) if *subject != Subject::Measured => Ok(Some((&between(of, truth, &sample, pad)?).into())),

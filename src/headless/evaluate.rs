@@ -14,6 +14,7 @@ use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
 use touch2touch_work::infer::bundle::{Bundle, Found, Origin, find_all};
+use touch2touch_work::infer::features::Preparation;
 use touch2touch_work::io::atomic;
 use touch2touch_work::models::Models;
 
@@ -31,6 +32,13 @@ pub(super) struct EvaluateArgs {
     /// The tool classifier's bundle (default: the first one found).
     #[arg(long)]
     classifier: Option<PathBuf>,
+    /// A feature extractor's bundle: the Fréchet distance is then a FID in its features, instead of those of the tool
+    /// classifier. `training/fid_features.py` makes one from the Inception weights that pytorch-fid uses.
+    #[arg(long, value_name = "DIR")]
+    features: Option<PathBuf>,
+    /// The pictures that it sees: `lab` (each imprint stretched on its own and compressed as a JPEG) or `plain`.
+    #[arg(long, value_parser = keyed::<Preparation>(), default_value = "lab", requires = "features")]
+    prepare: Preparation,
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
@@ -176,6 +184,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     Ok(Setup {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
+        features: args.features.as_ref().map(|folder| (Origin::from(folder), args.prepare)),
         recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime),
         steps: args.steps,
         seed: args.seed,

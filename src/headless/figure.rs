@@ -1,6 +1,7 @@
 //! `touch2touch figure`: pairs side by side, as a picture for a paper.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
@@ -8,6 +9,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
+use super::compare::made_from;
 use super::contact_mask::{MaskArgs, labels_of};
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
@@ -15,12 +17,17 @@ use crate::spatial;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
+use touch2touch_work::depict::{Compared, apart};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigureFile, FigureLook, FigurePane, FigureSetup, FigureTheme, figure, kind, note};
+use touch2touch_work::figure::{
+    FigureFile, FigureLook, FigureMakers, FigurePane, FigureSetup, FigureTheme, figure, kind, note,
+};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
+use touch2touch_work::subject::Subject;
 
 /// Arguments of `figure`.
 #[derive(Debug, Args)]
@@ -57,6 +64,12 @@ pub(super) struct FigureArgs {
     /// Leave out what the GelSlim sees of an imprint, the dashed rectangle.
     #[arg(long)]
     no_window: bool,
+    /// Of the column `compare`: one of the two, in the words of the verb `compare`.
+    #[arg(long, default_value = "prediction")]
+    a: Subject,
+    /// The other.
+    #[arg(long, default_value = "measured")]
+    b: Subject,
     /// The registration of poses in 3D.
     #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
     registration: RegistrationChoice,
@@ -136,8 +149,27 @@ pub(super) fn run(args: &FigureArgs) -> VerbResult {
         let by = drawer.as_deref().ok_or_else(|| TaskError::new("Figure", "there is no 3D renderer"))?;
         pictured(input, sample, view, by, cx)
     };
-    let drawn =
-        figure(&dataset, &setup, |_, sample, cx| recipe.generating()?.pair(&models, sample, cx), space, &output.job())?;
+    let of_subject =
+        |subject| made_from(subject, &args.model, |model| model.recipe(ImprintSource::Predicted, &dataset.rig));
+    let compared = match setup.look.panes.contains(&FigurePane::Compare) {
+        true => {
+            let from = [of_subject(&args.a)?, of_subject(&args.b)?];
+            Some(Compared { subjects: [args.a.clone(), args.b.clone()], from, recipe: recipe.clone() })
+        }
+        false => None,
+    };
+    if let Some(compared) = &compared {
+        setup.note = compared.note(&setup.note);
+    }
+    let makers = FigureMakers {
+        predict: |_, sample: &Arc<Sample>, cx: &JobCx| recipe.generating()?.pair(&models, sample, cx),
+        space,
+        apart: |pair, sample: &Arc<Sample>, cx: &JobCx| match &compared {
+            Some(compared) => apart(compared, (&dataset, pair), sample, &models, cx),
+            None => Ok(PerPad::default()),
+        },
+    };
+    let drawn = figure(&dataset, &setup, makers, &output.job())?;
     let report = Report { file: &args.out, figure: drawn.write(&args.out)?, note: &setup.note };
     output.finish(&report, || {
         let [width, height] = report.figure.size_px;

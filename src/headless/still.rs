@@ -43,6 +43,9 @@ pub(super) struct StillArgs {
     /// Direction of the view, degrees: about the vertical from the right finger's side, and above the horizontal.
     #[arg(long, value_name = "YAW,PITCH", value_parser = parse_view, default_value = "51.6,20", allow_hyphen_values = true)]
     view: ViewAngles,
+    /// Color CAD and contact points by their signed distances; the colors end at so many millimeters.
+    #[arg(long, value_name = "MM")]
+    distance: Option<f64>,
     /// Turn once around the pair in so many frames, which go into a folder as frame_0001.png and so on.
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
@@ -99,6 +102,7 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
         angles: args.view,
         width_px: args.width.unwrap_or(args.scale.saturating_mul(WIDTH_PX)),
         turntable: args.turntable,
+        distance_m: args.distance.map(|mm| mm * 1e-3),
     };
     setup.check()?;
     let drawer = spatial::stills()?;

@@ -10,7 +10,9 @@ use crate::gpu::guides;
 use crate::gpu::lines::{LinesItem, LinesStyle};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
+use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
+use touch2touch_work::deviation::DISTANCE_MAP;
 
 /// The names of contact points begin so.
 pub(crate) const CONTACT: &str = "contact ";
@@ -49,6 +51,31 @@ pub fn contact(
 ) -> CloudItem {
     let style = CloudStyle { color, size, opacity, ..CloudStyle::default() };
     CloudItem { name: format!("{CONTACT}{finger}"), revision, points, colors: PointColors::One, style }
+}
+
+/// Colors contact points, each by its own value or color.
+pub fn paint_points(item: &mut CloudItem, colors: PointColors, map: ColorMap, range: Range) {
+    /// Larger than points of one color: a color has to be told from the next.
+    const POINT_M: f32 = 0.000_6;
+    item.colors = colors;
+    item.style.map = map;
+    item.style.range = range;
+    if let PointSize::Meters(m) = &mut item.style.size {
+        *m = m.max(POINT_M);
+    }
+}
+
+/// Colors a model by the signed distances of its painted surface, meters, up to `reach_m`.
+pub fn model_by_distance(
+    item: &mut MeshItem,
+    (revision, (mesh, values)): (u64, (Arc<TriMesh>, Arc<[f32]>)),
+    reach_m: f32,
+) {
+    (item.mesh, item.values, item.revision) = (mesh, values, revision);
+    item.style.map = DISTANCE_MAP;
+    item.style.range = Range::symmetric(reach_m);
+    // The edges of its many small triangles are no edges of the model; they would be found anew for each pose.
+    item.style.edges = None;
 }
 
 /// The edges of a shaded model of a color before a ground: darker than the model before either.

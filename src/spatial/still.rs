@@ -4,13 +4,15 @@ use std::sync::Arc;
 
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::pipelines::Pipelines;
-use crate::gpu::points::PointSize;
+use crate::gpu::points::{PointColors, PointSize};
 use crate::gpu::scene::{SceneData, SceneRenderer};
 use crate::gpu::target::{Picture, Target};
 use crate::gpu::view::{Camera, Part};
 use crate::gpu::{Gpu, GpuError};
 use crate::spatial::{FILLED, focus, items};
+use touch2touch_core::colormap::Range;
 use touch2touch_core::grid::Grid;
+use touch2touch_work::deviation::DISTANCE_MAP;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::space::{DrawSpace, Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
@@ -78,8 +80,8 @@ impl StillColors {
     }
 }
 
-/// Everything that a still shows.
-fn scene(pair: &InSpace, ground: Ground) -> SceneData {
+/// Everything that a still shows; with `distance_m` in the colors of distances, which end there.
+fn scene(pair: &InSpace, ground: Ground, distance_m: Option<f64>) -> SceneData {
     let colors = StillColors::of(ground);
     let mut scene = SceneData {
         background: colors.ground,
@@ -92,7 +94,13 @@ fn scene(pair: &InSpace, ground: Ground) -> SceneData {
         let color = if both { colors.side(side.source) } else { colors.contact };
         for (pad, points) in side.contact.entries() {
             let name = format!("{} {}", pair.rig.pad_key(pad), side.source.key());
-            scene.clouds.push(items::contact(&name, (0, points.clone()), color, (PointSize::Meters(POINT_M), 1.0)));
+            let mut item = items::contact(&name, (0, points.clone()), color, (PointSize::Meters(POINT_M), 1.0));
+            let values = side.deviation.as_ref().and_then(|found| found.points.get(pad));
+            if let Some((values, reach)) = values.zip(distance_m) {
+                let colors = PointColors::Scalar(values.as_slice().into());
+                items::paint_points(&mut item, colors, DISTANCE_MAP, Range::symmetric(reach as f32));
+            }
+            scene.clouds.push(item);
         }
     }
     // Two membranes of one finger would hide each other.
@@ -102,7 +110,7 @@ fn scene(pair: &InSpace, ground: Ground) -> SceneData {
             scene.meshes.push(items::membrane(&name, (0, mesh.clone()), colors.side(side.source), VEIL));
         }
     }
-    models(pair, &colors, &mut scene);
+    models(pair, &colors, distance_m, &mut scene);
     let floor = items::floor(colors.ground, colors.weak);
     scene.floor = Some(match ground {
         Ground::Transparent => crate::gpu::floor::Floor { opacity: 0.0, ..floor },
@@ -116,36 +124,38 @@ fn scene(pair: &InSpace, ground: Ground) -> SceneData {
 }
 
 /// The model where the first side has it, as outlines where else it could be.
-fn models(pair: &InSpace, colors: &StillColors, scene: &mut SceneData) {
+fn models(pair: &InSpace, colors: &StillColors, distance_m: Option<f64>, scene: &mut SceneData) {
     let Some(mesh) = &pair.model else { return };
-    let mut add = |name: &str, style: MeshStyle| {
-        scene.meshes.push(MeshItem {
-            name: name.into(),
-            revision: 0,
-            mesh: mesh.clone(),
-            shading: Shading::Smooth,
-            values: Arc::default(),
-            style,
-        });
+    let item = |name: &str, style: MeshStyle| MeshItem {
+        name: name.into(),
+        revision: 0,
+        mesh: mesh.clone(),
+        shading: Shading::Smooth,
+        values: Arc::default(),
+        style,
     };
-    for (i, SpaceSide { source, pose, .. }) in pair.sides.iter().enumerate() {
+    for (i, SpaceSide { source, pose, deviation, .. }) in pair.sides.iter().enumerate() {
         let Some(world_from_mesh) = pose.as_ref().map(|pose| pose.grasp_from_object.to_affine()) else { continue };
         let name = format!("CAD {}", source.key());
-        match i {
-            0 => add(
-                &name,
-                MeshStyle {
-                    color: colors.model,
-                    look: Look::Solid,
-                    edges: Some(items::model_edges(colors.model, colors.ground)),
-                    ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
-                },
-            ),
-            _ => add(&name, items::outline(world_from_mesh, colors.side(*source), 1.0, 1.6)),
+        if i > 0 {
+            scene.meshes.push(item(&name, items::outline(world_from_mesh, colors.side(*source), 1.0, 1.6)));
+            continue;
         }
+        let style = MeshStyle {
+            color: colors.model,
+            look: Look::Solid,
+            edges: Some(items::model_edges(colors.model, colors.ground)),
+            ..items::outline(world_from_mesh, colors.model, 1.0, 1.2)
+        };
+        let mut model = item(&name, style);
+        if let Some((found, reach)) = deviation.as_ref().zip(distance_m) {
+            let painted = (Arc::new(found.surface.mesh.clone()), found.surface.values.as_slice().into());
+            items::model_by_distance(&mut model, (0, painted), reach as f32);
+        }
+        scene.meshes.push(model);
     }
     if let Some(truth) = pair.truth {
-        add("CAD true", items::truth(truth.to_affine(), colors.ink, 0.9, 1.2));
+        scene.meshes.push(item("CAD true", items::truth(truth.to_affine(), colors.ink, 0.9, 1.2)));
     }
 }
 
@@ -223,7 +233,7 @@ fn lay(out: &mut Picture, drawn: &Picture, part: Part, (corner, inner): ([u32; 2
 
 impl DrawSpace for Stills {
     fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError> {
-        let scene = scene(pair, view.ground);
+        let scene = scene(pair, view.ground, view.distance_m);
         let (yaw, pitch) = (view.angles.yaw_deg.to_radians(), view.angles.pitch_deg.to_radians());
         let mut camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
         camera.frame(&focus(&scene), FILLED);

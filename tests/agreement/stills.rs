@@ -17,8 +17,14 @@ pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
     let at = |name: &str| home.path().join(name);
     let mut studio = Studio::open(Place::Demo, home.path());
     let angles = ViewAngles { yaw_deg: 40.0, pitch_deg: 12.5 };
-    let asked = StillAsked { pane: SpacePane::Measured, width_px: 320, ground: Ground::Transparent, angles };
+    let asked =
+        StillAsked { pane: SpacePane::Measured, width_px: 320, ground: Ground::Transparent, angles, turntable: None };
     studio.send(ExportCommand::Write(Output::Still(asked), at("studio.png")).into());
+    studio.send(WorkbenchCommand::SetLayer(Layer::Distance).into());
+    studio.send(ExportCommand::Write(Output::Still(asked), at("studio-apart.png")).into());
+    studio.send(WorkbenchCommand::SetLayer(Layer::None).into());
+    let turned = StillAsked { turntable: Some(2), ..asked };
+    studio.send(ExportCommand::Write(Output::Still(turned), at("studio-turn")).into());
     let form = FigureForm {
         rows: FigureRows::Selected,
         scale: 1,
@@ -37,7 +43,9 @@ pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
     let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
     let figure = ["figure", "demo", "--pairs", &name, "--panes", "3d:measured", "--scale", "1", "--finger", &finger];
     verb(&figure, "verb-figure.png");
-    for end in [".png", "-figure.png"] {
+    verb(&[&still[..], &["--distance", "1"]].concat(), "verb-apart.png");
+    verb(&[&still[..], &["--turntable", "2"]].concat(), "verb-turn");
+    for end in [".png", "-apart.png", "-turn/frame_0001.png", "-turn/frame_0002.png", "-figure.png"] {
         let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}{end}"))).unwrap());
         assert!(a.len() > 5000 && a == b, "{end}: {} and {} bytes", a.len(), b.len());
     }

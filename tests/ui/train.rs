@@ -160,7 +160,7 @@ fn a_training_that_is_stopped_is_kept_and_goes_on() {
     rig.harness.get_by_label("Start training").click();
     rig.harness.step();
     rig.until("a few steps", |state| step(state) >= Some(4));
-    rig.harness.get_by_label("Cancel").click();
+    rig.harness.get_by_label_contains("Cancel: ").click();
     rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
     assert!(rig.harness.state().state().train.stopped.is_some());
     rig.harness.get_by_label_contains("it is kept");
@@ -168,7 +168,7 @@ fn a_training_that_is_stopped_is_kept_and_goes_on() {
     rig.harness.get_by_label("Start training").click();
     rig.until("the first step after", |state| step(state).is_some());
     assert!(step(rig.harness.state().state()) >= Some(4), "it goes on from where it was");
-    rig.harness.get_by_label("Cancel").click();
+    rig.harness.get_by_label_contains("Cancel: ").click();
     rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
     // What is kept is of what was asked for: another choice begins anew.
     let other = TrainForm { steps: 61, ..form };

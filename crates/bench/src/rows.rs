@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::figures::Summary;
 use super::reliability::Reliability;
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_work::io::cases::Stratum;
 
 /// A case ready to be registered.
@@ -47,6 +48,5 @@ pub(super) fn offset(estimated: PlanarPose, truth: PlanarPose) -> [f64; 2] {
 
 /// Distance between the two places, millimeters.
 pub(super) fn position_error_mm(estimated: PlanarPose, truth: PlanarPose) -> f64 {
-    let [y, z] = offset(estimated, truth);
-    y.hypot(z)
+    PoseDifference::between(estimated, truth).position_m * 1e3
 }

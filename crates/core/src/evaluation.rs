@@ -23,7 +23,7 @@ use super::metrics::{AngleSummary, Unstretched};
 use super::sample::Scale;
 use super::verdict::Grade;
 
-use columns::{COLUMNS, Of};
+use columns::{COLUMNS, FID, FRECHET, Of};
 pub use columns::{Column, NOTES, TableMetrics, columns, conventions};
 pub use metric::{Condition, Metric};
 pub use paper::paper_rows;
@@ -116,10 +116,16 @@ pub struct ImageScore {
     pub ssim: Option<f64>,
     /// With the range 0.0225 m.
     pub ssim_peak: Option<f64>,
+    /// With the range 0.0225 m, without the border: scikit-image's.
+    #[serde(default)]
+    pub ssim_standard: Option<f64>,
     /// As `ssim`, against the simulator's imprint without camera noise.
     pub ssim_noise_free: Option<f64>,
     /// Figures of the pictures as they are, where the scale was assumed.
     pub unstretched: Option<Unstretched>,
+    /// Intersection over union of the contact mask with the simulator's true contact, 0..1.
+    #[serde(default)]
+    pub mask_iou: Option<f64>,
     /// True where the classifier names the right tool; `None` without one, or for a tool it does not know.
     pub tool_right: Option<bool>,
     /// Features of the imprint: the input of the classifier's last layer.
@@ -143,6 +149,9 @@ pub struct GraspScore {
     pub images: Vec<ImageScore>,
     /// Error of the in-hand angle, radians, without sign; NaN (null) without a pose, `None` where no truth is known.
     pub angle_error_rad: Option<f64>,
+    /// Distance of the estimated place of the tool in the hand from the true one, meters; `None` without a pose or truth.
+    #[serde(default)]
+    pub position_error_m: Option<f64>,
     /// Reliance that the pose deserves, without the truth; `None` without a pose.
     #[serde(default)]
     pub verdict: Option<Grade>,
@@ -191,6 +200,35 @@ pub struct Row {
     pub upper_bound: bool,
     /// One per column group of the table.
     pub groups: Vec<TableMetrics>,
+}
+
+impl Row {
+    /// Takes the Fréchet distance for a FID: its features are those of an image network.
+    pub fn call_fid(&mut self) {
+        for group in &mut self.groups {
+            if let Some(distance) = group.figures.remove(FRECHET) {
+                group.figures.insert(FID, distance);
+            }
+        }
+    }
+}
+
+/// Notes on groups that have fewer images than the Fréchet distance has features.
+pub fn few_features(scores: &[Scores], groups: &[Group]) -> Vec<String> {
+    let few = |group: &Group| {
+        let measured = scores.iter().find(|scores| !scores.measured_features.is_empty())?;
+        let mut of = measured.measured_features.iter().filter(|(g, _)| g == group).map(|(_, features)| features.len());
+        let features = of.next()?;
+        let images = 1 + of.count();
+        (images < features).then(|| {
+            format!(
+                "Fréchet distance, {}: {images} images are fewer than the {features} features: biased upwards, compare sets \
+                 of equal size only",
+                group.short()
+            )
+        })
+    };
+    groups.iter().filter_map(few).collect()
 }
 
 /// The row of a method, for the column groups `groups`; `resamples` drawings for the intervals, 0 for none.
@@ -262,6 +300,11 @@ fn psnr(grasps: &[&GraspScore], of: impl Fn(&ImageScore) -> Option<SquaredError>
     db(PEAK_M, pooled)
 }
 
+/// PSNR of one image, peak 0.0225 m. Equal images have none.
+fn psnr_of(error: SquaredError) -> Option<f64> {
+    (error.pixels > 0 && error.sum > 0.0).then(|| 10.0 * (PEAK_M * PEAK_M * error.pixels as f64 / error.sum).log10())
+}
+
 fn angles(grasps: &[&GraspScore]) -> Option<AngleSummary> {
     let errors: Vec<f64> = grasps.iter().filter_map(|g| g.angle_error_rad).collect();
     (!errors.is_empty()).then(|| AngleSummary::from_errors(&errors))
@@ -318,6 +361,7 @@ mod tests {
             scale: Scale::Measured,
             images: vec![image],
             angle_error_rad: Some(angle_deg.to_radians()),
+            position_error_m: Some(1e-3),
             verdict: Some(Grade::of_angle_error(angle_deg.to_radians())),
             seconds: Some(0.1),
             doubt: Doubt::default(),

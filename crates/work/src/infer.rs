@@ -14,6 +14,7 @@
 pub mod bundle;
 pub mod classifier;
 pub mod engine;
+pub mod features;
 pub mod generator;
 pub mod kept_key;
 mod library;

@@ -2,6 +2,7 @@
 
 pub mod canvas;
 pub mod compare;
+pub mod depict;
 pub mod deviation;
 pub mod doubts;
 pub mod ensemble;

@@ -4,6 +4,7 @@ use super::super::keys::ImprintSource;
 use super::super::pane::{Kind, Pane};
 use super::super::state::State;
 use super::super::state::settings::GelView;
+use super::super::state::settings::versus::VersusMode;
 use touch2touch_work::figure::FigurePane;
 
 /// The column of a figure that shows the same as a pane; `None` of panes that are no pictures.
@@ -18,6 +19,7 @@ pub(crate) fn in_figure(state: &State, pane: Pane) -> Option<FigurePane> {
         Kind::Imprint(ImprintSource::Measured) => FigurePane::Measured,
         Kind::Imprint(ImprintSource::Predicted) => FigurePane::Predicted,
         Kind::Versus if settings.compared().is_error() => FigurePane::Error,
+        Kind::Versus if settings.compared().mode == VersusMode::Difference => FigurePane::Compare,
         _ => return None,
     })
 }

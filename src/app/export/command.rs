@@ -67,9 +67,10 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
                 .option("--finger", if both { "both" } else { &finger })
                 .option("--out", pane.picture_name(true))
                 .option("--range", format!("{}..{}", range.min_m * 1e3, range.max_m * 1e3))
-                .option_if("--error-range-mm", (shown == FigurePane::Error).then_some(error_m * 1e3))
+                .option_if("--error-range-mm", shown.is_difference().then_some(error_m * 1e3))
                 .word_if(state.settings.color_map == ColorMap::Gray, "--gray")
                 .word_if(!state.settings.footprint_visible, "--no-window");
+            let words = if shown == FigurePane::Compare { of_compared(state, words) } else { words };
             if shown.is_predicted() { words.then(drawn()) } else { words }
         }
         (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
@@ -93,13 +94,8 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
             words.option("--seeds", state.seeds.count).then(drawn())
         }
-        (Pane::Compare, _) => {
-            let versus = state.settings.compared();
-            of_pair("compare")?
-                .option("--a", placed(state, &versus.a))
-                .option("--b", placed(state, &versus.b))
-                .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
-        }
+        (Pane::Compare, _) => of_compared(state, of_pair("compare")?)
+            .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose)),
         (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
         (Pane::Masks, _) => of_pair("label")?,
         (Pane::Results | Pane::Table | Pane::Scatter, _) => {
@@ -130,6 +126,11 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
         _ => return None,
     };
     Some(words.list())
+}
+
+fn of_compared(state: &State, words: Words) -> Words {
+    let versus = state.settings.compared();
+    words.option("--a", placed(state, &versus.a)).option("--b", placed(state, &versus.b))
 }
 
 fn dial_words(state: &State, words: Words) -> Option<Words> {

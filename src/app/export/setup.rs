@@ -11,6 +11,7 @@ use super::super::pane::Pane;
 use super::super::state::State;
 use super::super::state::export::{FigureRows, StillAsked};
 use super::super::state::settings::Settings;
+use super::super::state::workbench::Layer;
 use super::super::{recipe, results};
 use super::column::in_figure;
 use super::command::recipe_shown;
@@ -21,14 +22,16 @@ use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
+use touch2touch_work::depict::Compared;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigureSetup, FigureTheme, note};
+use touch2touch_work::figure::{FigurePane, FigureSetup, FigureTheme, note};
 use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{ModelName, Recipe};
 use touch2touch_work::still::StillSetup;
+use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 use touch2touch_work::tool::NamedTool;
 
 /// The view of the studio on a case.
@@ -143,11 +146,29 @@ fn with_note(state: &State, setup: FigureSetup) -> FigureSetup {
         [one] => one.clone(),
         several => format!("{} and {} other ways", several[0], several.len() - 1),
     };
+    let compared = setup.look.panes.contains(&FigurePane::Compare).then(|| compared(state));
+    let note = compared.and_then(Result::ok).map_or_else(|| note.clone(), |compared| compared.note(&note));
     FigureSetup { note, ..setup }
 }
 
-/// A picture of the selected pair in 3D, by the recipe of what is shown.
+/// The two imprints that the Compare pane holds against each other, ready to be made anew.
+///
+/// # Errors
+/// Why one of them cannot be made.
+pub(crate) fn compared(state: &State) -> Result<Compared, &'static str> {
+    let versus = state.settings.compared();
+    let recipe = recipe_shown(state, ImprintSource::Predicted);
+    let from = |subject: &Subject| match subject {
+        // The one that the other panes show, made by whatever settings.
+        Subject::Predicted(change) if *change == RecipeChange::default() => Ok(MadeFrom::Prediction(recipe.clone())),
+        _ => subject.made_from(|named| recipe::of_generator(state, named)).map_err(|absent| absent.text()),
+    };
+    Ok(Compared { from: [from(&versus.a)?, from(&versus.b)?], subjects: [versus.a, versus.b], recipe })
+}
+
+/// A picture of the selected pair in 3D, by the recipe of what is shown, in the colors of distances where these are on.
 pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup> {
+    let reach = state.settings.scene.distance_m;
     Some(StillSetup {
         pair: state.selection.pair?,
         pane: asked.pane,
@@ -156,7 +177,8 @@ pub(crate) fn still_setup(state: &State, asked: StillAsked) -> Option<StillSetup
         ground: asked.ground,
         angles: asked.angles,
         width_px: asked.width_px,
-        turntable: None,
+        turntable: asked.turntable,
+        distance_m: (state.workbench.layer == Layer::Distance).then_some(reach.into()),
     })
 }
 

@@ -99,6 +99,8 @@ pub struct StillAsked {
     pub ground: Ground,
     /// Direction of the view.
     pub angles: ViewAngles,
+    /// Frames of a turntable; `None` = one picture.
+    pub turntable: Option<u32>,
 }
 
 /// Something to be written once the place is chosen.
@@ -115,7 +117,7 @@ pub enum Output {
         /// Half the range of the colors of errors, meters.
         error_m: f32,
     },
-    /// The selected pair in 3D.
+    /// The selected pair in 3D: a picture, or a turntable into a folder.
     Still(StillAsked),
     /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
     Pair(ImprintSource),
@@ -129,7 +131,8 @@ impl Output {
     /// The request, as the title of a dialog.
     pub fn title(self) -> &'static str {
         match self {
-            Self::Still(_) => "Save the 3D picture (.png)",
+            Self::Still(StillAsked { turntable: None, .. }) => "Save the 3D picture (.png)",
+            Self::Still(_) => "Save the frames of a turntable to a folder",
             Self::Figure => "Save the figure (.png or .svg)",
             Self::Case => "Save the case (.t2tcase)",
             Self::Masks => "Export masks to a folder",
@@ -143,6 +146,7 @@ impl Output {
     pub fn file_name(self) -> Option<String> {
         match self {
             Self::Figure => Some("figure.png".into()),
+            Self::Still(StillAsked { turntable: Some(_), .. }) => None,
             Self::Still(asked) => Some(format!("3d-{}.png", asked.pane.name().to_lowercase())),
             Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
             Self::Case => Some(format!("case.{}", case_file::ENDING)),

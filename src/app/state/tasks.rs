@@ -14,7 +14,7 @@ use touch2touch_work::job::Progress;
 pub struct Ticket(pub u64);
 
 macro_rules! kinds {
-    ($( #[doc = $doc:literal] $kind:ident, $name:literal, $lane:ident; )*) => {
+    ($( #[doc = $doc:literal] $kind:ident, $name:literal, $lane:ident, $kept:literal; )*) => {
         /// A kind of job that a person can start. On [`Lane::Batch`] there is one of a kind at a time, and nobody waits for
         /// its end any more once another data set is open.
         #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter)]
@@ -24,6 +24,11 @@ macro_rules! kinds {
             /// The work that it does, for errors.
             pub fn name(self) -> &'static str {
                 match self { $( Self::$kind => $name, )* }
+            }
+
+            /// What stopping it means, in a sentence.
+            pub(crate) fn kept(self) -> &'static str {
+                match self { $( Self::$kind => $kept, )* }
             }
 
             /// The lane that it runs on.
@@ -36,33 +41,47 @@ macro_rules! kinds {
 
 kinds! {
     /// A data set is opened.
-    Open, "Open", Files;
+    Open, "Open", Files,
+        "Stop; the data set before stays";
     /// A tool's CAD file is read in another unit.
-    ReadTool, "Read the tool", Files;
+    ReadTool, "Read the tool", Files,
+        "Stop; the tool stays as it is";
     /// A data set is read otherwise than it is stored.
-    ReadOtherwise, "Read the data otherwise", Files;
+    ReadOtherwise, "Read the data otherwise", Files,
+        "Stop; the data set stays as it is";
     /// Touches of a pair are predicted.
-    Generate, "Generate", Models;
+    Generate, "Generate", Models,
+        "Stop generating; what is shown stays";
     /// Shift statistics are made.
-    Refit, "Shift statistics", Models;
+    Refit, "Shift statistics", Models,
+        "Stop computing shift statistics";
     /// Something is written to a place that a person named.
-    Write, "Write", Files;
+    Write, "Write", Files,
+        "Stop; what was written until then stays";
     /// Masks are taken over that lie in a form of other programs.
-    Import, "Import masks", Files;
+    Import, "Import masks", Files,
+        "Stop; the masks that were taken over stay";
     /// Masks are proposed for many pairs.
-    Propose, "Propose masks", Batch;
+    Propose, "Propose masks", Batch,
+        "Stop; the pairs that were done until then keep their masks";
     /// A data set is scored.
-    Evaluate, "Evaluate", Batch;
+    Evaluate, "Evaluate", Batch,
+        "Stop, and show what was scored until then";
     /// A dial is turned over many pairs.
-    Dial, "Dial", Batch;
+    Dial, "Dial", Batch,
+        "Stop, and show the pairs that were done until then";
     /// The models are tried on a sample of a data set.
-    TryModels, "Try the models", Batch;
+    TryModels, "Try the models", Batch,
+        "Stop; the models are not tried on a sample of these pairs";
     /// Every pair of a data set is examined.
-    Examine, "Examine the pairs", Batch;
+    Examine, "Examine the pairs", Batch,
+        "Stop; pairs that were not examined are not told of";
     /// A generator is fitted to pairs.
-    Fit, "Fit the model", Batch;
+    Fit, "Fit the model", Batch,
+        "Stop; the same fit goes on from here when it is asked for again";
     /// A mask model is trained.
-    Train, "Train the mask model", Batch;
+    Train, "Train the mask model", Batch,
+        "Stop; the same training goes on from here when it is asked for again";
 }
 
 /// A job that a person started.

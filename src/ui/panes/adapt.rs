@@ -164,10 +164,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         match cx.state.tasks.of_kind(TaskKind::Fit) {
-            Some((ticket, task)) => {
-                let tip = "Stop; the same fit goes on from here when it is asked for again";
-                cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
-            }
+            Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
             None => {
                 if let Some(at) = cx.state.adapt.stopped.clone() {
                     cx.action_button(ui, Action::FitPairs, "Go on with the fit");

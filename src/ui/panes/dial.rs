@@ -96,10 +96,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.push(DialCommand::Predictions(predictions));
         }
         match cx.state.tasks.of_kind(TaskKind::Dial) {
-            Some((ticket, task)) => {
-                let tip = "Stop, and show the pairs that were done until then";
-                cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));
-            }
+            Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
             None => {
                 cx.action_button(ui, Action::TurnDial, "Run");
             }

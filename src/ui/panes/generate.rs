@@ -189,10 +189,12 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
     let running = cx.state.tasks.any_generating();
     let width = ui.available_width();
     match running {
-        Some((ticket, task)) => {
-            let text = if task.progress.text.is_empty() { "starting" } else { &task.progress.text };
-            let tip = cx.keys().behind("Stop generating; what is shown stays", Action::CancelJobs);
-            ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, (text, &tip)));
+        Some((_, task)) => {
+            ui.horizontal(|ui| {
+                // As high as the button in its place: nothing below moves.
+                ui.set_min_height(28.0);
+                cx.under_way(ui, task, &task.progress.text);
+            });
         }
         None => {
             let can = results::can_generate(cx.state);

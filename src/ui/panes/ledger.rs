@@ -117,10 +117,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, finger: PadId) {
         response.response.accessible_name("Shift of the depth chain").on_hover_text(shift_tooltip(current));
     });
     match cx.state.tasks.of_kind(TaskKind::Refit) {
-        Some((ticket, task)) => {
-            let what = (task.progress.text.as_str(), "Stop computing shift statistics");
-            ui.horizontal(|ui| cx.stoppable(ui, (ticket, task), f32::INFINITY, what));
-        }
+        Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
         None => {
             cx.action_button(ui, Action::Refit, "Refit on this data set");
         }

@@ -92,14 +92,13 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
         match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-            Some((ticket, task)) => {
+            Some((_, task)) => {
                 let now = &task.progress;
                 let text = match now.fraction() {
                     Some(_) => format!("{} of {} grasps   {}", now.done, now.total, now.text),
                     None => now.text.clone(),
                 };
-                let tip = "Stop, and show what was scored until then";
-                cx.stoppable(ui, (ticket, task), f32::INFINITY, (&text, tip));
+                cx.under_way(ui, task, &text);
             }
             None => {
                 // The empty table offers it large; an export is in the pane's menu.

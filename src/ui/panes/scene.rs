@@ -47,7 +47,7 @@ use touch2touch_work::cloud::Clouds;
 use touch2touch_work::space::ViewAngles;
 
 pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
-pub(crate) use layers::{DISTANCE_MAP, outline};
+pub(crate) use layers::outline;
 pub(crate) use legend::distances;
 pub(crate) use overlay::{error_color, pose_details, pose_time};
 
@@ -368,7 +368,7 @@ fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
         build::update_cloud(cx, memory, source, key, clouds);
     }
     if state.workbench.both_clouds {
-        let other = other_side(source);
+        let other = source.other();
         if let (Lookup::Ready(clouds), Ok(Some(key))) = (results::cloud(state, other), results::cloud_key(state, other))
         {
             build::update_cloud(cx, memory, other, key, clouds);
@@ -404,13 +404,6 @@ fn aim(
     let Some(point) = clouds.finger(finger).and_then(|cloud| cloud.points.get(index)) else { return false };
     camera.target = *point;
     true
-}
-
-fn other_side(source: ImprintSource) -> ImprintSource {
-    match source {
-        ImprintSource::Measured => ImprintSource::Predicted,
-        ImprintSource::Predicted => ImprintSource::Measured,
-    }
 }
 
 /// The point of a cloud that is meant by a position in the picture, physical pixels: finger and index.

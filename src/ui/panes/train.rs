@@ -139,10 +139,7 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         match cx.state.tasks.of_kind(TaskKind::Train) {
-            Some((ticket, task)) => {
-                let tip = "Stop; the same training goes on from here when it is asked for again";
-                cx.stoppable(ui, (ticket, task), 360.0, (&task.progress.text, tip));
-            }
+            Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
             None => {
                 if let Some(at) = cx.state.train.stopped.clone() {
                     cx.action_button(ui, Action::StartTraining, "Go on with the training");

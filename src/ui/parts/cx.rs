@@ -2,20 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use eframe::egui::{self, Response, Ui};
+use eframe::egui::{self, Response, RichText, Ui};
 
 use super::dialogs::Dialogs;
 use super::saved::Saved;
 use super::scene_view::Device;
-use super::theme::Palette;
+use super::theme::{Palette, SMALL};
 use super::widget::image_canvas::ViewTransform;
-use super::widget::progress;
 use super::widget::texture::Textures;
 use crate::app::action::{Action, Bindings};
-use crate::app::command::{Command, TasksCommand};
+use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
-use crate::app::state::tasks::{Task, Ticket};
+use crate::app::state::tasks::Task;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
 use touch2touch_work::space::ViewAngles;
@@ -93,26 +92,17 @@ impl Cx<'_> {
         response
     }
 
-    /// Progress of a task, at most `widest` wide, in the words of `text`, with a button that stops it; `tip` says what
-    /// stopping keeps.
-    pub(crate) fn stoppable(
-        &mut self,
-        ui: &mut Ui,
-        (ticket, task): (Ticket, &Task),
-        widest: f32,
-        (text, tip): (&str, &str),
-    ) {
-        let width = (ui.available_width() - CANCEL).clamp(60.0, widest);
-        progress::bar(ui, width, task.progress.fraction(), if task.cancelling { "stopping" } else { text });
-        let cancel = ui.add_enabled(!task.cancelling, egui::Button::new("Cancel"));
-        if cancel.on_hover_text(tip).clicked() {
-            self.push(TasksCommand::Cancel(ticket));
-        }
+    /// The progress of a task in a pane, in the words of `text`; the bar below has the one that fills, and Cancel.
+    pub(crate) fn under_way(&self, ui: &mut Ui, task: &Task, text: &str) {
+        let text = match (task.cancelling, text) {
+            (true, _) => "stopping…",
+            (false, "") => "starting…",
+            (false, text) => text,
+        };
+        let label = egui::Label::new(RichText::new(text).size(SMALL).color(self.p.accent)).truncate();
+        ui.add(label).on_hover_text("Progress and Cancel are in the bar below");
     }
 }
-
-/// Room for the button beside a bar, points.
-const CANCEL: f32 = 70.0;
 
 /// Part of the pictures that is seen, and the colors of errors: one for all panes.
 pub(crate) struct Views {

@@ -142,8 +142,8 @@ fn cure(cx: &mut Cx<'_>, ui: &mut Ui, cure: &Cure) {
         Cure::TrainFromCad { .. } => cx.state.tasks.of_kind(TaskKind::Train),
         _ => None,
     };
-    if let Some((ticket, task)) = running {
-        return cx.stoppable(ui, (ticket, task), 280.0, (&task.progress.text, "Stop this job"));
+    if let Some((_, task)) = running {
+        return cx.under_way(ui, task, &task.progress.text);
     }
     let button = ui.add_enabled(about::can(cx.state, cure), egui::Button::new(cure.name()).small());
     let verb = cure.verb().map_or(String::new(), |verb| format!("\n{verb}"));
@@ -156,12 +156,9 @@ fn cure(cx: &mut Cx<'_>, ui: &mut Ui, cure: &Cure) {
 /// The worth of the models, or how far trying them is.
 fn tried(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
-    if let Some((ticket, task)) = state.tasks.of_kind(TaskKind::TryModels) {
+    if let Some((_, task)) = state.tasks.of_kind(TaskKind::TryModels) {
         return named(cx, ui, "Models", |cx, ui| {
-            ui.horizontal(|ui| {
-                let tip = "Stop: the models are not tried on a sample of these pairs";
-                cx.stoppable(ui, (ticket, task), 280.0, (&task.progress.text, tip));
-            });
+            cx.under_way(ui, task, &task.progress.text);
         });
     }
     match state.about.worth.clone() {

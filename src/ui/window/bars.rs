@@ -11,6 +11,7 @@ use crate::app::action::Action;
 use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::Theme;
+use crate::app::tasks::{Task, Ticket};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::theme::{SMALL, caption, medium};
@@ -228,21 +229,22 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-/// First of the running jobs, with its progress, and a way to stop it.
+/// The running jobs, the first with its progress and a way to stop it, the rest in a menu: the one place for these.
 fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tasks = &cx.state.tasks;
-    let more = tasks.running.len().saturating_sub(1);
-    if let Some((ticket, task)) = tasks.running.iter().next() {
-        let (ticket, cancelling) = (*ticket, task.cancelling);
-        let cancel = ui.add_enabled(!cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
-        let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
-        if cancel.on_hover_text(cx.keys().behind("Stop this job", Action::CancelJobs)).clicked() {
-            cx.push(TasksCommand::Cancel(ticket));
+    let mut running = tasks.running.iter();
+    if let Some((ticket, task)) = running.next() {
+        job(cx, ui, *ticket, task);
+        let more: Vec<_> = running.collect();
+        if !more.is_empty() {
+            let name = format!("and {} more", more.len());
+            let (response, _) = egui::containers::menu::MenuButton::new(name).ui(ui, |ui| {
+                for (ticket, task) in more {
+                    ui.horizontal(|ui| job(cx, ui, *ticket, task));
+                }
+            });
+            response.on_hover_text("The other running jobs");
         }
-        let text = if cancelling { "stopping…".to_owned() } else { task.progress.text.clone() };
-        progress::bar(ui, 150.0, task.progress.fraction(), &text);
-        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-        ui.label(RichText::new(format!("{}{more}", task.title)).size(12.0).color(cx.p.text));
     } else if !tasks.demanded.is_empty() {
         // A dot, not a spinner: a spinner would draw frames as long as it turns.
         let (rect, response) = ui.allocate_exact_size(vec2(8.0, 8.0), Sense::hover());
@@ -250,6 +252,18 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
         response.on_hover_text("Computing what the panes show");
         ui.label(caption("computing", cx.p));
     }
+}
+
+/// A running job, with its progress and a way to stop it.
+fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &Task) {
+    let cancel = ui.add_enabled(!task.cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
+    let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
+    if cancel.on_hover_text(cx.keys().behind(task.kind.kept(), Action::CancelJobs)).clicked() {
+        cx.push(TasksCommand::Cancel(ticket));
+    }
+    let text = if task.cancelling { "stopping…" } else { &task.progress.text };
+    progress::bar(ui, 150.0, task.progress.fraction(), text);
+    ui.label(RichText::new(&task.title).size(12.0).color(cx.p.text));
 }
 
 /// That the folder is followed, what arrived, and a way to stop it.

@@ -186,6 +186,9 @@ fn preview(cx: &Cx<'_>, ui: &mut Ui, [columns, rows]: [usize; 2], size: [u32; 2]
     }
 }
 
+/// Frames of a turntable: six seconds of a film.
+const FRAMES: u32 = 180;
+
 /// Pictures of a 3D view, by ground and size, from where the view looks now.
 fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
     let pane = cx.state.settings.scene_sides();
@@ -197,12 +200,21 @@ fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
         (Ground::Transparent, "no ground", "without ground"),
     ] {
         ui.horizontal(|ui| {
-            for (width_px, text) in [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")] {
+            let asked = StillAsked { pane, width_px: WIDTH_PX, ground, angles, turntable: None };
+            let sizes = [(WIDTH_PX, "1x"), (2 * WIDTH_PX, "2x"), (4 * WIDTH_PX, "4x"), (8192, "8k")];
+            let sizes = sizes.map(|(width_px, text)| (StillAsked { width_px, ..asked }, text));
+            for (asked, text) in sizes.into_iter().chain([(StillAsked { turntable: Some(FRAMES), ..asked }, "film")]) {
                 let button = ui.add_enabled(export::can_draw(cx.state), egui::Button::new(text));
                 let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
-                let tip = format!("Save as PNG of {width_px} x {width_px} pixels {on}, in the direction of this view");
+                let size = format!("{} x {} pixels {on}", asked.width_px, asked.width_px);
+                let tip = match asked.turntable {
+                    None => format!("Save as PNG of {size}, in the direction of this view"),
+                    Some(frames) => {
+                        format!("Save one turn around the pair as {frames} PNG files of {size}, for a film")
+                    }
+                };
                 if button.on_hover_text(tip).clicked() {
-                    cx.push(ExportCommand::Place(Output::Still(StillAsked { pane, width_px, ground, angles })));
+                    cx.push(ExportCommand::Place(Output::Still(asked)));
                     ui.close();
                 }
             }

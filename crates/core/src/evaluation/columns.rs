@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, Serializer};
 
-use super::{Estimate, GraspScore, Group, Row, angles, images, mean, psnr};
-use crate::metrics::frechet_distance;
+use super::{Estimate, GraspScore, Group, ImageScore, Row, angles, images, mean, psnr, psnr_of};
+use crate::metrics::{frechet_distance, frechet_extrapolated};
 use crate::sample::Scale;
 use crate::verdict::Grade;
 
@@ -38,6 +38,10 @@ pub(super) enum Of {
     Published,
 }
 
+/// Names in files of the Fréchet distance by our features, and by those of an image network.
+pub(super) const FRECHET: &str = "frechet";
+pub(super) const FID: &str = "fid";
+
 /// The columns of a group, in the paper's order.
 pub(super) static COLUMNS: &[Column] = &[
     Column {
@@ -46,6 +50,12 @@ pub(super) static COLUMNS: &[Column] = &[
             psnr(tool, |image| Some(image.error))
         })
     },
+    db(
+        "each dB",
+        "psnr_each_db",
+        "PSNR of each image, then the mean, as scikit-image has it with the data range 22.5 mm, decibels",
+        |tool| mean(measured(tool).filter_map(|i| psnr_of(i.error))),
+    ),
     db(
         "clean dB",
         "psnr_noise_free_db",
@@ -77,6 +87,12 @@ pub(super) static COLUMNS: &[Column] = &[
         mean(images(tool).filter_map(|i| i.ssim_peak))
     }),
     ssim(
+        "SSIM std",
+        "ssim_standard",
+        "Structural similarity without the border, as scikit-image has it with Gaussian weights and the data range 22.5 mm",
+        |tool| mean(images(tool).filter_map(|i| i.ssim_standard)),
+    ),
+    ssim(
         "clean SSIM",
         "ssim_noise_free",
         "SSIM against the simulator's imprint before camera noise, range of the tool's predictions",
@@ -84,22 +100,39 @@ pub(super) static COLUMNS: &[Column] = &[
     ),
     Column {
         heading: "FD",
-        key: "frechet",
+        key: FRECHET,
         tip: "Fréchet distance in the features of the tool classifier: not to be compared with a published FID",
         decimals: 2,
         larger_is_better: false,
         in_paper: true,
+        of: Of::Group(|grasps, measured| frechet_distance(&features(grasps), measured)),
+    },
+    Column {
+        heading: "FD ∞",
+        key: "frechet_extrapolated",
+        tip: "The same for infinitely many images: a straight line in one over their number, followed to 0",
+        decimals: 2,
+        larger_is_better: false,
+        in_paper: false,
+        of: Of::Group(|grasps, measured| frechet_extrapolated(&features(grasps), measured)),
+    },
+    Column {
+        heading: "FD N",
+        key: "frechet_images",
+        tip: "Number of images that the Fréchet distance is of, on each side",
+        decimals: 0,
+        larger_is_better: true,
+        in_paper: false,
         of: Of::Group(|grasps, measured| {
-            let features: Vec<&[f32]> =
-                images(grasps).map(|i| i.features.as_slice()).filter(|f| !f.is_empty()).collect();
-            frechet_distance(&features, measured)
+            let count = features(grasps).len().min(measured.len());
+            (count > 0).then_some(count as f64)
         }),
     },
     Column {
         heading: "FID",
-        key: "fid",
-        tip: "As published, with the features of an Inception network",
-        decimals: 0,
+        key: FID,
+        tip: "Fréchet distance in the features of an image network: as published, or of the extractor that was named",
+        decimals: 1,
         larger_is_better: false,
         in_paper: true,
         of: Of::Published,
@@ -125,6 +158,18 @@ pub(super) static COLUMNS: &[Column] = &[
             Some(angles(tool)?.success_10)
         })
     },
+    Column {
+        heading: "place mm",
+        key: "position_mm",
+        tip: "Mean distance of the tool's estimated place in the hand from the true one, millimeters",
+        decimals: 2,
+        larger_is_better: false,
+        in_paper: false,
+        of: Of::Tool(|tool| mean(tool.iter().filter_map(|g| g.position_error_m)).map(|m| m * 1e3)),
+    },
+    ssim("IoU", "mask_iou", "Intersection over union of contact masks with the simulator's true contact", |tool| {
+        mean(images(tool).filter_map(|i| i.mask_iou))
+    }),
     percent(
         "good %",
         "verdict_good",
@@ -149,6 +194,16 @@ pub(super) static COLUMNS: &[Column] = &[
         }),
     },
 ];
+
+/// The features of the images that have some.
+fn features<'a>(grasps: &'a [&GraspScore]) -> Vec<&'a [f32]> {
+    images(grasps).map(|i| i.features.as_slice()).filter(|f| !f.is_empty()).collect()
+}
+
+/// The images whose scale was measured.
+fn measured<'a>(tool: &'a [&GraspScore]) -> impl Iterator<Item = &'a ImageScore> {
+    tool.iter().filter(|grasp| grasp.scale == Scale::Measured).flat_map(|grasp| &grasp.images)
+}
 
 type OfTool = fn(&[&GraspScore]) -> Option<f64>;
 
@@ -213,16 +268,19 @@ pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
 }
 
 /// Notes on the meaning of the columns, a line each.
-pub const NOTES: [&str; 7] = [
+pub const NOTES: [&str; 9] = [
     "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
+    "each, SSIM std: the standard conventions, those of scikit-image with the data range 22.5 mm: PSNR of each image and \
+     then the mean, SSIM without the border; beside them the lab's",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
      imprints says how much that noise costs",
     "raw, line: of pictures whose scale was assumed, as they are and after the straight line that fits best; PSNR itself \
      stretches both pictures to 0..1, where no noise-free picture passes 20 dB",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
      cannot be compared with a published FID, nor between groups of different size",
-    "FID: published, with the features of an Inception network",
+    "FID: Fréchet distance in the features of an image network: published ones are of Inception",
     "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
+    "place: of the grasps that have a pose; IoU: of the contact masks of both fingers, against the simulator's true contact",
     "tool: share of imprints whose tool the classifier names",
 ];
 

@@ -1,34 +1,93 @@
 //! Distance of two sets of feature vectors, each taken for a sample of a normal distribution.
 
 use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng as _;
+use rand::seq::index::sample;
+use rand_chacha::ChaCha8Rng;
 
 use crate::linear::eigen_symmetric;
 
+/// Fewest vectors of an extrapolation.
+pub(crate) const LEAST: usize = 16;
+/// Parts that are drawn of each size.
+const DRAWS: usize = 3;
+/// Seed of the parts.
+const PARTS_SEED: u64 = 1;
+
 /// The Fréchet distance of two sets of vectors: `|m1 - m2|² + tr(C1 + C2 - 2 (C1 C2)^½)`, with means `m` and unbiased
 /// covariances `C`. Behind published "FID" figures stand the features of an Inception network; with other features the
-/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only.
+/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only, or see
+/// [`frechet_extrapolated`].
 ///
 /// `None` with fewer than two vectors on a side, vectors of different lengths or of none, or values that are not finite.
 ///
 /// # Numerics
 /// In f64. The trace of the root is the sum of the singular values of `C1^½ C2^½`, which needs no root of a matrix that
-/// is not symmetric; eigenvalues below rounding count as 0, so fewer vectors than dimensions are no trouble.
+/// is not symmetric; eigenvalues below rounding count as 0. With fewer vectors than dimensions these singular values are
+/// those of the vectors' products with each other, `X1ᵀ X2` over the root of both degrees of freedom: no covariance is formed.
 pub(crate) fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
     let d = first.first()?.len();
     let sound = |set: &[&[f32]]| set.len() >= 2 && set.iter().all(|v| v.len() == d && v.iter().all(|x| x.is_finite()));
     if d == 0 || !sound(first) || !sound(second) {
         return None;
     }
+    if first.len().max(second.len()) <= d {
+        return Some(of_products(first, second, d));
+    }
     let ((m1, c1), (m2, c2)) = (moments(first, d), moments(second, d));
     let shared = (root(c1.clone())? * root(c2.clone())?).singular_values().sum();
     Some(((m1 - m2).norm_squared() + c1.trace() + c2.trace() - 2.0 * shared).max(0.0))
 }
 
-/// Mean and unbiased covariance.
-fn moments(set: &[&[f32]], d: usize) -> (DVector<f64>, DMatrix<f64>) {
+/// Distance by the products of centered vectors.
+fn of_products(first: &[&[f32]], second: &[&[f32]], d: usize) -> f64 {
+    let ((m1, x1), (m2, x2)) = (centered(first, d), centered(second, d));
+    let freedoms = [x1.ncols() - 1, x2.ncols() - 1].map(|n| n as f64);
+    let shared = x1.tr_mul(&x2).singular_values().sum() / (freedoms[0] * freedoms[1]).sqrt();
+    let traces = x1.norm_squared() / freedoms[0] + x2.norm_squared() / freedoms[1];
+    ((m1 - m2).norm_squared() + traces - 2.0 * shared).max(0.0)
+}
+
+/// [`frechet_distance`] for infinitely many vectors: its bias falls with one over their number, so a straight line through
+/// the distances of parts of the sets is followed to where that is 0. Parts are drawn from a fixed seed. It may be below 0 by
+/// chance; `None` where the distance is, and below [`LEAST`] vectors.
+///
+/// # Source
+/// Chong and Forsyth, Effectively unbiased FID and Inception Score, 2020.
+pub(crate) fn frechet_extrapolated(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
+    let most = first.len().min(second.len());
+    if most < LEAST {
+        return None;
+    }
+    let mut rng = ChaCha8Rng::seed_from_u64(PARTS_SEED);
+    let mut places = Vec::new();
+    for (quarters, draws) in [(1, DRAWS), (2, DRAWS), (3, DRAWS), (4, 1)] {
+        let count = most * quarters / 4;
+        for _ in 0..draws {
+            let mut part = |set: &[&[f32]]| -> Vec<usize> { sample(&mut rng, set.len(), count).into_vec() };
+            let (a, b) = (part(first), part(second));
+            let [a, b] = [(a, first), (b, second)].map(|(at, set)| at.into_iter().map(|i| set[i]).collect::<Vec<_>>());
+            places.push([1.0 / count as f64, frechet_distance(&a, &b)?]);
+        }
+    }
+    let mean = |at: usize| places.iter().map(|place| place[at]).sum::<f64>() / places.len() as f64;
+    let (x, y) = (mean(0), mean(1));
+    let (up, along) =
+        places.iter().fold((0.0, 0.0), |(up, along), [px, py]| (up + (px - x) * (py - y), along + (px - x).powi(2)));
+    Some(y - up / along * x)
+}
+
+/// Mean, and the vectors without it as columns.
+fn centered(set: &[&[f32]], d: usize) -> (DVector<f64>, DMatrix<f64>) {
     let mut vectors = DMatrix::from_fn(d, set.len(), |i, k| f64::from(set[k][i]));
     let mean = vectors.column_mean();
     vectors.column_iter_mut().for_each(|mut v| v -= &mean);
+    (mean, vectors)
+}
+
+/// Mean and unbiased covariance.
+fn moments(set: &[&[f32]], d: usize) -> (DVector<f64>, DMatrix<f64>) {
+    let (mean, vectors) = centered(set, d);
     let covariance = &vectors * vectors.transpose() / (set.len() - 1) as f64;
     (mean, covariance)
 }
@@ -44,8 +103,7 @@ fn root(c: DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use rand::{Rng as _, SeedableRng as _};
-    use rand_chacha::ChaCha8Rng;
+    use rand::Rng as _;
 
     use super::*;
 
@@ -98,6 +156,46 @@ mod tests {
         // All alike: the distance of the means.
         let (p, q) = (vec![vec![1.0; 5]; 4], vec![vec![2.0; 5]; 6]);
         assert!((distance(&p, &q).unwrap() - 5.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_distance_is_that_of_pytorch_fid() {
+        let reference: serde_json::Value =
+            serde_json::from_str(include_str!("../../tests/data/scikit_image.json")).unwrap();
+        for case in reference["sets"].as_array().unwrap() {
+            let d = case["features"].as_u64().unwrap() as usize;
+            let set = |key: &str| -> Vec<Vec<f32>> {
+                let values: Vec<f32> =
+                    case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+                values.chunks(d).map(<[f32]>::to_vec).collect()
+            };
+            let (found, theirs) =
+                (distance(&set("first"), &set("second")).unwrap(), case["distance"].as_f64().unwrap());
+            assert!((found - theirs).abs() < 1e-3, "{found} for {theirs}");
+        }
+    }
+
+    #[test]
+    fn products_and_covariances_give_the_same_distance() {
+        let (a, b) = (set(30, 32, 5, 0.1, 0.0), set(25, 32, 6, 0.2, 0.3));
+        let [a, b] = [&a, &b].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let ((m1, c1), (m2, c2)) = (moments(&a, 32), moments(&b, 32));
+        let shared = (root(c1.clone()).unwrap() * root(c2.clone()).unwrap()).singular_values().sum();
+        let by_covariances = (m1 - m2).norm_squared() + c1.trace() + c2.trace() - 2.0 * shared;
+        let found = frechet_distance(&a, &b).unwrap();
+        assert!((found / by_covariances - 1.0).abs() < 1e-6, "{found} {by_covariances}");
+    }
+
+    #[test]
+    fn the_extrapolation_takes_the_bias_out() {
+        // Two samples of one distribution: the distance is 0.
+        let (a, b) = (set(400, 12, 7, 1.0, 0.0), set(400, 12, 8, 1.0, 0.0));
+        let [a, b] = [&a, &b].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
+        let (few, all) = (frechet_distance(&a[..60], &b[..60]).unwrap(), frechet_distance(&a, &b).unwrap());
+        let beyond = frechet_extrapolated(&a, &b).unwrap();
+        assert!(few > 3.0 * all && beyond.abs() < 0.5 * all, "{few} {all} {beyond}");
+        assert_eq!(frechet_extrapolated(&a, &b), Some(beyond));
+        assert_eq!(frechet_extrapolated(&a[..LEAST - 1], &b), None);
     }
 
     #[test]

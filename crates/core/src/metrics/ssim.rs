@@ -1,4 +1,4 @@
-//! Structural similarity as the lab computes it, with a stated range.
+//! Structural similarity with a stated range, as the lab averages it and as the literature does.
 
 use crate::grid::Grid;
 
@@ -24,8 +24,11 @@ pub enum SsimRange {
 /// A structural similarity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Ssim {
-    /// The mean of the map, borders included.
+    /// The mean of the map, borders included: the lab's convention.
     pub mean: f64,
+    /// The mean of the map without the pixels whose window reaches over the border, as Wang et al. and scikit-image have
+    /// it; NaN for an image that is all border.
+    pub interior: f64,
     /// The score of each pixel, -1 to 1.
     pub map: Grid<f32>,
     /// Pixels that were not finite in one of the images and were counted as equal.
@@ -41,8 +44,8 @@ pub struct Ssim {
 /// (a flat prediction with [`SsimRange::OfPrediction`]).
 ///
 /// # Source
-/// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against an independent
-/// implementation by `tests/data/ssim.json`.
+/// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against independent
+/// implementations: `tests/data/ssim.json` for the whole map, `tests/data/scikit_image.json` for its interior.
 pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Result<Ssim, MetricError> {
     let mut one = ssim_ranges(prediction, truth, &[range])?;
     Ok(one.remove(0))
@@ -100,8 +103,13 @@ pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRang
             })
             .collect();
         let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+        let border = WINDOW / 2;
+        let inner = |from: usize, length: usize| from >= border && from + border < length;
+        let kept = scores.iter().enumerate().filter(|(i, _)| inner(i % width, width) && inner(i / width, height));
+        let (sum, count) = kept.fold((0.0, 0), |(sum, count), (_, score)| (sum + score, count + 1));
+        let interior = if count == 0 { f64::NAN } else { sum / f64::from(count) };
         let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
-        Ssim { mean, map, ignored: p.len() - used }
+        Ssim { mean, interior, map, ignored: p.len() - used }
     };
     Ok(ranges.iter().map(of_range).collect())
 }
@@ -172,6 +180,27 @@ mod tests {
             // Both sides work in f64 on the same f32 pixels.
             assert!((similarity.mean - expected).abs() < 1e-9, "{} for {expected}", similarity.mean);
         }
+    }
+
+    #[test]
+    fn the_interior_and_the_psnr_are_those_of_scikit_image() {
+        let reference: Value = serde_json::from_str(include_str!("../../tests/data/scikit_image.json")).unwrap();
+        for case in reference["images"].as_array().unwrap() {
+            let grid = |key: &str| {
+                let data = case[key].as_array().unwrap().iter().map(|v| v.as_f64().unwrap() as f32).collect();
+                let size = |k: &str| case[k].as_u64().unwrap() as usize;
+                Grid::from_vec(size("width"), size("height"), data).unwrap()
+            };
+            let value = |key: &str| case[key].as_f64().unwrap();
+            let (prediction, truth, range) = (grid("prediction"), grid("truth"), value("range"));
+            let found = ssim(&prediction, &truth, SsimRange::Explicit(range)).unwrap();
+            assert!((found.interior - value("ssim")).abs() < 1e-6, "{} for {}", found.interior, value("ssim"));
+            let db = super::super::psnr(&prediction, &truth, range).unwrap().db().unwrap();
+            assert!((db - value("psnr")).abs() < 1e-6, "{db} for {}", value("psnr"));
+        }
+        let (small, _) = textured(0.0);
+        let border = Grid::from_fn(10, 10, |x, y| small[(x, y)]);
+        assert!(ssim(&border, &border, SsimRange::Explicit(1.0)).unwrap().interior.is_nan());
     }
 
     #[test]

@@ -257,6 +257,7 @@ mod tests {
             group: Group::Unknown,
             scale: Scale::Measured,
             images: Vec::new(),
+            position_error_m: None,
             angle_error_rad: angle_deg.map(f64::to_radians),
             verdict: None,
             seconds: None,

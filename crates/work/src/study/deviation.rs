@@ -2,12 +2,17 @@
 //! [`cloud_difference`].
 
 use crate::cloud::Clouds;
+use touch2touch_core::colormap::ColorMap;
 use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::PerPad;
 
+/// The colors of signed distances: blue inside, red outside.
+pub const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
+/// Distances at which these colors can end, meters.
+pub const DISTANCES_M: std::ops::RangeInclusive<f64> = 1e-5..=0.05;
 /// Contact points within this distance of the model's surface are painted on it, meters.
 const REACH_M: f64 = 0.004;
 

@@ -19,6 +19,7 @@ use crate::doubts;
 use crate::error::TaskError;
 use crate::infer::bundle::Origin;
 use crate::infer::engine::threads;
+use crate::infer::features::Preparation;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::models;
@@ -44,6 +45,8 @@ pub struct Setup {
     pub bundles: Vec<Origin>,
     /// The tool classifier; without it neither accuracy nor Fréchet distance.
     pub classifier: Option<Origin>,
+    /// Feature extractor of the Fréchet distance with the preparation of its pictures, instead of the classifier's features.
+    pub features: Option<(Origin, Preparation)>,
     /// Recipe that every method has in common: all but the generator and the imprint, which are the method's.
     #[serde(flatten)]
     pub recipe: Recipe,
@@ -68,6 +71,7 @@ impl Default for Setup {
         Self {
             bundles: Vec::new(),
             classifier: None,
+            features: None,
             recipe: Recipe::default(),
             steps: None,
             seed: None,
@@ -206,10 +210,14 @@ pub fn evaluate(
     }
     cx.progress(total as u64, total as u64, "intervals");
     scores.retain(|s| !s.grasps.is_empty());
-    let rows = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
+    let mut rows: Vec<Row> = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
+    if setup.features.is_some() {
+        rows.iter_mut().for_each(Row::call_fid);
+    }
     let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
     notes.append(&mut models.missing(setup, &dataset.rig, scale));
     notes.append(&mut models.masks_made_otherwise());
+    notes.extend(evaluation::few_features(&scores, &groups));
     Ok(Evaluation {
         dataset: dataset.title.clone(),
         rows,

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use super::canvas;
-use super::compare::{of_pad, tile_of};
+use super::compare::{Comparison, of_pad, tile_of};
 pub use super::space::note;
 use super::space::{SpacePane, SpacePicture, SpaceView};
 use crate::error::TaskError;
@@ -71,6 +71,8 @@ pub enum FigurePane {
     Predicted,
     /// Predicted minus measured.
     Error,
+    /// One of the two imprints that are compared minus the other.
+    Compare,
     /// The pair in 3D by its measured imprint.
     #[serde(rename = "3d:measured")]
     #[strum(serialize = "3d:measured")]
@@ -111,6 +113,7 @@ impl FigurePane {
             Self::Measured => "Measured imprint".into(),
             Self::Predicted => "Predicted imprint".into(),
             Self::Error => "Error".into(),
+            Self::Compare => "A minus B".into(),
             Self::SpaceMeasured => "3D, measured".into(),
             Self::SpacePredicted => "3D, predicted".into(),
             Self::SpaceBoth => "3D, both".into(),
@@ -119,13 +122,18 @@ impl FigurePane {
 
     /// True where something has to be predicted for it.
     pub fn is_predicted(self) -> bool {
-        matches!(self, Self::Predicted | Self::Error | Self::SpacePredicted | Self::SpaceBoth)
+        matches!(self, Self::Predicted | Self::Error | Self::Compare | Self::SpacePredicted | Self::SpaceBoth)
+    }
+
+    /// True where it shows one imprint minus another.
+    pub fn is_difference(self) -> bool {
+        matches!(self, Self::Error | Self::Compare)
     }
 
     fn sensor(self, rig: &Rig) -> Option<&Sensor> {
         match self {
             Self::GelSlim | Self::Raw | Self::Reference => rig.color(),
-            Self::Measured | Self::Predicted | Self::Error => rig.depth(),
+            Self::Measured | Self::Predicted | Self::Error | Self::Compare => rig.depth(),
             Self::SpaceMeasured | Self::SpacePredicted | Self::SpaceBoth => None,
         }
     }
@@ -233,8 +241,18 @@ pub struct FigureSetup {
     pub shift: ShiftMode,
     /// Look of the figure.
     pub look: FigureLook,
-    /// The line below everything: what made the predictions.
+    /// The line below everything: what made the predictions, and what is compared.
     pub note: String,
+}
+
+/// Makers of what the columns of a figure show of a pair; each is asked only where a column needs it.
+pub struct FigureMakers<P, S, A> {
+    /// Predictions of the pair's fingers.
+    pub predict: P,
+    /// Picture of the pair in 3D.
+    pub space: S,
+    /// One of the imprints that are compared minus the other, of each finger that has both.
+    pub apart: A,
 }
 
 /// One picture of a figure.
@@ -287,16 +305,18 @@ pub struct FigureFile {
     pub error_mm: f32,
 }
 
-/// Draws pairs of a data set. `predict` answers with the predictions of a pair's fingers, `space` with its picture in 3D; they
-/// are asked only where a column needs one.
+/// Draws pairs of a data set.
 ///
 /// # Errors
 /// If it would be empty or too large, a pair cannot be read, a prediction fails, or the job was told to stop.
 pub fn figure(
     dataset: &Dataset,
     setup: &FigureSetup,
-    mut predict: impl FnMut(PairId, &Arc<Sample>, &JobCx) -> Result<PerPad<Prediction>, TaskError>,
-    mut space: impl FnMut(PairId, &Sample, &SpaceView, &JobCx) -> Result<SpacePicture, TaskError>,
+    mut makers: FigureMakers<
+        impl FnMut(PairId, &Arc<Sample>, &JobCx) -> Result<PerPad<Prediction>, TaskError>,
+        impl FnMut(PairId, &Sample, &SpaceView, &JobCx) -> Result<SpacePicture, TaskError>,
+        impl FnMut(PairId, &Arc<Sample>, &JobCx) -> Result<PerPad<Comparison>, TaskError>,
+    >,
     cx: &JobCx,
 ) -> Result<Figure, TaskError> {
     let look = &setup.look;
@@ -311,11 +331,14 @@ pub fn figure(
             .load(pair)
             .map(Arc::new)
             .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
-        let predicted = look.panes.iter().any(|pane| pane.is_predicted());
-        let made = if predicted { predict(pair, &sample, cx)? } else { PerPad::default() };
+        let shows = |those: &[FigurePane]| look.panes.iter().any(|pane| those.contains(pane));
+        let predicted = shows(&[FigurePane::Predicted, FigurePane::Error]);
+        let made = if predicted { (makers.predict)(pair, &sample, cx)? } else { PerPad::default() };
+        let compared = shows(&[FigurePane::Compare]);
+        let apart = if compared { (makers.apart)(pair, &sample, cx)? } else { PerPad::default() };
         let mut in_space = Vec::new();
         for pane in look.panes.iter().filter_map(|pane| pane.space()) {
-            in_space.push((pane, space(pair, &sample, &sheet::space_view(look, pane, &dataset.rig), cx)?));
+            in_space.push((pane, (makers.space)(pair, &sample, &sheet::space_view(look, pane, &dataset.rig), cx)?));
         }
         let tile = if predicted { tile_of(dataset, pair, &sample)? } else { None };
         for &finger in &setup.fingers {
@@ -325,7 +348,7 @@ pub fn figure(
             let drawn = made.get(finger).map(|made| (made, setup.shift));
             let cells = look.panes.iter().map(|pane| match pane.space() {
                 Some(of) => Ok(space_cell(&mut in_space, of)),
-                None => cell(*pane, &sample, finger, drawn, tile.as_ref(), look),
+                None => cell(*pane, &sample, finger, (drawn, apart.get(finger)), tile.as_ref(), look),
             });
             let cells = cells.collect::<Result<_, TaskError>>()?;
             rows.push(Row { name: name.clone(), finger: sample.rig.pad_key(finger).into_owned(), cells });
@@ -358,7 +381,7 @@ fn cell(
     pane: FigurePane,
     sample: &Sample,
     finger: PadId,
-    drawn: Option<(&Prediction, ShiftMode)>,
+    (drawn, apart): (Option<(&Prediction, ShiftMode)>, Option<&Comparison>),
     tile: Option<&DepthMap>,
     look: &FigureLook,
 ) -> Result<Cell, TaskError> {
@@ -370,6 +393,8 @@ fn cell(
         Some((made, shift)) if made.color.is_none() => imprint_of(made, shift, sample, finger).map(Some),
         _ => Ok(None),
     };
+    let difference =
+        |found: &Comparison| picture::colored(&found.error, ColorMap::Diverging, Range::symmetric(look.error_m));
     let mut note = String::new();
     let picture = match pane {
         FigurePane::GelSlim => {
@@ -396,18 +421,25 @@ fn cell(
             Some(imprint) => match of_pad(&imprint, drawn, sample, finger, tile)? {
                 Some(found) => {
                     note = format!("mean |error| {}", units::text_mm(found.mae_m));
-                    Ok(picture::colored(&found.error, ColorMap::Diverging, Range::symmetric(look.error_m)))
+                    Ok(difference(&found))
                 }
                 None => absent("not measured"),
             },
             None => absent("no prediction"),
+        },
+        FigurePane::Compare => match apart {
+            Some(found) => {
+                note = format!("mean |A - B| {}", units::text_mm(found.mae_m));
+                Ok(difference(found))
+            }
+            None => absent("not both are there"),
         },
         FigurePane::SpaceMeasured | FigurePane::SpacePredicted | FigurePane::SpaceBoth => absent("drawn in 3D"),
     };
     let sensor = pane.sensor(&sample.rig);
     let width = picture.as_ref().ok().map(|picture: &Rgb8| picture.width() as f64);
     let px_per_m = sensor.zip(width).map(|(sensor, width)| sensor.px_per_m * width / sensor.width.max(1) as f64);
-    let window = matches!(pane, FigurePane::Measured | FigurePane::Predicted | FigurePane::Error)
+    let window = (pane.sensor(&sample.rig) == sample.rig.depth())
         .then(|| Some(sample.rig.color_window(finger)?.rectangle()))
         .flatten()
         .filter(|_| look.window && width == sensor.map(|sensor| sensor.width as f64));
@@ -489,6 +521,7 @@ pub fn kind(file: &Path) -> Result<FigureKind, TaskError> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::compare::compare;
     use super::*;
     use touch2touch_core::rig::lab;
 
@@ -505,7 +538,14 @@ mod tests {
             let [w, h] = view.size_px.map(|n| n as usize);
             Ok(SpacePicture { pixels: touch2touch_core::grid::Grid::filled(w, h, [9, 99, 199, 255]), px_per_m: 2000.0 })
         };
-        figure(&Dataset::demo(), setup, never, space, &JobCx::unwatched())
+        let apart = |_, sample: &Arc<Sample>, _: &JobCx| {
+            let imprint = &sample.pad(lab::RIGHT).and_then(|touch| touch.depth()).unwrap().imprint;
+            let mut found = PerPad::default();
+            found[lab::RIGHT] = Some(compare(&imprint.map(|m| m + 0.001), imprint, Scale::Measured).unwrap());
+            Ok(found)
+        };
+        let makers = FigureMakers { predict: never, space, apart };
+        figure(&Dataset::demo(), setup, makers, &JobCx::unwatched())
     }
 
     #[test]
@@ -539,6 +579,14 @@ mod tests {
         let shown = mean(&|x, y| f64::from(image[(left + 4 + x * 4, top + off + 4 + y * 2)][0]));
         let meant = mean(&|x, y| f64::from(gel[(5 + x * 4 * 427 / 350, 5 + y * 2 * 427 / 350)][0]));
         assert!((shown - meant).abs() < 3.0, "{shown} {meant}");
+    }
+
+    #[test]
+    fn what_is_compared_is_a_column_with_its_bar_and_its_mean() {
+        let text = drawn(&setup(&[FigurePane::Compare], 1.0)).unwrap().svg().unwrap();
+        for word in ["A minus B", "A minus B, mm", "mean |A - B| 1.00 mm", "not both are there"] {
+            assert!(text.contains(word), "{word}");
+        }
     }
 
     #[test]

@@ -7,6 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
+use super::deviation::{Deviation, deviation};
 use crate::error::TaskError;
 use crate::feel::{Touch, feel};
 use crate::io::dataset::Dataset;
@@ -105,6 +106,8 @@ pub struct SpaceView {
     pub angles: ViewAngles,
     /// Turn of the view about the vertical after it was framed, degrees.
     pub turned_deg: f64,
+    /// Distance at which the colors of signed distances end, meters; `None` where the model has its own color.
+    pub distance_m: Option<f64>,
     /// Width and height, pixels.
     pub size_px: [u32; 2],
 }
@@ -138,6 +141,8 @@ pub struct SpaceSide {
     pub membranes: PerPad<Arc<TriMesh>>,
     /// The registered pose; `None` where there is none.
     pub pose: Option<PoseResult>,
+    /// Signed distances of model and contact points at that pose, where they are shown.
+    pub deviation: Option<Deviation>,
 }
 
 /// A pair in 3D.
@@ -170,7 +175,7 @@ pub struct SpaceInput<'a> {
     pub models: &'a Models,
 }
 
-/// Makes membranes, contact points and poses of a pair.
+/// Makes membranes, contact points and poses of a pair, and where they are shown the distances between them.
 ///
 /// # Errors
 /// If prediction, imprint or mask cannot be made. Without a tool or a pose it is shown without.
@@ -178,6 +183,7 @@ pub fn in_space(
     input: SpaceInput<'_>,
     sample: &Sample,
     sides: &[ImprintSource],
+    distances: bool,
     cx: &JobCx,
 ) -> Result<InSpace, TaskError> {
     const WHAT: &str = "3D picture";
@@ -202,9 +208,11 @@ pub fn in_space(
             membranes[pad] = camera.and_then(|camera| membrane(imprint, camera).ok()).map(Arc::new);
         }
         let pose = felt.pose().ok().cloned();
+        let apart = pose.as_ref().zip(tool.as_ref().ok()).filter(|_| distances);
+        let deviation = apart.map(|(pose, tool)| deviation(&clouds, tool, pose.grasp_from_object));
         notes.push(side_note(&recipe, pose.as_ref()));
         let contact = clouds.fingers.as_ref().map(|cloud| cloud.map(contact));
-        made.push(SpaceSide { source, contact, membranes, pose });
+        made.push(SpaceSide { source, contact, membranes, pose, deviation });
     }
     Ok(InSpace {
         sides: made,
@@ -252,5 +260,5 @@ pub fn pictured(
     by: &dyn DrawSpace,
     cx: &JobCx,
 ) -> Result<SpacePicture, TaskError> {
-    by.draw(&in_space(input, sample, view.pane.sides(), cx)?, view)
+    by.draw(&in_space(input, sample, view.pane.sides(), view.distance_m.is_some(), cx)?, view)
 }

@@ -9,6 +9,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
 use super::canvas::{self, Drawing, Drawn, Paper};
+use super::deviation::{DISTANCE_MAP, DISTANCES_M};
 use super::space::{DrawSpace, Ground, SpaceInput, SpacePane, SpaceView, ViewAngles, in_space};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
@@ -29,8 +30,10 @@ pub const WIDTHS_PX: std::ops::RangeInclusive<u32> = 64..=8192;
 pub const MOST_FRAMES: u32 = 3600;
 /// Width of a still in units of its letters.
 const UNITS: f64 = 480.0;
-/// Height of the strip of letters, units.
-const STRIP: f64 = 40.0;
+/// Height of the strip of letters, units; with a color bar.
+const STRIP: [f64; 2] = [40.0, 66.0];
+/// Width and height of a color bar, units.
+const BAR: [f64; 2] = [110.0, 6.0];
 /// Letters of a line of the note, and its most lines.
 const NOTE: (usize, usize) = (92, 2);
 /// Round lengths of scale bars, millimeters.
@@ -55,6 +58,8 @@ pub struct StillSetup {
     pub width_px: u32,
     /// Frames of a turntable, into a folder; `None` = one picture, into a file.
     pub turntable: Option<u32>,
+    /// Distance at which the colors of signed distances end, meters, within [`DISTANCES_M`]; `None` without them.
+    pub distance_m: Option<f64>,
 }
 
 /// Stills that were written.
@@ -84,6 +89,9 @@ impl StillSetup {
         if self.turntable.is_some_and(|frames| frames == 0 || frames > MOST_FRAMES) {
             return fail("a turntable of so many frames cannot be".into(), "Choose 1 to 3600 frames.");
         }
+        if self.distance_m.is_some_and(|reach| !DISTANCES_M.contains(&reach)) {
+            return fail("the colors of distances cannot end there".into(), "Choose 0.01 to 50 mm.");
+        }
         if !(self.angles.yaw_deg.is_finite() && self.angles.pitch_deg.abs() <= 90.0) {
             return fail("the view is no direction".into(), "Choose two numbers, the second from -90 to 90 degrees.");
         }
@@ -111,7 +119,7 @@ pub fn still(
         .map(Arc::new)
         .map_err(|err| TaskError::from_error(format!("{WHAT}: load {name}"), &err).with_hint(err.hint()))?;
     let input = SpaceInput { dataset, pair: setup.pair, recipe: &setup.recipe, labels: &setup.labels, models };
-    let pair = in_space(input, &sample, setup.pane.sides(), cx)?;
+    let pair = in_space(input, &sample, setup.pane.sides(), setup.distance_m.is_some(), cx)?;
     let frames = setup.turntable.unwrap_or(1);
     if setup.turntable.is_some() {
         std::fs::create_dir_all(out)
@@ -123,10 +131,13 @@ pub fn still(
         cx.check(WHAT)?;
         cx.progress(u64::from(frame), u64::from(frames), name.clone());
         let turned_deg = 360.0 * f64::from(frame) / f64::from(frames);
-        let view = SpaceView { pane: setup.pane, ground: setup.ground, angles: setup.angles, turned_deg, size_px };
+        let StillSetup { pane, ground, angles, distance_m, .. } = *setup;
+        let view = SpaceView { pane, ground, angles, turned_deg, distance_m, size_px };
         let mut picture = by.draw(&pair, &view)?;
         done.px_per_mm = picture.px_per_m * 1e-3;
-        letter(&mut picture.pixels, setup.ground, &StillStrip::new(&name, &pair.note, done.px_per_mm, setup.width_px))?;
+        let painted = distance_m.filter(|_| pair.sides.iter().any(|side| side.deviation.is_some()));
+        let strip = StillStrip::new((&name, &pair.note), done.px_per_mm, setup.width_px, painted);
+        letter(&mut picture.pixels, ground, &strip)?;
         let file = match setup.turntable {
             Some(_) => out.join(format!("frame_{:04}.png", frame + 1)),
             None => out.to_owned(),
@@ -146,14 +157,24 @@ struct StillStrip {
     note: Vec<String>,
     /// Length in units, with its text.
     bar: Option<(f64, String)>,
+    /// Distance at which the colors end, millimeters.
+    distance_mm: Option<f64>,
 }
 
 impl StillStrip {
-    fn new(name: &str, note: &str, px_per_mm: f64, width_px: u32) -> Self {
+    fn new((name, note): (&str, &str), px_per_mm: f64, width_px: u32, distance_m: Option<f64>) -> Self {
         let per_mm = px_per_mm * UNITS / f64::from(width_px.max(1));
         let bar = LENGTHS_MM.iter().rev().find(|mm| **mm * per_mm <= UNITS / 4.0);
         let bar = bar.filter(|_| per_mm > 0.0).map(|mm| (mm * per_mm, format!("{mm} mm")));
-        Self { size: [UNITS as u32, STRIP as u32], name: name.to_owned(), note: lines(note), bar }
+        let high = STRIP[usize::from(distance_m.is_some())];
+        // A number of few digits that came through single precision is meant.
+        let distance_mm = distance_m.map(|m| (m * 1e7).round() * 1e-4);
+        Self { size: [UNITS as u32, high as u32], name: name.to_owned(), note: lines(note), bar, distance_mm }
+    }
+
+    /// Left and top of the color bar, units.
+    fn color_bar(&self) -> Option<[f64; 2]> {
+        self.distance_mm.map(|_| [UNITS - 10.0 - BAR[0], 11.0])
     }
 }
 
@@ -177,13 +198,14 @@ impl Drawing for StillStrip {
 
     fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
         let left = |units: f64| paper.letters(units, BLACK).pos(Pos::new(HPos::Left, VPos::Bottom));
-        let top = STRIP - 6.0 - 9.0 * self.note.len() as f64;
+        let high = f64::from(self.size[1]);
+        let top = high - 6.0 - 9.0 * self.note.len() as f64;
         paper.text([10.0, top - 1.0], &left(8.5), &self.name)?;
         for (line, y) in self.note.iter().zip(1..) {
             paper.text([10.0, top + 9.0 * f64::from(y)], &left(7.0), line)?;
         }
         if let Some((length, text)) = &self.bar {
-            let (right, y) = (UNITS - 10.0, STRIP - 8.0);
+            let (right, y) = (UNITS - 10.0, high - 8.0);
             paper.line(&[[right - length, y], [right, y]], BLACK, 1.2)?;
             for x in [right - length, right] {
                 paper.line(&[[x, y - 2.5], [x, y + 2.5]], BLACK, 1.0)?;
@@ -191,11 +213,21 @@ impl Drawing for StillStrip {
             let style = paper.letters(8.5, BLACK).pos(Pos::new(HPos::Center, VPos::Bottom));
             paper.text([right - length / 2.0, y - 3.0], &style, text)?;
         }
+        if let Some((mm, [left, top])) = self.distance_mm.zip(self.color_bar()) {
+            let centered = |at: VPos| paper.letters(7.0, BLACK).pos(Pos::new(HPos::Center, at));
+            let [middle, below] = [left + BAR[0] / 2.0, top + BAR[1] + 1.5];
+            paper.text([middle, top - 1.0], &centered(VPos::Bottom), "signed distance, mm")?;
+            for (share, text) in [(0.0, format!("-{mm} inside")), (0.5, "0".into()), (1.0, format!("+{mm}"))] {
+                let side = [HPos::Left, HPos::Center, HPos::Right][(2.0 * share) as usize];
+                let style = paper.letters(7.0, BLACK).pos(Pos::new(side, VPos::Top));
+                paper.text([left + share * BAR[0], below], &style, &text)?;
+            }
+        }
         Ok(())
     }
 }
 
-/// Lays the letters over the lower end of a picture, in an ink that can be read on its ground.
+/// Lays the letters and the color bar over the lower end of a picture, in an ink that can be read on its ground.
 fn letter(pixels: &mut Grid<[u8; 4]>, ground: Ground, strip: &StillStrip) -> Result<(), TaskError> {
     let ink: f32 = if ground == Ground::Black { 225.0 } else { 40.0 };
     let scale = pixels.width() as f64 / UNITS;
@@ -212,6 +244,16 @@ fn letter(pixels: &mut Grid<[u8; 4]>, ground: Ground, strip: &StillStrip) -> Res
         let alpha = cover + below;
         let over = |v: u8| ((ink * cover + f32::from(v) * below) / alpha).round() as u8;
         pixels[(x, top + y)] = [over(r), over(g), over(b), (alpha * 255.0).round() as u8];
+    }
+    if let Some([left, from]) = strip.color_bar() {
+        let [left, from, wide, high] = [left, from, BAR[0], BAR[1]].map(|units| (units * scale).round() as usize);
+        for (x, y) in (0..high).flat_map(|y| (0..wide).map(move |x| (x, y))) {
+            let [r, g, b] = DISTANCE_MAP.rgb8(x as f32 / (wide.max(2) - 1) as f32);
+            let at = (left + x, top + from + y);
+            if at.0 < pixels.width() && at.1 < pixels.height() {
+                pixels[at] = [r, g, b, 255];
+            }
+        }
     }
     Ok(())
 }
@@ -248,6 +290,7 @@ mod tests {
             angles: ViewAngles::default(),
             width_px: 480,
             turntable: None,
+            distance_m: None,
         }
     }
 
@@ -267,6 +310,19 @@ mod tests {
     }
 
     #[test]
+    fn distances_have_their_bar() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("still.png");
+        let setup = StillSetup { distance_m: Some(0.002), ground: Ground::White, ..setup() };
+        still(&Dataset::demo(), &setup, &Models::new(None), &Plain, &file, &JobCx::unwatched()).unwrap();
+        let image = image::open(&file).unwrap().into_rgba8();
+        // The bar is 110 by 6 pixels, 11 below the top of the strip.
+        for (x, share) in [(360, 0.0), (469, 1.0)] {
+            assert_eq!(image.get_pixel(x, 480 - 66 + 14).0[..3], DISTANCE_MAP.rgb8(share), "{share}");
+        }
+    }
+
+    #[test]
     fn a_turntable_is_numbered_frames_all_around() {
         let folder = tempfile::tempdir().unwrap();
         let setup = StillSetup { turntable: Some(4), width_px: 64, ..setup() };
@@ -282,6 +338,7 @@ mod tests {
         for broken in [
             StillSetup { width_px: 20_000, ..setup() },
             StillSetup { turntable: Some(0), ..setup() },
+            StillSetup { distance_m: Some(f64::NAN), ..setup() },
             StillSetup { angles: ViewAngles { yaw_deg: 0.0, pitch_deg: f64::NAN }, ..setup() },
         ] {
             assert!(broken.check().unwrap_err().hint.is_some());

@@ -57,6 +57,8 @@ pub enum BundleKind {
     Mask,
     /// Imprint to tool.
     Classifier,
+    /// Picture to features.
+    Features,
 }
 
 impl BundleKind {
@@ -66,6 +68,7 @@ impl BundleKind {
             Self::Generator => "generator",
             Self::Mask => "mask model",
             Self::Classifier => "tool classifier",
+            Self::Features => "feature extractor",
         }
     }
 }
@@ -80,6 +83,7 @@ impl BundleInfo {
                 BundleSpec::Generator(_) => BundleKind::Generator,
                 BundleSpec::MaskUnet(_) => BundleKind::Mask,
                 BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
+                BundleSpec::ImageFeatures(_) => BundleKind::Features,
             },
             origin: bundle.origin().clone(),
             generator: bundle.generator().map(|spec| GeneratorInfo {

@@ -308,7 +308,9 @@ impl Models {
         match bundle.kind {
             BundleKind::Generator => outside_of_pools(generator),
             BundleKind::Mask => outside_of_pools(mask_model),
-            BundleKind::Classifier => Err(TaskError::new(format!("Open {}", bundle.name), "it is a tool classifier")),
+            kind @ (BundleKind::Classifier | BundleKind::Features) => {
+                Err(TaskError::new(format!("Open {}", bundle.name), format!("it is a {}", kind.name())))
+            }
         }
     }
 

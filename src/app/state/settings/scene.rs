@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use touch2touch_core::units::clamp_or;
+use touch2touch_work::deviation::DISTANCES_M;
 
 /// Something that 3D views draw and a person can switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]
@@ -115,9 +116,6 @@ impl SceneLayer {
     }
 }
 
-/// Largest end of the scale of distances, meters.
-const MAX_DISTANCE_M: f32 = 0.05;
-
 /// The look of all 3D views.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -174,7 +172,7 @@ impl SceneLook {
             look.size = look.size.with(clamp_or(look.size.value(), lo, hi, preset.size.value()));
         }
         let default = Self::default().distance_m;
-        self.distance_m = clamp_or(self.distance_m, 1e-5, MAX_DISTANCE_M, default);
+        self.distance_m = clamp_or(self.distance_m, *DISTANCES_M.start() as f32, *DISTANCES_M.end() as f32, default);
         self
     }
 }

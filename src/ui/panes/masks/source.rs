@@ -178,9 +178,8 @@ fn offer(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         return;
     }
-    if let Some((ticket, task)) = cx.state.tasks.of_kind(TaskKind::Propose) {
-        let tip = "Stop; the pairs that were done until then keep their masks";
-        return cx.stoppable(ui, (ticket, task), 300.0, (&task.progress.text, tip));
+    if let Some((_, task)) = cx.state.tasks.of_kind(TaskKind::Propose) {
+        return cx.under_way(ui, task, &task.progress.text);
     }
     cx.action_button(ui, Action::Propose, "Propose");
     // Said here as well: the box that sets it is on screen only with a proposal.

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use eframe::egui::Color32;
 use glam::{DAffine3, DVec3};
 
-use super::{Memory, layers, other_side, rgb, steps};
+use super::{Memory, layers, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
@@ -136,13 +136,13 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         SceneLayer::Membrane => theme::mix(p.canvas, side_color(p, source), 0.6),
         SceneLayer::Surface => theme::mix(p.canvas, side_color(p, source), 0.7),
         SceneLayer::Contact => CONTACT,
-        SceneLayer::OtherContact => side_color(p, other_side(source)),
+        SceneLayer::OtherContact => side_color(p, source.other()),
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => p.accent,
         SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => p.good,
         // Lit from all sides it is darker than its color: before a light ground it begins paler.
         SceneLayer::Cad if *p == theme::LIGHT => theme::mix(p.cad, Color32::WHITE, 0.5),
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
-        SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, other_side(source)), 0.7),
+        SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, source.other()), 0.7),
         SceneLayer::TrueCad => p.strong,
         SceneLayer::Before => theme::mix(p.strong, GHOST, 0.8),
         SceneLayer::Dropped => theme::mix(p.strong, GHOST, 0.5),
@@ -259,7 +259,7 @@ fn surfaces(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Sce
 
 /// The contact points of the other side, in its color, where both are shown in one view.
 fn other_cloud(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    let other = other_side(source);
+    let other = source.other();
     let look = cx.state.settings.scene.layer(SceneLayer::OtherContact);
     let Some(cloud) = memory.clouds[other as usize].as_ref().filter(|_| look.shown) else { return };
     // What is of another pair is no comparison.
@@ -331,7 +331,7 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
         }
         (None, None) => {}
     }
-    let other = results::pose(state, other_side(source)).ready().filter(|_| state.workbench.both_clouds);
+    let other = results::pose(state, source.other()).ready().filter(|_| state.workbench.both_clouds);
     models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
     let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
     models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));

@@ -13,17 +13,18 @@ use crate::app::settings::LayerLook;
 use crate::app::workbench::Layer;
 use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{MeshItem, MeshStyle};
-use crate::gpu::points::{CloudItem, PointColors, PointSize};
+use crate::gpu::points::{CloudItem, PointColors};
 use crate::spatial::items;
 use crate::ui::panes::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::parts::cx::Cx;
 use touch2touch_core::align::Observability;
 use touch2touch_core::align::reason::Reason;
-use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::colormap::Range;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::verdict::Grade;
+use touch2touch_work::deviation::DISTANCE_MAP;
 
 /// Bars of a histogram of distances.
 const BARS: usize = 37;
@@ -56,9 +57,6 @@ fn counted(points: &PerPad<PointColors>, range: Range) -> [usize; BARS] {
     }
     counts
 }
-
-/// The colors of distances: blue inside, red outside.
-pub(crate) const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
 
 /// Makes the colors of a side's contact points, where a layer is on and its figures are there.
 pub(super) fn update(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource) {
@@ -126,13 +124,7 @@ pub(super) fn paint_model(memory: &Memory, source: ImprintSource, world_from_mes
     let Some((mesh, values, _)) = colors.surface.as_ref().filter(|(_, _, pose)| *pose == world_from_mesh) else {
         return;
     };
-    item.mesh = mesh.clone();
-    item.values = values.clone();
-    item.revision = colors.revision;
-    item.style.map = DISTANCE_MAP;
-    item.style.range = colors.range;
-    // The edges of its many small triangles are no edges of the model; they would be found anew for each pose.
-    item.style.edges = None;
+    items::model_by_distance(item, (colors.revision, (mesh.clone(), values.clone())), colors.range.hi);
 }
 
 /// Colors the contact points of one finger, if the layer is of this very cloud.
@@ -143,14 +135,9 @@ pub(super) fn paint(memory: &Memory, source: ImprintSource, finger: PadId, item:
         return;
     }
     let Some(own) = colors.fingers.get(finger) else { return };
-    item.colors = own.clone();
     item.revision = colors.revision;
-    item.style.map = if colors.surface.is_some() { DISTANCE_MAP } else { RESIDUAL_MAP };
-    item.style.range = colors.range;
-    // Larger than uncolored ones: a color has to be told from the next.
-    if let PointSize::Meters(m) = &mut item.style.size {
-        *m = m.max(0.000_6);
-    }
+    let map = if colors.surface.is_some() { DISTANCE_MAP } else { RESIDUAL_MAP };
+    items::paint_points(item, own.clone(), map, colors.range);
 }
 
 /// The look of a model that another one is compared with: its outline alone.

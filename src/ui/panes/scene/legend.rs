@@ -9,7 +9,7 @@ use eframe::egui::{
 };
 use strum::IntoEnumIterator as _;
 
-use super::{Memory, build, ghost, layers, other_side, steps};
+use super::{Memory, build, ghost, steps};
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
 use crate::app::workbench::Layer;
@@ -20,6 +20,7 @@ use crate::ui::parts::widget::colorbar::gradient;
 use touch2touch_core::align::reason::Reason;
 use touch2touch_core::colormap::ColorMap;
 use touch2touch_core::units;
+use touch2touch_work::deviation::DISTANCE_MAP;
 
 /// Height of a row, points.
 const ROW: f32 = 17.0;
@@ -136,8 +137,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         add(SceneLayer::Contact, "contact points");
     }
     if state.workbench.both_clouds {
-        let other =
-            if other_side(source) == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
+        let other = if source.other() == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
         add(SceneLayer::OtherContact, other);
     }
     for (layer, text) in ghost::legend_entries(memory, source) {
@@ -300,7 +300,7 @@ fn residuals(cx: &Cx<'_>, painter: &Painter, source: ImprintSource, rect: Rect) 
 pub(crate) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, rect: Rect) {
     let bar = bar(rect);
     let painter = ui.painter_at(rect);
-    colors(&painter, bar, layers::DISTANCE_MAP);
+    colors(&painter, bar, DISTANCE_MAP);
     let look: &SceneLook = &cx.state.settings.scene;
     let mut mm = units::mm(f64::from(look.distance_m));
     let texts = [format!("{below}-{mm:.2}"), "0".into(), format!("+{mm:.2} mm")];

@@ -12,9 +12,8 @@ use crate::app::settings::{SceneLayer, Versus, VersusMode};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use crate::gpu::scene::SceneData;
-use crate::ui::panes::scene::{
-    DISTANCE_MAP, SceneMesh, distances, guides, model_edges, outline, parts, rgb, update_mesh,
-};
+use crate::spatial::{self, items};
+use crate::ui::panes::scene::{SceneMesh, distances, guides, model_edges, outline, parts, rgb, update_mesh};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::scene_view::{Grip, SceneView};
 use crate::ui::parts::theme::{self, SMALL};
@@ -22,6 +21,7 @@ use crate::ui::parts::widget::empty;
 use touch2touch_core::colormap::Range;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units;
+use touch2touch_work::deviation::DISTANCE_MAP;
 
 /// Diameter of a point, meters.
 const POINT_M: f32 = 0.000_5;
@@ -71,10 +71,8 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
     space.view.camera.orthographic = cx.state.settings.scene.orthographic;
     let mut scene = scene(cx, space, versus, flipped);
     let output = space.view.interact(ui, "3D view, A and B", Grip::Nothing);
-    if (output.fit || !space.view.placed)
-        && let Some(bounds) = scene.bounds()
-    {
-        space.view.camera.fit(bounds, output.size);
+    if output.fit || !space.view.placed {
+        space.view.camera.frame(&spatial::focus(&scene), spatial::FILLED);
         space.view.placed = true;
     }
     scene.moving = output.moved;
@@ -163,9 +161,9 @@ fn scene(cx: &Cx<'_>, space: &Space, versus: &Versus, flipped: bool) -> SceneDat
             for (finger, [membrane, contact]) in held.fingers.entries() {
                 let finger = cx.state.finger_name(finger);
                 let faint = theme::mix(cx.p.canvas, own, 0.35);
-                for (name, points, color) in [("membrane", membrane, faint), ("contact", contact, own)] {
+                for (name, points, color) in [("membrane ", membrane, faint), (items::CONTACT, contact, own)] {
                     scene.clouds.push(CloudItem {
-                        name: format!("{letter:?} {name} {finger}"),
+                        name: format!("{name}{finger} {letter:?}"),
                         revision: held.revision,
                         points: points.clone(),
                         colors: PointColors::One,

@@ -16,6 +16,7 @@ use super::load::Labeled;
 use super::methods::{Method, Models};
 use super::{Setup, ToolWork};
 use crate::infer::engine::{EngineChoice, resolve};
+use crate::infer::features::Preparation;
 use crate::infer::sheets::Sheets;
 use crate::io::dataset::{Dataset, SourceKind, UNIT_FILE};
 use crate::io::digest::sha256;
@@ -29,7 +30,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 4;
+const VERSION: u32 = 5;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.
@@ -43,7 +44,7 @@ pub(super) struct Entry {
     /// True where no pose was found: NaN has no place in the file.
     no_pose: bool,
     scale: Scale,
-    /// Features by the classifier, bit for bit, by image.
+    /// Features by the classifier or the extractor, bit for bit, by image.
     features: Vec<String>,
     /// Least and largest value of each prediction.
     pub(super) spans: Vec<Option<[f32; 2]>>,
@@ -195,6 +196,7 @@ fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &Method) -> 
         stored: bool,
         recipe: RecipeId,
         classifier: Option<&'a str>,
+        features: Option<(&'a str, Preparation)>,
         engine: &'a str,
         finger: Option<PadId>,
         kind: String,
@@ -210,6 +212,7 @@ fn sheet(dataset: &Dataset, setup: &Setup, models: &Models, method: &Method) -> 
         // Drawn masks are in the key of the grasp.
         recipe: Recipe { engine, hand: true, ..recipe }.id(Stage::Pose),
         classifier: models.classifier_hash(),
+        features: models.features_key(),
         engine: models.engine(),
         finger: setup.finger,
         kind: format!("{:?}", dataset.kind),

@@ -10,6 +10,7 @@ use crate::imprint;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
+use crate::infer::features::{FeatureExtractor, Preparation};
 use crate::io::dataset::{Dataset, SourceKind};
 use crate::job::JobCx;
 use crate::labels::ImprintSource;
@@ -73,6 +74,9 @@ pub(super) struct Models {
     /// The classifier's bundle; the model once it was needed.
     classifier_bundle: Option<Bundle>,
     pub(super) classifier: Option<ToolClassifier>,
+    /// The feature extractor's bundle with the preparation of pictures; the model once it was needed.
+    features_bundle: Option<(Bundle, Preparation)>,
+    pub(super) extractor: Option<FeatureExtractor>,
     engine: String,
     /// Number of masks that were not made of the source that was asked, by row and reason.
     pub(super) made_otherwise: BTreeMap<(String, String), usize>,
@@ -125,12 +129,19 @@ impl Models {
             (**model).clone().of_kind(BundleKind::Mask, WHAT)?;
         }
         let classifier_bundle = setup.classifier.as_ref().filter(|_| !pictures).map(open).transpose()?;
+        let features = setup.features.as_ref().filter(|_| !pictures);
+        let features_bundle = features.map(|(origin, way)| Ok::<_, TaskError>((open(origin)?, *way))).transpose()?;
+        if let Some((bundle, _)) = &features_bundle {
+            BundleInfo::of(bundle).of_kind(BundleKind::Features, WHAT)?;
+        }
         Ok(Self {
             methods,
             masks: models.beside(),
             common: Recipe { mask_model, ..setup.recipe.clone() },
             classifier_bundle,
             classifier: None,
+            features_bundle,
+            extractor: None,
             engine,
             made_otherwise: BTreeMap::new(),
         })
@@ -149,6 +160,10 @@ impl Models {
         if let Some(bundle) = &self.classifier_bundle {
             let opened = ToolClassifier::open(bundle, self.common.engine);
             self.classifier = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
+        }
+        if let Some((bundle, way)) = &self.features_bundle {
+            let opened = FeatureExtractor::open(bundle, self.common.engine, *way);
+            self.extractor = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
         }
         Ok(())
     }
@@ -176,6 +191,11 @@ impl Models {
     /// The identity of the classifier's bundle.
     pub(super) fn classifier_hash(&self) -> Option<&str> {
         self.classifier_bundle.as_ref().map(Bundle::hash)
+    }
+
+    /// The identity of the feature extractor's bundle, with the preparation of its pictures.
+    pub(super) fn features_key(&self) -> Option<(&str, Preparation)> {
+        self.features_bundle.as_ref().map(|(bundle, way)| (bundle.hash(), *way))
     }
 
     /// Recipe that every method has in common.
@@ -233,8 +253,12 @@ impl Models {
                 format!("contact masks: the deepest {:.1} % of each imprint", percent.get())
             }
         });
-        if self.classifier_bundle.is_none() {
-            notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
+        match (&self.features_bundle, &self.classifier_bundle) {
+            (Some((bundle, way)), _) => {
+                notes.push(format!("FID: features of {}; {}", bundle.name(), way.description()))
+            }
+            (None, None) => notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into()),
+            (None, Some(_)) => {}
         }
         notes
     }

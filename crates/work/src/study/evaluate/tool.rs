@@ -14,6 +14,7 @@ use crate::compare::as_tile;
 use crate::error::TaskError;
 use crate::feel::{Felt, Touch};
 use crate::infer::classifier::{ToolClassifier, Verdict};
+use crate::infer::features::FeatureExtractor;
 use crate::io::caught::caught;
 use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::job::JobCx;
@@ -26,11 +27,12 @@ use touch2touch_core::contact::{ContactMask, MaskBasis};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch_core::label::Doubt;
+use touch2touch_core::label::{Doubt, iou};
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
 use touch2touch_core::pose::ToolModel;
-use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Scale;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::{Sample, Scale};
 use touch2touch_core::verdict::Grade;
 
 /// A prediction that waits for its image figures.
@@ -41,7 +43,10 @@ struct Image {
     truth: Option<Grid<f32>>,
     noise_free: Option<Grid<f32>>,
     unstretched: Option<Unstretched>,
+    mask_iou: Option<f64>,
     verdict: Option<Verdict>,
+    /// Features by an extractor, where one was named.
+    features: Option<Vec<f32>>,
 }
 
 /// A grasp that waits for its image figures.
@@ -82,6 +87,16 @@ fn name_tools(classifier: Option<&mut ToolClassifier>, images: &mut [Image]) -> 
     Ok(())
 }
 
+/// Has the extractor describe each image, where one was named.
+fn describe(extractor: Option<&mut FeatureExtractor>, images: &mut [Image]) -> Result<(), String> {
+    let Some(extractor) = extractor else { return Ok(()) };
+    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
+    let found = guarded(|| extractor.features(&pictures).map_err(|err| err.to_string()));
+    let found = found.map_err(|why| format!("feature extractor: {why}"))?;
+    images.iter_mut().zip(found).for_each(|(image, features)| image.features = Some(features));
+    Ok(())
+}
+
 /// A grasp with what a method made of it.
 struct Masked<'a> {
     case: &'a LoadedPair,
@@ -90,6 +105,8 @@ struct Masked<'a> {
     felt: Option<Felt>,
     /// Why some masks are not of the source that was asked.
     otherwise: Vec<(String, usize)>,
+    /// Intersection over union of each mask with the simulator's true contact.
+    iou: PerPad<f64>,
     /// Doubt of the mask model about the imprints.
     doubt: Doubt,
 }
@@ -135,7 +152,7 @@ impl<'a> Tool<'a> {
         say: &mut dyn FnMut(&str),
     ) {
         let common = models.common().clone();
-        let Models { methods, masks: by_models, classifier, .. } = models;
+        let Models { methods, masks: by_models, classifier, extractor, .. } = models;
         self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
@@ -171,34 +188,44 @@ impl<'a> Tool<'a> {
                     }
                 }
                 let otherwise = otherwise(&felt);
+                let iou = felt.has(Stage::Mask).then(|| mask_iou(&felt, &case.sample)).unwrap_or_default();
                 let doubt = match upper && case.sample.scale == Scale::Measured {
                     true => guarded(|| doubt(&mut felt, touch.labels, by_models).map_err(|err| err.why)),
                     false => Ok(Doubt::default()),
                 };
                 let doubt = doubt.map_err(|why| skip(case, format!("mask model: {why}"))).unwrap_or_default();
                 let felt = Some(felt).filter(|felt| felt.has(Stage::Mask));
-                kept.push(Masked { case, made, felt, otherwise, doubt });
+                kept.push(Masked { case, made, felt, otherwise, iou, doubt });
             }
             // Poses on all cores; the models run one by one.
             let angles: Vec<Result<Judged, String>> = kept
                 .par_iter()
                 .map(|Masked { case, made, felt, .. }| {
                     // A color picture has no depth, so there is nothing that could fail.
-                    let Some(felt) = felt.clone().filter(|_| made.colors.is_empty()) else { return Ok((None, None)) };
+                    let Some(felt) = felt.clone().filter(|_| made.colors.is_empty()) else {
+                        return Ok(Judged::default());
+                    };
                     guarded(|| self.angle(felt, self.touch(case, &labels), by_models, cx))
                 })
                 .collect();
-            for (Masked { case, made, otherwise, doubt, .. }, angle) in kept.into_iter().zip(angles) {
+            for (Masked { case, made, otherwise, iou, doubt, .. }, angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
-                let ((angle_error_rad, verdict), mut images) = match scored {
+                let (judged, mut images) = match scored {
                     Ok(scored) => scored,
                     Err(why) => {
                         skip(case, why);
                         continue;
                     }
                 };
+                for image in &mut images {
+                    image.mask_iou = iou.get(PadId::new(image.finger)).copied();
+                }
                 let classifier = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured);
                 if let Err(why) = name_tools(classifier.filter(|_| made.colors.is_empty()), &mut images) {
+                    skip(case, why);
+                }
+                let extractor = extractor.as_mut().filter(|_| case.sample.scale == Scale::Measured);
+                if let Err(why) = describe(extractor.filter(|_| made.colors.is_empty()), &mut images) {
                     skip(case, why);
                 }
                 let score = GraspScore {
@@ -208,8 +235,9 @@ impl<'a> Tool<'a> {
                     // Differences of a color sensor never lost their scale.
                     scale: if made.colors.is_empty() { case.sample.scale } else { Scale::Measured },
                     images: Vec::new(),
-                    angle_error_rad,
-                    verdict,
+                    angle_error_rad: judged.angle_error_rad,
+                    position_error_m: judged.position_error_m,
+                    verdict: judged.verdict,
                     seconds: made.seconds,
                     doubt,
                     seed_spread_m: None,
@@ -238,13 +266,18 @@ impl<'a> Tool<'a> {
     /// The error of the angle from both fingers and the verdict on the pose.
     fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Judged, String> {
         if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
-            return Ok((None, None));
+            return Ok(Judged::default());
         }
         let felt = felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why)?;
         let found = felt.pose().ok();
-        let verdict = found.and_then(|found| Some(found.verdict.as_ref()?.grade));
-        let error = touch.sample.grasp_from_object.map(|_| found.and_then(|found| found.error_rad).unwrap_or(f64::NAN));
-        Ok((error, verdict))
+        let truth = touch.sample.grasp_from_object;
+        let both = found.zip(truth);
+        let apart = both.map(|(found, truth)| PoseDifference::between(found.grasp_from_object, truth));
+        Ok(Judged {
+            angle_error_rad: truth.map(|_| found.and_then(|found| found.error_rad).unwrap_or(f64::NAN)),
+            position_error_m: apart.map(|apart| apart.position_m),
+            verdict: found.and_then(|found| Some(found.verdict.as_ref()?.grade)),
+        })
     }
 
     /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
@@ -297,8 +330,27 @@ impl<'a> Tool<'a> {
     }
 }
 
-/// Error of the angle, radians (NaN without a pose, `None` where there can be none), and the verdict on the pose.
-type Judged = (Option<f64>, Option<Grade>);
+/// A pose against the truth, and the verdict on it.
+#[derive(Default)]
+struct Judged {
+    /// Radians; NaN without a pose, `None` where there can be none.
+    angle_error_rad: Option<f64>,
+    /// Meters.
+    position_error_m: Option<f64>,
+    verdict: Option<Grade>,
+}
+
+/// Intersection over union of each mask of a touch with the simulator's true contact, where it is known.
+fn mask_iou(felt: &Felt, sample: &Sample) -> PerPad<f64> {
+    let mut found = PerPad::default();
+    for (pad, contact) in felt.contact().masks.entries() {
+        let truth = sample.pad(pad).and_then(|touch| touch.depth()).and_then(|depth| depth.truth.as_ref());
+        found[pad] = truth
+            .filter(|truth| truth.contact.size() == contact.mask.size())
+            .map(|truth| iou(&contact.mask, &truth.contact));
+    }
+    found
+}
 
 /// The images of a grasp, made once more.
 pub(super) struct Again {
@@ -392,7 +444,16 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
             let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
             let prediction = levels(color);
             let finger = finger.index();
-            return Some(Image { finger, prediction, truth, noise_free: None, unstretched: None, verdict: None });
+            return Some(Image {
+                finger,
+                prediction,
+                truth,
+                noise_free: None,
+                unstretched: None,
+                mask_iou: None,
+                verdict: None,
+                features: None,
+            });
         }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
@@ -415,13 +476,24 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
                 truth: Some(truth),
                 noise_free: None,
                 unstretched,
+                mask_iou: None,
                 verdict: None,
+                features: None,
             });
         }
         let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
-        Some(Image { finger: finger.index(), prediction, truth, noise_free, unstretched: None, verdict: None })
+        Some(Image {
+            finger: finger.index(),
+            prediction,
+            truth,
+            noise_free,
+            unstretched: None,
+            mask_iou: None,
+            verdict: None,
+            features: None,
+        })
     };
     let meant = |pad: &PadId| setup.finger.is_none_or(|only| only == *pad) && case.sample.pad(*pad).is_some();
     case.sample.rig.pads().filter(meant).filter_map(image).collect()
@@ -453,7 +525,7 @@ fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
 }
 
 fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
-    let Image { finger, prediction, truth, noise_free, unstretched, verdict } = image;
+    let Image { finger, prediction, truth, noise_free, unstretched, mask_iou, verdict, features } = image;
     let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
     let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
     let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
@@ -464,8 +536,10 @@ fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed:
         ssim: of(0),
         ssim_noise_free: clean.map(|found| found[0].mean),
         ssim_peak: of(1).filter(|_| !assumed),
+        ssim_standard: ssim.as_ref().map(|found| found[1].interior).filter(|v| !assumed && v.is_finite()),
+        mask_iou,
         unstretched,
         tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
-        features: verdict.map_or_else(Vec::new, |v| v.features),
+        features: features.or(verdict.map(|v| v.features)).unwrap_or_default(),
     }
 }

@@ -100,18 +100,22 @@ pub(super) fn space_view(look: &FigureLook, pane: SpacePane, rig: &Rig) -> Space
         },
         angles: ViewAngles::default(),
         turned_deg: 0.0,
+        distance_m: None,
         size_px: [WIDE, height(look, rig)].map(|units| (units * per_unit).round() as u32),
     }
 }
 
 fn bars(look: &FigureLook) -> Vec<(&'static str, ColorMap, Range)> {
-    use FigurePane::{Error, Measured, Predicted};
+    use FigurePane::{Compare, Error, Measured, Predicted};
     let mut bars = Vec::new();
     if look.panes.iter().any(|pane| matches!(pane, Measured | Predicted)) {
         bars.push(("imprint, mm", look.map, look.range));
     }
     if look.panes.contains(&Error) {
         bars.push(("predicted minus measured, mm", ColorMap::Diverging, Range::symmetric(look.error_m)));
+    }
+    if look.panes.contains(&Compare) {
+        bars.push(("A minus B, mm", ColorMap::Diverging, Range::symmetric(look.error_m)));
     }
     bars
 }
