@@ -337,7 +337,7 @@ fn the_results_table_is_printed_and_written() {
         for figures in row["groups"].as_array().unwrap() {
             assert_eq!((&figures["grasps"], &figures["images"]), (&Value::from(2), &Value::from(4)));
             assert_eq!(figures["psnr_db"].is_null(), upper, "the measured imprints are not compared with themselves");
-            for key in ["psnr_noise_free_db", "success_5", "tool_accuracy"] {
+            for key in ["psnr_noise_free_db", "success_5", "tool_accuracy", "mask_iou"] {
                 assert!(figures[key]["value"].is_number(), "{key} in {figures}");
             }
             assert_eq!(figures["frechet"].is_number(), !upper);
@@ -351,6 +351,21 @@ fn the_results_table_is_printed_and_written() {
         same
     });
     assert_eq!(report["pairs"].as_array().unwrap().len(), 3);
+
+    // By a feature extractor the distance is a FID, of the pictures that were asked for.
+    let features = bundle("features");
+    let fid = |prepare: &str| {
+        let report = json(&run(&[&args[..], &["--features", &features, "--prepare", prepare]].concat(), &data));
+        let notes = report["notes"].to_string();
+        assert!(notes.contains("Small features (test)") && notes.contains("4 images are fewer than the 6"), "{notes}");
+        let figures = &report["rows"][1]["groups"][0];
+        assert!(figures["frechet"].is_null() && figures["frechet_images"] == 4.0, "{figures}");
+        assert!(figures["psnr_each_db"]["value"].is_number() && figures["ssim_standard"]["value"].is_number());
+        figures["fid"].as_f64().unwrap()
+    };
+    assert!(fid("lab") != fid("plain"));
+    let wrong = run(&[&args[..], &["--features", &classifier]].concat(), &data);
+    assert!(error_text(&wrong).contains("not a feature extractor"), "{}", error_text(&wrong));
 
     // A damaged pair is left out and named; the rest is scored.
     std::fs::write(set.join("test/test_only/gelslims/pattern_36_data_0.pt"), b"no file").unwrap();

@@ -1,6 +1,8 @@
 //! Pictures in 3D: the same bytes by the menu of a pane and by the verbs.
 
+use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::export::{FigureRows, StillAsked};
+use touch2touch::app::workbench::Layer;
 use touch2touch_work::figure::FigurePane;
 use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
 

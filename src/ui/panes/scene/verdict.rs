@@ -2,7 +2,7 @@
 
 use crate::app::results;
 use crate::app::settings::prefer;
-use eframe::egui::{Align, Button, Color32, Layout, RichText, Sense, Ui, UiBuilder, vec2};
+use eframe::egui::{Align, Button, Color32, FontId, Layout, RichText, Sense, Ui, UiBuilder, vec2};
 
 use super::hands;
 use super::overlay::{difference, lower_first, pose_details, pose_time, step_text};
@@ -20,6 +20,9 @@ use touch2touch_core::verdict::Grade;
 
 /// Height of the line, points.
 const HEIGHT: f32 = 22.0;
+/// Height of its letters, points.
+const LINE: f32 = 12.0;
+
 /// True where there is no pose because the mask has too few contact points.
 fn lacks_contact(state: &State, source: ImprintSource) -> bool {
     match results::pose(state, source) {
@@ -33,7 +36,7 @@ fn lacks_contact(state: &State, source: ImprintSource) -> bool {
 
 /// The line; takes its height from the top of the pane.
 pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
-    let (text, color, details) = said(cx, source);
+    let (text, color, mut details) = said(cx, source);
     let width = ui.available_width();
     let (rect, response) = ui.allocate_exact_size(vec2(width, HEIGHT), Sense::hover());
     ui.painter().rect_filled(rect, 0.0, cx.p.frame);
@@ -75,7 +78,11 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
     }
     ui.scope_builder(UiBuilder::new().max_rect(inner), |ui| {
         ui.set_clip_rect(inner.intersect(ui.clip_rect()));
-        ui.add(eframe::egui::Label::new(RichText::new(text).size(12.0).color(color)).truncate());
+        let shown = fitting(ui, &text);
+        if shown != text {
+            details.insert(0, text);
+        }
+        ui.add(eframe::egui::Label::new(RichText::new(shown).size(LINE).color(color)).truncate());
     });
     if !details.is_empty() {
         response.on_hover_ui(|ui| {
@@ -84,6 +91,20 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             }
         });
     }
+}
+
+/// The parts of the line that fit beside each other, from the first on: a whole part less is better than half a word.
+fn fitting(ui: &Ui, text: &str) -> String {
+    let width = |text: &str| {
+        let galley = ui.painter().layout_no_wrap(text.to_owned(), FontId::proportional(LINE), Color32::WHITE);
+        galley.size().x
+    };
+    let mut text = text;
+    while width(text) > ui.available_width() {
+        let Some((kept, _)) = text.rsplit_once(" · ") else { break };
+        text = kept;
+    }
+    text.to_owned()
 }
 
 /// The line, its color, and what there is besides.

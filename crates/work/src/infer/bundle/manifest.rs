@@ -1,5 +1,7 @@
 //! The manifest's keys, and what makes a manifest wrong.
 
+mod features;
+
 use std::collections::BTreeMap;
 
 use serde::de::DeserializeOwned;
@@ -15,6 +17,8 @@ use touch2touch_core::postprocess::{
 };
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::{Sensor, SensorKind, lab, share};
+
+pub use features::FeaturesSpec;
 
 const FORMAT: &str = "touch2touch-bundle";
 /// The newest version; the first declares no sensors, and means the lab's.
@@ -35,31 +39,6 @@ pub enum BundleSpec {
     ToolClassifier(ClassifierSpec),
     /// Picture to features.
     ImageFeatures(FeaturesSpec),
-}
-
-/// A network whose features a Fréchet distance is of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FeaturesSpec {
-    /// Size of the picture.
-    pub input: FeaturesInput,
-    /// Number of the features.
-    pub output: FeaturesOutput,
-}
-
-/// Picture that a feature extractor takes: three channels, 0..1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FeaturesInput {
-    /// `[width, height]`.
-    pub size: [usize; 2],
-}
-
-/// Output of a feature extractor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct FeaturesOutput {
-    /// Their number.
-    pub features: usize,
 }
 
 /// A latent-diffusion generator.
@@ -456,7 +435,7 @@ pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
         Some("generator") => (generator(&mut keys, problems), &[Role::ConditionEncoder, Role::Denoiser, Role::Decoder]),
         Some("mask_unet") => (mask(&mut keys, problems), &[Role::MaskUnet]),
         Some("tool_classifier") => (classifier(&mut keys, problems), &[Role::ToolClassifier]),
-        Some("image_features") => (features(&mut keys, problems), &[Role::ImageFeatures]),
+        Some("image_features") => (features::parse(&mut keys, problems), &[Role::ImageFeatures]),
         other => {
             if let Some(other) = other {
                 let hint = "it must be \"generator\", \"mask_unet\", \"tool_classifier\" or \"image_features\"";
@@ -690,18 +669,6 @@ fn classifier(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<
         }
     }
     Some(BundleSpec::ToolClassifier(ClassifierSpec { input: input?, output: output? }))
-}
-
-fn features(keys: &mut Map<String, Value>, problems: &mut Problems) -> Option<BundleSpec> {
-    let input: Option<FeaturesInput> = section(keys, "input", problems);
-    let output: Option<FeaturesOutput> = section(keys, "output", problems);
-    if input.is_some_and(|input| !sides(&input.size)) {
-        problems.add("input.size: out of range", SIDES);
-    }
-    if output.is_some_and(|output| !sides(&[output.features])) {
-        problems.add("output.features: out of range", "give 1 to 4096");
-    }
-    Some(BundleSpec::ImageFeatures(FeaturesSpec { input: input?, output: output? }))
 }
 
 const SIDES: &str = "every side must be 1 to 4096, and no tensor larger than 4 x 4096 x 4096";
