@@ -141,22 +141,19 @@ pub fn trials(setup: &TrialsSetup, models: &Models, cx: &JobCx) -> Result<Trials
         let model = ToolModel::new(task.spec.mesh()).map_err(|err| TaskError::from_error(WHAT, &err))?;
         let run = Run { setup, task, model: &model, dataset: &dataset, models, cx };
         cx.progress(done.load(Ordering::Relaxed) as u64, total as u64, task.name());
-        let one = |number: usize| {
+        let one = |number: usize| -> Result<Vec<Trial>, TaskError> {
             let trial = run.trial(number)?;
             let so_far = done.fetch_add(1, Ordering::Relaxed) + 1;
             cx.progress(so_far as u64, total as u64, format!("{}, trial {}", task.name(), number + 1));
             Ok(trial)
         };
-        let made = (0..setup.count).into_par_iter().map(|number| {
-            // A trial that is stopped midway is none.
-            if cx.cancel.is_cancelled() { Ok(None) } else { one(number).map(Some) }
+        // A trial that is stopped midway is none.
+        let made = (0..setup.count).into_par_iter().map(|number| match cx.cancel.is_cancelled() {
+            true => Ok(None),
+            false => one(number).map(Some).or_else(|err| if cx.cancel.is_cancelled() { Ok(None) } else { Err(err) }),
         });
-        let made: Result<Vec<_>, TaskError> = made.collect();
-        let made = match made {
-            Ok(made) => made.into_iter().flatten().collect(),
-            Err(_) if cx.cancel.is_cancelled() => Vec::new(),
-            Err(err) => return Err(err),
-        };
+        let made = made.collect::<Result<Vec<_>, TaskError>>()?;
+        let made: Vec<_> = made.into_iter().flatten().collect();
         if cx.cancel.is_cancelled() && made.is_empty() {
             break;
         }

@@ -135,7 +135,8 @@ pub(super) fn notes(setup: &TrialsSetup) -> Vec<String> {
             text_mm(cup.mass_m),
             text_mm(setup.margin_m)
         ),
-        "in the plane of the in-hand angle, rigid, without friction: what the gripper gives way is taken to be found".into(),
+        "in the plane of the in-hand angle, rigid, without friction: what the gripper gives way is taken to be found"
+            .into(),
     ];
     notes.push("intervals: 95 %, Wilson's score".into());
     notes.push("the paper's counts are of a real robot, whose hole and clearance are not known here".into());
