@@ -31,7 +31,7 @@ use touch2touch_core::trials::{Compliance, HoleShape, InHand, Published, publish
 use touch2touch_core::units::angle_error;
 
 pub use report::{Held, MethodTrials, Swept, ToolTrials, Trial};
-pub use task::{Task, default_tools, known_tools};
+pub use task::{Task, TaskKind, default_tools, known_tools};
 
 /// Name of the task in errors.
 const WHAT: &str = "Trials";

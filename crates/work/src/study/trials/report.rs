@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::TrialsSetup;
-use super::task::{Kind, Task};
+use super::task::{Task, TaskKind};
 use crate::error::TaskError;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::metrics::AngleSummary;
@@ -85,7 +85,7 @@ pub struct ToolTrials {
     /// Name of the tool.
     pub tool: String,
     /// What was done with it.
-    pub task: Kind,
+    pub task: TaskKind,
     /// One per method, in the order of the settings.
     pub methods: Vec<MethodTrials>,
 }
@@ -98,7 +98,7 @@ pub(super) fn tool_trials(task: &Task, setup: &TrialsSetup, made: Vec<Vec<Trial>
     }
     let one = |(method, trials): (&super::Method, Vec<Trial>)| {
         let firsts: Vec<Option<InHand>> = trials.iter().map(|trial| trial.first.in_hand()).collect();
-        let share = |(clearance_m, passes)| Swept { clearance_m, success: Share::count::<Vec<bool>>(passes) };
+        let share = |(clearance_m, passes): (f64, Vec<bool>)| Swept { clearance_m, success: Share::count(passes) };
         let pairs = || trials.iter().map(|trial| (trial.first.tried(), trial.second.as_ref().map(Held::tried)));
         let looped = |after| with_verdict(pairs(), after);
         let errors: Vec<f64> = trials.iter().map(|trial| trial.first.angle_error_rad.unwrap_or(f64::NAN)).collect();

@@ -44,7 +44,7 @@ enum Goal {
 /// Kind of a task, in files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Kind {
+pub enum TaskKind {
     /// A hole of the tool's own outline.
     Insertion,
     /// A cup on a cup.
@@ -85,10 +85,10 @@ impl Task {
     }
 
     /// Kind of the task.
-    pub fn kind(&self) -> Kind {
+    pub fn kind(&self) -> TaskKind {
         match self.goal {
-            Goal::Insertion(_) => Kind::Insertion,
-            Goal::Stacking(_) => Kind::Stacking,
+            Goal::Insertion(_) => TaskKind::Insertion,
+            Goal::Stacking(_) => TaskKind::Stacking,
         }
     }
 
