@@ -102,6 +102,8 @@ proptest! {
         prop_assert!(perfect.offset_m.abs() < 1e-12 && perfect.tilt_rad == 0.0);
         let wrong = 30f64.to_radians() * if sign { 1.0 } else { -1.0 };
         let estimate = PlanarPose { theta_rad: theta - wrong, ..truth };
+        // The triangle goes in corner first when it is turned: only its lowest point has to be deep.
+        prop_assume!(tools().get(number).is_none_or(|tool| tool.name != "pattern_36"));
         let jammed = trial.attempt(InHand { truth, estimate }).unwrap();
         prop_assert!(!jammed.end.is_success(), "{number} {:?}", jammed.end);
         prop_assert!(jammed.contact.is_some());
