@@ -32,6 +32,7 @@ mod stats;
 mod still;
 mod sweep;
 mod training_data;
+mod trials;
 mod unit;
 mod version;
 mod watch;
@@ -97,6 +98,8 @@ enum Verb {
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Turn a dial (mask threshold or probability, gate, trim, shift) over all pairs, and say what it does to every pose.
     Sweep(Box<sweep::SweepArgs>),
+    /// What a robot would do with the poses: simulated grasps of a tool, put into a hole of its own outline; cup on cup.
+    Trials(Box<trials::TrialsArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
     Figure(Box<figure::FigureArgs>),
     /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
@@ -275,6 +278,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
         Some(Verb::Sweep(args)) => sweep::run(&args),
+        Some(Verb::Trials(args)) => trials::run(&args),
         Some(Verb::Figure(args)) => figure::run(&args),
         Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),

@@ -1,5 +1,6 @@
 //! The catalog of tools: the lab's twelve, and tools drawn at random.
 
+mod household;
 mod mesh;
 mod shape;
 
@@ -9,6 +10,7 @@ use glam::{DVec2, Vec2Swizzles};
 
 use super::noise::{Noise, Stream};
 
+pub use household::{CUP_AXIS_M, CUP_BASE_M, cup_handle, pencil};
 pub use shape::{Bar, ToolSpec};
 
 /// Length of shaft between the grasp and an ambiguous pair's pattern, meters: out of the GelSlim's 18 mm, within the

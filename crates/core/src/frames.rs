@@ -38,6 +38,13 @@ impl PlanarPose {
         Self { theta_rad: -self.theta_rad, y_m: t.x, z_m: t.y }
     }
 
+    /// The motion `inner` and then this one: `a_from_b.compose(b_from_c)` is `a_from_c`.
+    #[must_use]
+    pub fn compose(self, inner: Self) -> Self {
+        let t = self.transform_yz(DVec2::new(inner.y_m, inner.z_m));
+        Self { theta_rad: self.theta_rad + inner.theta_rad, y_m: t.x, z_m: t.y }
+    }
+
     /// Moves a point given as `(y, z)`.
     pub fn transform_yz(self, yz: DVec2) -> DVec2 {
         rotate(self.theta_rad, yz) + DVec2::new(self.y_m, self.z_m)
@@ -90,6 +97,9 @@ mod tests {
         assert!((back - p).length() < 1e-15);
         let q = pose.to_affine().transform_point3(DVec3::new(0.5, p.x, p.y));
         assert!((DVec2::new(q.y, q.z) - pose.transform_yz(p)).length() < 1e-15);
+        let other = PlanarPose { theta_rad: -1.1, y_m: 0.02, z_m: 0.03 };
+        let both = pose.compose(other);
+        assert!((both.transform_yz(p) - pose.transform_yz(other.transform_yz(p))).length() < 1e-15);
         let round = (pose.inverse().to_affine() * pose.to_affine()).to_cols_array();
         for (a, b) in round.iter().zip(DAffine3::IDENTITY.to_cols_array()) {
             assert!((a - b).abs() < 1e-15);

@@ -44,6 +44,7 @@ pub mod sim;
 mod tent;
 pub mod text;
 pub mod tool;
+pub mod trials;
 pub mod turn;
 pub mod units;
 pub mod upright;

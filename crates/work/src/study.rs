@@ -18,3 +18,4 @@ pub mod statistics;
 pub mod still;
 pub mod subject;
 pub mod sweep;
+pub mod trials;

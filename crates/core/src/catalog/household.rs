@@ -1,0 +1,75 @@
+//! Things that are no tools of the lab's data set, for trials of a robot: a pencil, and a cup by its handle.
+//!
+//! They are not in [`tools()`](super::tools()), which training, tests and tables count on. Both are as thick along the
+//! closing axis as the lab's tools: thinner, and the two membranes would meet beside them, which the simulator does not
+//! know.
+
+use glam::DVec2;
+
+use super::shape::{Bar, ToolSpec};
+use super::tool;
+
+/// Place of the cup's axis along y, meters, object frame: its wall is farther from the grip than the membranes reach.
+pub const CUP_AXIS_M: f64 = 0.075;
+/// Place of the cup's base along z, meters, object frame.
+pub const CUP_BASE_M: f64 = 0.045;
+/// Distance from the grip to the cup's wall, meters.
+const HANDLE_M: f64 = 0.035;
+/// Half the height of the handle's opening, meters.
+const HALF_GRIP_M: f64 = 0.02;
+/// Half the width of the handle's strap, meters.
+const HALF_STRAP_M: f64 = 0.0025;
+
+/// A pencil: a rod of 7 mm, whose cone of 14 mm ends in a tip of 1 mm, 34.5 mm from the grip.
+pub fn pencil() -> ToolSpec {
+    let point = |y: f64, z: f64| DVec2::new(y, z) * 1e-3;
+    let core = vec![point(-3.0, -60.0), point(3.0, -60.0), point(3.0, 20.0), point(0.0, 34.0), point(-3.0, 20.0)];
+    ToolSpec {
+        bevel_width_m: 0.002,
+        bevel_depth_m: 0.002,
+        ..tool("pencil", false, vec![Bar { core, half_width_m: 0.0005 }])
+    }
+}
+
+/// The handle that a cup is held by: a strap along the cup's axis, with an arm to the wall at each end.
+///
+/// Held at the strap the cup's tilt is that of a bar between two arms, which the fingers feel; held by its round wall, only
+/// the rim would tell, which no finger is sure to meet.
+pub fn cup_handle() -> ToolSpec {
+    let strap = |from: [f64; 2], to: [f64; 2]| Bar { core: vec![from.into(), to.into()], half_width_m: HALF_STRAP_M };
+    let arm = |z: f64| strap([0.0, z], [HANDLE_M, z]);
+    tool("cup", false, vec![strap([0.0, -HALF_GRIP_M], [0.0, HALF_GRIP_M]), arm(-HALF_GRIP_M), arm(HALF_GRIP_M)])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::catalog::tools;
+    use crate::sim::{Grasp, SimConfig, simulate};
+    use crate::tool::ToolModel;
+
+    #[test]
+    fn they_are_solid_can_be_felt_and_leave_the_catalog_alone() {
+        for spec in [pencil(), cup_handle()] {
+            assert!(tools().iter().all(|tool| tool.name != spec.name));
+            let mesh = spec.mesh();
+            assert!(mesh.is_watertight(), "{}", spec.name);
+            ToolModel::new(mesh).unwrap();
+            let felt = |degrees: f64| {
+                let grasp = Grasp { theta_rad: degrees.to_radians(), ..Grasp::default() };
+                simulate(&spec, grasp, 1, &SimConfig::default())
+            };
+            let (upright, turned) = (felt(0.0), felt(15.0));
+            let pad = crate::rig::lab::RIGHT;
+            let contact = |sample: &crate::sample::Sample| {
+                let truth = sample.pad(pad).unwrap().depth().unwrap().truth.as_ref().unwrap().contact.clone();
+                (truth.as_slice().iter().filter(|c| **c).count(), truth)
+            };
+            let ((count, a), (_, b)) = (contact(&upright), contact(&turned));
+            assert!(count > 500, "{}: {count} pixels of contact", spec.name);
+            assert_ne!(a, b, "{}: its angle can be seen", spec.name);
+        }
+        let tip = pencil().mesh().bounds().unwrap()[1].z;
+        assert!((tip - 0.0345).abs() < 1e-4, "{tip}");
+    }
+}
