@@ -96,6 +96,8 @@ pub enum Demand {
     FingerPoses,
     /// The layers of the registration that the workbench is about.
     Layers,
+    /// The trial of a robot with the pose that the workbench is about.
+    Trial,
     /// The recorded registration that is looked at.
     Steps,
     /// The map of its starts.
@@ -161,6 +163,10 @@ macro_rules! panes {
             timemachine { TimeMachine {
                 "Time machine", "The steps of a registration, forwards and backwards",
                 Steps, needs [Steps], at [Align Bottom(1)]
+            } }
+            trial { Trial {
+                "Robot trial" as "Trial", "What a robot would do with the pose: the tool let down into a hole of its own outline",
+                Form, needs [Trial], at [Align Bottom(1)]
             } }
             basin { BasinMap {
                 "Basin map", "Where starts lead; a click on one loads its run into the time machine",
@@ -255,7 +261,7 @@ macro_rules! define {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, LabelStats, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
-                    Steps, Thumbnails, Training, Versus,
+                    Steps, Thumbnails, Training, Trial, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

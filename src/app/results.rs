@@ -47,6 +47,7 @@ pub(crate) mod shown;
 pub(crate) mod thumbnail;
 pub(crate) mod tool;
 pub(crate) mod train_plan;
+pub(crate) mod trial;
 pub(crate) mod versus;
 
 pub(crate) use about::{about_key, want_about};
@@ -109,6 +110,8 @@ pub(crate) use thumbnail::want_thumbnails;
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
 pub(crate) use train_plan::{train_plan_key, want_train_plan};
+pub use trial::trial;
+pub(crate) use trial::{shows_trial, want_trial};
 pub use versus::{subject, subject_key, subject_pose, subjects_apart, subjects_compared};
 pub(crate) use versus::{subject_points, want_versus};
 

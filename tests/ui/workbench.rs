@@ -102,6 +102,27 @@ impl Rig {
 }
 
 #[test]
+fn a_robot_tries_the_pose_and_the_picture_rests_when_it_is_over() {
+    let Some(mut rig) = Rig::aligned() else { return };
+    rig.front("Trial");
+    rig.until("the trial", |state| results::trial(state, MEASURED).ready().is_some());
+    rig.settle();
+    rig.harness.get_by_label_contains("By the measured pose: through");
+    rig.harness.get_by_label("3D view, trial");
+    assert!(!rig.asks_to_repaint(), "nothing plays");
+    rig.harness.get_by_label("Play the trial").click();
+    rig.harness.step();
+    rig.harness.step();
+    assert!(rig.asks_to_repaint(), "it plays");
+    let over = (0..2000).any(|_| {
+        rig.harness.step();
+        !rig.asks_to_repaint()
+    });
+    assert!(over, "it ends");
+    rig.shoot("trial");
+}
+
+#[test]
 fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     let Some(mut rig) = Rig::aligned() else { return };
     let name = rig.model().pair_name().to_owned();

@@ -5,6 +5,7 @@
 //! all as the floor. A second grasp is made of a trial where a method's verdict on the first is not *good*. The sweep over
 //! clearances tries the same poses again; nothing is felt anew for it.
 
+mod pair;
 mod report;
 mod task;
 
@@ -30,6 +31,7 @@ use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
 use touch2touch_core::trials::{Compliance, HoleShape, InHand, Published, published};
 use touch2touch_core::units::angle_error;
 
+pub use pair::{PairTrial, of_pair};
 pub use report::{Held, MethodTrials, Swept, ToolTrials, Trial};
 pub use task::{Task, TaskKind, default_tools, known_tools};
 

@@ -18,7 +18,7 @@ use touch2touch_core::postprocess::{
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::{Sensor, SensorKind, lab, share};
 
-pub use features::FeaturesSpec;
+pub(crate) use features::FeaturesSpec;
 
 const FORMAT: &str = "touch2touch-bundle";
 /// The newest version; the first declares no sensors, and means the lab's.
