@@ -188,7 +188,7 @@ impl<'a> Tool<'a> {
                     }
                 }
                 let otherwise = otherwise(&felt);
-                let iou = felt.has(Stage::Mask).then(|| mask_iou(&felt, &case.sample)).unwrap_or_default();
+                let iou = if felt.has(Stage::Mask) { mask_iou(&felt, &case.sample) } else { PerPad::default() };
                 let doubt = match upper && case.sample.scale == Scale::Measured {
                     true => guarded(|| doubt(&mut felt, touch.labels, by_models).map_err(|err| err.why)),
                     false => Ok(Doubt::default()),
