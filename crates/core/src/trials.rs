@@ -176,6 +176,11 @@ pub enum End {
         /// Depth of the tip, meters.
         depth_m: f64,
     },
+    /// The tip came to the bottom, but the tool is tilted by more than counts as put in.
+    Askew {
+        /// Depth of the tip, meters.
+        depth_m: f64,
+    },
     /// The cup stands.
     Stands {
         /// Distance of its center of mass from the edge of its support, less the margin, meters.
@@ -200,6 +205,7 @@ impl std::fmt::Display for End {
         match *self {
             Self::Through { depth_m } => write!(f, "through, {} deep", text_mm(depth_m)),
             Self::Jammed { depth_m } => write!(f, "jams {} deep", text_mm(depth_m)),
+            Self::Askew { depth_m } => write!(f, "askew, {} deep", text_mm(depth_m)),
             Self::Stands { spare_m } => write!(f, "stands, {} to spare", text_mm(spare_m)),
             Self::Falls { spare_m } => write!(f, "falls, {} beyond the margin", text_mm(-spare_m)),
         }

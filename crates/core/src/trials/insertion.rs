@@ -4,6 +4,8 @@
 //! not matter. It succeeds where some turn and shift within the compliance is free of the plates at that depth: everything
 //! that is below the mouth then passed the plates above it straight, so the same turn and shift is free on the whole way.
 //!
+//! What reaches the bottom tilted by more than 10° is not put in, but askew: one prong of a fork, or a corner.
+//!
 //! Shifts are solved exactly, as intervals. Turns are searched by branch and bound: no point within a distance r of the grasp's
 //! origin moves by more than r times a turn, so what overlaps a hole that is wider by that cannot be turned free.
 
@@ -21,6 +23,8 @@ const TOUCH_M: f64 = 1e-9;
 const FINEST_M: f64 = 1e-7;
 /// Turns that are looked at for one answer, at most.
 const MOST: usize = 4000;
+/// Largest tilt of a tool that counts as put in: the paper's limit of a usable angle, radians.
+const UPRIGHT_RAD: f64 = 10.0 / 180.0 * std::f64::consts::PI;
 /// Halvings of a depth, and of a share of the compliance.
 const DEPTH_HALVINGS: usize = 16;
 const SHARE_HALVINGS: usize = 8;
@@ -67,9 +71,9 @@ impl Held {
         self.body.iter().map(|s| s.map(|p| turn.transform_yz(p))).collect()
     }
 
-    /// Only what can come below the mouth within a compliance at a depth: the rest cannot touch a plate.
-    fn near(&self, compliance: Compliance, depth_m: f64) -> Self {
-        let above = -2.0 * self.reach_m * compliance.turn_rad - TOUCH_M;
+    /// Only what can come below the mouth within a turn at a depth: the rest cannot touch a plate.
+    fn near(&self, turn_rad: f64, depth_m: f64) -> Self {
+        let above = -2.0 * self.reach_m * turn_rad - TOUCH_M;
         let is_near = |s: &Segment| s.iter().any(|p| p.y >= above);
         let kept = self.body.iter().zip(self.at(0.0, depth_m)).filter(|(_, at)| is_near(at)).map(|(s, _)| *s);
         Self { body: kept.collect(), ..*self }
@@ -113,8 +117,7 @@ impl Insertion {
     /// # Errors
     /// [`TrialError::Number`] for a pose that is not finite.
     pub fn passes(&self, grasp: InHand) -> Result<bool, TrialError> {
-        let held = self.held(grasp.checked()?);
-        Ok(self.free(&held, self.compliance, self.hole.shape().depth_m).is_some())
+        Ok(self.upright(&self.held(grasp.checked()?)).is_some())
     }
 
     /// The whole attempt.
@@ -125,9 +128,9 @@ impl Insertion {
         let held = self.held(grasp.checked()?);
         let (bottom_m, still) = (self.hole.shape().depth_m, Compliance::default());
         let goal = grasp.world_from_object(self.goal());
-        let passes = self.free(&held, self.compliance, bottom_m).is_some();
+        let upright = self.upright(&held);
         let free_m = self.deepest(&held, still, 0.0);
-        let end_m = if passes { bottom_m } else { self.deepest(&held, self.compliance, free_m) };
+        let end_m = if upright.is_some() { bottom_m } else { self.deepest(&held, self.compliance, free_m) };
         let contact = (free_m < bottom_m).then(|| self.contact(&held, free_m));
         let rigid = Motion::default();
         let mut path = vec![held.waypoint(Phase::Approach, rigid, -ABOVE_M)];
@@ -135,12 +138,17 @@ impl Insertion {
             path.push(held.waypoint(Phase::Contact, rigid, free_m));
             path.extend(self.way(&held, [free_m, end_m]));
         }
-        let last = path.last().filter(|last| last.phase == Phase::Inside).copied();
-        path.push(
-            last.map_or_else(|| held.waypoint(Phase::End, rigid, end_m), |at| Waypoint { phase: Phase::End, ..at }),
-        );
+        // As little as it takes, unless that is askew.
+        let is_upright = |at: &Waypoint| upright.is_none() || at.world_from_object.theta_rad.abs() <= UPRIGHT_RAD;
+        let last = path.last().filter(|last| last.phase == Phase::Inside && is_upright(last)).copied();
+        let at_end = |motion: Motion| held.waypoint(Phase::End, motion, end_m);
+        path.push(last.map_or_else(|| at_end(upright.unwrap_or_default()), |at| Waypoint { phase: Phase::End, ..at }));
         Ok(Attempt {
-            end: if passes { End::Through { depth_m: end_m } } else { End::Jammed { depth_m: end_m } },
+            end: match upright {
+                Some(_) => End::Through { depth_m: end_m },
+                None if end_m < bottom_m => End::Jammed { depth_m: end_m },
+                None => End::Askew { depth_m: end_m },
+            },
             tilt_rad: goal.theta_rad,
             offset_m: goal.transform_yz(self.hole.tip()).x,
             contact,
@@ -155,21 +163,36 @@ impl Insertion {
         Held { body, world_from_grasp, grasp_from_object: truth, reach_m }
     }
 
+    /// A motion within the compliance that brings the tool to the bottom upright.
+    fn upright(&self, held: &Held) -> Option<Motion> {
+        let tilt = held.world_from_grasp.theta_rad + held.grasp_from_object.theta_rad;
+        let Compliance { turn_rad, shift_m } = self.compliance;
+        let turns = [(-turn_rad).max(-UPRIGHT_RAD - tilt), turn_rad.min(UPRIGHT_RAD - tilt)];
+        self.search(held, turns, shift_m, self.hole.shape().depth_m)
+    }
+
     /// A motion within a compliance at which the tool is free with its lowest point at a depth: one that is small.
-    fn free(&self, held: &Held, compliance: Compliance, depth_m: f64) -> Option<Motion> {
-        let held = held.near(compliance, depth_m);
+    fn free(&self, held: &Held, Compliance { turn_rad, shift_m }: Compliance, depth_m: f64) -> Option<Motion> {
+        self.search(held, [-turn_rad, turn_rad], shift_m, depth_m)
+    }
+
+    fn search(&self, held: &Held, [least, most]: [f64; 2], shift_m: f64, depth_m: f64) -> Option<Motion> {
+        if least > most {
+            return None;
+        }
+        let held = held.near(least.abs().max(most.abs()), depth_m);
         let at = |turn_rad: f64, slack: Slack| {
-            self.hole.shifts(&held.at(turn_rad, depth_m), compliance.shift_m + slack.across_m, slack)
+            self.hole.shifts(&held.at(turn_rad, depth_m), shift_m + slack.across_m, slack)
         };
         let found = |turn_rad: f64| {
             let shift_m = at(turn_rad, Slack { across_m: TOUCH_M, down_m: TOUCH_M }).nearest_to_zero()?;
             Some(Motion { turn_rad, shift_m })
         };
-        if let Some(motion) = found(0.0) {
+        let smallest = 0.0_f64.clamp(least, most);
+        if let Some(motion) = found(smallest) {
             return Some(motion);
         }
-        let most = compliance.turn_rad;
-        let mut open = vec![[-most, 0.0], [0.0, most]];
+        let mut open = vec![[least, smallest], [smallest, most]];
         for _ in 0..MOST {
             let [low, high] = open.pop()?;
             let (middle, half) = (0.5 * (low + high), 0.5 * (high - low));
