@@ -83,7 +83,7 @@ def parser():
     parser.add_argument("--budgets", type=lambda text: [int(n) for n in text.split(",")], default=[10_000, 20_000, 40_000],
                         help="samples that every method is given")
     parser.add_argument("--equal", type=int, default=20_000, help="samples of each training in the tables of conditions and ablations")
-    parser.add_argument("--grasps", type=int, default=2000, help="grasps of the training shards of each condition, both fingers")
+    parser.add_argument("--grasps", type=int, default=1500, help="grasps of the training shards of each condition, both fingers")
     parser.add_argument("--test-grasps", type=int, help="score only so many grasps of each tool (default: all 46)")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program")
