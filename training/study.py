@@ -67,7 +67,8 @@ def made(row, args, program):
 def settings(row, args):
     common = {"test_grasps": args.test_grasps}
     if row.training:
-        common |= {"seed": args.seed, "training_grasps": args.grasps, "turned": TURNED, "fall": FALL, "autoencoder": AUTOENCODER}
+        common |= {"seed": args.seed, "training_grasps": args.grasps, "turned": TURNED, "fall": FALL}
+        common |= {"autoencoder": AUTOENCODER}
     return row.settings() | common
 
 

@@ -62,7 +62,8 @@ def main():
                     train_to(kind, training, shards, out, steps, 0.0, 1)
                 assert asked == expected, f"{method} was given other samples"
                 ways.append(torch.load(out / f"{kind}.pt", weights_only=True))
-            assert all(same(ways[0][key], ways[1][key]) for key in ("nets", "optimiser", "others", "step")), f"{method}: a stop shows"
+            equal = [same(ways[0][key], ways[1][key]) for key in ("nets", "optimiser", "others", "step")]
+            assert all(equal), f"{method}: a stop shows"
             print(f"{method}: the samples of the seed in its order; the same to the last bit over a stop", flush=True)
 
 

@@ -50,11 +50,13 @@ class Program:
     def fitted(self, bundle, data, pairs, steps, out):
         """A bundle fitted to some pairs by `adapt`."""
         if not (out / "manifest.json").exists():
-            self.run("adapt", data, "--bundle", bundle, "--limit", pairs, "--tune", steps, "--validate", 0, "--force", "--out", out)
+            self.run("adapt", data, "--bundle", bundle, "--limit", pairs, "--tune", steps, "--validate", 0, "--force",
+                     "--out", out)
         return out
 
     def evaluate(self, bundle, data, shift, grasps):
         """The verb's answer with every grasp, and the command that gave it."""
         words = ["evaluate", data, "--bundle", bundle, "--mask-bundle", MODELS / "mask_unet", "--classifier",
                  MODELS / "tool_classifier", "--shift", shift, "--pairs", *(("--grasps", grasps) if grasps else ())]
-        return self.run(*words), " ".join(str(w).replace(str(self.place), "OUT").replace(str(MODELS), "assets/models") for w in words)
+        said = " ".join(map(str, words)).replace(str(self.place), "OUT").replace(str(MODELS), "assets/models")
+        return self.run(*words), said
