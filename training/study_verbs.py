@@ -5,6 +5,8 @@ import os
 import subprocess
 from pathlib import Path
 
+from .data import sha256
+
 MODELS = Path(__file__).resolve().parent.parent / "assets" / "models"
 
 
@@ -29,8 +31,10 @@ class Program:
         return json.loads(done.stdout)
 
     def version(self):
+        """Version and commit as the program says them, and which file it is: a build for development does not know."""
         done = subprocess.run([self.path, "--version"], env=self.environment, capture_output=True, text=True, check=True)
-        return done.stdout.strip().splitlines()[0]
+        said = ", ".join(" ".join(line.split()) for line in done.stdout.splitlines()[:2])
+        return f"{said}, sha256 {sha256(self.path)[:12]}"
 
     def shards(self, condition, grasps, seed):
         """The folder of the training shards of a condition; those that are there are not written again."""
