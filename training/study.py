@@ -52,7 +52,7 @@ def made(row, args, program):
         if row.fit:
             place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
             bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
-    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps)
+    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features)
     if not answer["complete"] or answer["skipped"]:
         raise Refused(f"not every grasp could be scored: {answer['skipped'][:3]}")
     facts = {"date": datetime.date.today().isoformat(), "commit": commit(), "program": program.version(), "machine": machine(),
@@ -65,7 +65,7 @@ def made(row, args, program):
 
 
 def settings(row, args):
-    common = {"test_grasps": args.test_grasps}
+    common = scoring(args)
     if row.training:
         common |= {"seed": args.seed, "training_grasps": args.grasps, "turned": TURNED, "fall": FALL}
         common |= {"autoencoder": AUTOENCODER}
@@ -73,7 +73,11 @@ def settings(row, args):
 
 
 def measured(row, args):
-    return {"method": "measured imprints", "test": row.test, "test_grasps": args.test_grasps}
+    return {"method": "measured imprints", "test": row.test} | scoring(args)
+
+
+def scoring(args):
+    return {"test_grasps": args.test_grasps, "features": Path(args.features).name if args.features else None}
 
 
 def parser():
@@ -86,6 +90,7 @@ def parser():
     parser.add_argument("--equal", type=int, default=20_000, help="samples of each training in the tables of conditions and ablations")
     parser.add_argument("--grasps", type=int, default=1500, help="grasps of the training shards of each condition, both fingers")
     parser.add_argument("--test-grasps", type=int, help="score only so many grasps of each tool (default: all 46)")
+    parser.add_argument("--features", help="bundle of `training.fid_features`: a FID in the place of the Fréchet distance")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program")
     parser.add_argument("--table", action="store_true", help="print the file's tables and make nothing")

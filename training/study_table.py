@@ -3,7 +3,7 @@
 from .paired import differences
 
 # Heading, the verb's name of the figure, digits.
-COLUMNS = (("PSNR dB", "psnr_db", 1), ("clean dB", "psnr_noise_free_db", 1), ("SSIM", "ssim", 3), ("FD", "frechet", 2),
+COLUMNS = (("PSNR dB", "psnr_db", 1), ("clean dB", "psnr_noise_free_db", 1), ("SSIM", "ssim", 3), ("FD", "frechet", 2), ("FID", "fid", 1),
            ("angle °", "angle_deg", 1), ("≤5° %", "success_5", 1), ("≤10° %", "success_10", 1))
 GROUPS = {"seen_tools": "unseen grasps of seen tools", "unseen_tools": "unseen tools"}
 
@@ -34,17 +34,16 @@ def number(figure, digits):
 
 
 def table(rows, group):
-    heads = ["row", *(column[0] for column in COLUMNS)]
-    lines = [heads, ["---", *["--:"] * len(COLUMNS)]]
-    for row in rows:
-        figures = next((g for g in row["groups"] if g["group"] == group), None)
-        if figures:
-            lines.append([label(row["settings"]), *(number(figures[key], digits) for _, key, digits in COLUMNS)])
+    of = [(row, next((g for g in row["groups"] if g["group"] == group), {})) for row in rows]
+    columns = [c for c in COLUMNS if any(figures.get(c[1]) is not None for _, figures in of)]
+    lines = [["row", *(column[0] for column in columns)], ["---", *["--:"] * len(columns)]]
+    for row, figures in of:
+        lines.append([label(row["settings"]), *(number(figures.get(key), digits) for _, key, digits in columns)])
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
 
 def paired_table(rows, group):
-    heads = ["from", "to", *(column[0] for column in COLUMNS if column[1] not in ("psnr_noise_free_db", "frechet"))]
+    heads = ["from", "to", *(column[0] for column in COLUMNS if column[1] not in ("psnr_noise_free_db", "frechet", "fid"))]
     lines = [heads, ["---", "---", *["--:"] * (len(heads) - 2)]]
     for found in differences(rows):
         figures = found["groups"].get(group)

@@ -58,9 +58,10 @@ class Program:
                      "--out", out)
         return out
 
-    def evaluate(self, bundle, data, shift, grasps):
+    def evaluate(self, bundle, data, shift, grasps, features):
         """The verb's answer with every grasp, and the command that gave it."""
         words = ["evaluate", data, "--bundle", bundle, "--mask-bundle", MODELS / "mask_unet", "--classifier",
-                 MODELS / "tool_classifier", "--shift", shift, "--pairs", *(("--grasps", grasps) if grasps else ())]
+                 MODELS / "tool_classifier", "--shift", shift, "--pairs", *(("--grasps", grasps) if grasps else ()),
+                 *(("--features", features) if features else ())]
         said = " ".join(map(str, words)).replace(str(self.place), "OUT").replace(str(MODELS), "assets/models")
         return self.run(*words), said
