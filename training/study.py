@@ -112,7 +112,8 @@ def main():
             begun = time.monotonic()
             try:
                 for each in made(row, args, program):
-                    rows.add(each)
+                    if not rows.find(each["settings"]):
+                        rows.add(each)
             except Refused as why:
                 print(f"{name}: {row} is left out: {why}", file=sys.stderr, flush=True)
                 continue

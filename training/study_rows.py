@@ -2,7 +2,7 @@
 
 {"rows": [{"settings", "made", "groups", "grasps"}], "differences": [{"from", "to", "groups"}]}. `groups` are the verb's own
 figures with their intervals. `grasps` holds of each tool, in the order of its grasps, root mean square error (0.1 um), SSIM
-(1e-4) and angle error (0.01 degrees; null: no pose), so that a row made on another day can be compared grasp by grasp.
+(1e-4; measured imprints have neither) and angle error (0.01 degrees; null: no pose), so that a row made on another day can be compared grasp by grasp.
 """
 
 import json
@@ -16,11 +16,11 @@ def compact(scores):
     """The figures of every grasp, rounded, by tool."""
     tools = {}
     for grasp in sorted(scores["grasps"], key=lambda g: (g["tool"], int(g["pair"].rsplit("_", 1)[1]))):
-        error = [sum(image["error"][key] for image in grasp["images"]) for key in ("sum", "pixels")]
-        ssim = [image["ssim"] for image in grasp["images"]]
+        squares, pixels = (sum(image["error"][key] for image in grasp["images"]) for key in ("sum", "pixels"))
+        ssim = [image["ssim"] for image in grasp["images"] if image["ssim"] is not None]
         tool = tools.setdefault(grasp["tool"], {"group": grasp["group"], "rms": [], "ssim": [], "angle": []})
-        tool["rms"].append(round((error[0] / error[1]) ** 0.5 * 1e7))
-        tool["ssim"].append(round(sum(ssim) / len(ssim) * 1e4))
+        tool["rms"].append(round((squares / pixels) ** 0.5 * 1e7) if pixels else None)
+        tool["ssim"].append(round(sum(ssim) / len(ssim) * 1e4) if ssim else None)
         angle = grasp["angle_error_rad"]
         tool["angle"].append(None if angle is None else round(angle * 18000 / 3.141592653589793))
     return tools
