@@ -42,16 +42,15 @@ def machine():
 
 def made(row, args, program):
     """Makes a row: trains, fits, evaluates. The row, and that of the measured imprints of the same grasps."""
-    bundle, cost = MODELS / "generator_ldm", None
+    bundle, cost, data = MODELS / "generator_ldm", None, row.test
+    if row.test.startswith("other"):
+        pairs, data = program.other(row.test, OTHER_SEED)
     if row.training:
         shards = program.shards(row.training.condition, args.grasps, args.seed)
         bundle, cost = exported(row.training, row.samples, shards, Path(args.out) / "runs", args.seed)
-    data = row.test
-    if row.test.startswith("other"):
-        pairs, data = program.other(row.test, OTHER_SEED)
-        if row.fit:
-            place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
-            bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
+    if row.fit:
+        place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
+        bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
     answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features)
     if not answer["complete"] or answer["skipped"]:
         raise Refused(f"not every grasp could be scored: {answer['skipped'][:3]}")
