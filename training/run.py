@@ -32,7 +32,8 @@ class Run:
                 net.load_state_dict(state["nets"][name])
             self.optimiser.load_state_dict(state["optimiser"])
             for name, optimiser in self.others.items():
-                optimiser.load_state_dict(state["others"][name])
+                if name in state.get("others", {}):
+                    optimiser.load_state_dict(state["others"][name])
             self.step, self.samples, self.spent = state["step"], state["samples"], state["minutes"]
             self.worked += 60 * state.get("processor_minutes", 0.0)
             self.means, self.extra = state["losses"], state["extra"]

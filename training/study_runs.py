@@ -54,10 +54,10 @@ def methods(budgets, _equal):
     """Each method at each budget; the diffusion also by the other ways to meters; beside them what ships."""
     yield Row(None, None)
     for budget in sorted(budgets):
-        for method in METHODS:
-            yield Row(Training(method), budget)
-        for shift in SHIFTS[1:]:
+        for shift in SHIFTS:
             yield Row(Training(), budget, shift=shift)
+        for method in list(METHODS)[1:]:
+            yield Row(Training(method), budget)
 
 
 def conditions(_budgets, equal):
