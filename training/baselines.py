@@ -9,11 +9,9 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
-import numpy as np
-
 from . import data
 from .models import ResBlock, Transformer, norm
-from .run import Run, condition, edges, indices, symmetries, target
+from .run import Run, batches, condition, edges, symmetries, target
 
 # In the order of the simulator's list, which is what a shard's `meta` counts by.
 NAMES = (
@@ -137,25 +135,22 @@ class Classifier(nn.Module):
         return self.body(image)
 
 
-def begin(args, kind, net, rate, others=None):
+def begin(args, kind, net, rate, nets=None, others=None):
     net = net.to(memory_format=torch.channels_last)
-    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
-    return shards, rng, Run(args, kind, {kind: net, **(others or {})}, rate)
+    return data.Shards(args.data), Run(args, kind, {kind: net, **(nets or {})}, rate, others)
 
 
-def pairs(shards, rng, run, size=16):
+def pairs(shards, run, size=16):
     """Batches of (GelSlim, clean imprint) until the budget is spent."""
-    for batch in indices(shards, rng, size):
-        if run.over():
-            return
+    for batch, rng in batches(shards, run, size):
         k = symmetries(run.args, rng, len(batch))
         yield condition(shards, batch, k, run.args, rng), target(shards, "clean", batch, k, run.args)
 
 
 def l1unet(args):
     net = L1UNet()
-    shards, rng, run = begin(args, "l1unet", net, 1e-3)
-    for gelslim, clean in pairs(shards, rng, run):
+    shards, run = begin(args, "l1unet", net, 1e-3)
+    for gelslim, clean in pairs(shards, run):
         with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
             loss = (net(gelslim).float() - clean).abs().mean()
         run.descend(loss, len(gelslim), {"l1": loss})
@@ -163,12 +158,12 @@ def l1unet(args):
 
 
 def visgel(args):
-    """L1 and a least-squares GAN; the critic has its own optimiser, begun anew at each start."""
+    """L1 and a least-squares GAN; the critic has its own optimiser."""
     net, critic = L1UNet(), PatchCritic()
-    critic.requires_grad_(False)
-    shards, rng, run = begin(args, "visgel", net, 7e-4, {"critic": critic})
     optimiser = torch.optim.AdamW(critic.parameters(), lr=3e-4, betas=(0.5, 0.99))
-    for gelslim, clean in pairs(shards, rng, run):
+    critic.requires_grad_(False)
+    shards, run = begin(args, "visgel", net, 7e-4, {"critic": critic}, {"critic": optimiser})
+    for gelslim, clean in pairs(shards, run):
         with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
             drawn = net(gelslim).float()
         critic.requires_grad_(True)
@@ -185,14 +180,14 @@ def visgel(args):
 
 def vqvae(args):
     net = VqVae()
-    shards, rng, run = begin(args, "vqvae", net, 1e-3)
-    for gelslim, clean in pairs(shards, rng, run):
+    shards, run = begin(args, "vqvae", net, 1e-3)
+    for gelslim, clean in pairs(shards, run):
         with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
             drawn, z, q = net(gelslim)
         l1, edge = (drawn.float() - clean).abs().mean(), edges(drawn.float(), clean)
         book = F.mse_loss(q, z.detach()) + 0.25 * F.mse_loss(z, q.detach())
         run.descend(10 * l1 + 10 * edge + book, len(gelslim), {"l1": l1, "edge": edge, "book": book})
-        if run.step % 100 == 0 and run.progress() < 0.5:
+        if run.step % 100 == 0 and not run.fallen():
             revive(net, z.detach())
     run.save()
 
@@ -209,10 +204,8 @@ def revive(net, z):
 
 def classifier(args):
     net = Classifier()
-    shards, rng, run = begin(args, "classifier", net, 1e-3)
-    for batch in indices(shards, rng, 32):
-        if run.over():
-            break
+    shards, run = begin(args, "classifier", net, 1e-3)
+    for batch, rng in batches(shards, run, 32):
         batch = batch[shards.meta[batch, 5] >= 0]
         tool = torch.from_numpy(shards.meta[batch, 5]).long()
         image = data.to_model(shards.metres("imprint" if rng.random() < 0.5 else "clean", batch))

@@ -65,6 +65,40 @@ class Picture(nn.Module):
         return latent * 1.0
 
 
+class Padded(nn.Module):
+    """A network whose GelSlim image is first drawn where the sensor lies in the bubble's view."""
+
+    def __init__(self, net):
+        super().__init__()
+        self.net = net
+        self.rows, self.columns = (nn.Buffer(m) for m in data.shrunk())
+
+    def forward(self, gelslim):
+        return self.net(self.rows @ gelslim @ self.columns)
+
+
+class Cropped(nn.Module):
+    """A decoder of the GelSlim's view alone, drawn where it lies in the bubble's view; around it no imprint, 0 m."""
+
+    def __init__(self, net):
+        super().__init__()
+        self.net = net
+        self.rows, self.columns = (nn.Buffer(m) for m in data.shrunk())
+        low, high = data.RANGE_M
+        self.nothing = -(high + low) / (high - low)
+
+    def forward(self, latent):
+        return self.rows @ (self.net(latent).clamp(-1, 1) - self.nothing) @ self.columns + self.nothing
+
+
+def placed(nets, geometry):
+    """Condition encoder, denoiser and decoder of another geometry as ones of whole pictures, as every bundle has them."""
+    encoder, denoiser, decoder = nets
+    wrapped = {"full": (encoder, decoder), "padding": (Padded(encoder), decoder), "cropping": (encoder, Cropped(decoder))}
+    encoder, decoder = wrapped[geometry]
+    return encoder.eval(), denoiser, decoder.eval()
+
+
 class Named(nn.Module):
     """The classifier with what its last layer sees, averaged over the cells: sets of imprints are compared by it."""
 
@@ -217,7 +251,8 @@ def generator(args, out):
     if args.average_with:
         averaged((encoder, denoiser, decoder), args)
     shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
-    return generator_bundle(args, out, "Latent diffusion", (encoder, denoiser, decoder), shapes, args.steps,
+    nets = placed((encoder, denoiser, decoder), state["options"]["geometry"])
+    return generator_bundle(args, out, "Latent diffusion", nets, shapes, args.steps,
                             {"autoencoder": ae, "generator": state})
 
 
@@ -226,15 +261,12 @@ def one_shot(args, out):
     state = torch.load(Path(args.run) / f"{args.what}.pt", weights_only=True)
     net = baselines.VqVae() if args.what == "vqvae" else baselines.L1UNet()
     net.load_state_dict(state["nets"][args.what])
-    if state["options"]["geometry"] == "cropping":
-        raise SystemExit("a network trained on cropped imprints does not draw the bubble's view; a bundle cannot say so")
-    if state["options"]["geometry"] == "padding":
-        raise SystemExit("padding the GelSlim image is not part of a bundle's preparation; export a run without it")
     net = net.eval()
     if args.what == "vqvae":
         nets, shape = (Codes(net), OneShot(), net.decoder), (net.book.shape[1], 16, 16)
     else:
         nets, shape = (net, OneShot(), Picture()), (1, 128, 128)
+    nets = placed(nets, state["options"]["geometry"])
     title = {"vqvae": "VQ-VAE", "l1unet": "L1 UNet", "visgel": "VisGel"}[args.what]
     return generator_bundle(args, out, title, nets, (shape, shape), 1, {args.what: state})
 
@@ -272,7 +304,16 @@ def mask(args, out):
 WHAT = {"generator": generator, "mask": mask, "l1unet": one_shot, "visgel": one_shot, "vqvae": one_shot, "classifier": classifier}
 
 
-def main():
+def bundle(args):
+    """Writes a bundle; returns its manifest, which is written last."""
+    out = Path(args.out)
+    out.mkdir(parents=True, exist_ok=True)
+    manifest = WHAT[args.what](args, out)
+    (out / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+    return manifest
+
+
+def parser():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=tuple(WHAT))
     parser.add_argument("--run", default="training/runs/demo", help="folder of checkpoints")
@@ -285,12 +326,13 @@ def main():
     parser.add_argument("--sampler", default="ddim", help="its default sampler: ddim, ddpm or dpm_solver2m")
     parser.add_argument("--note", default="", help="free text for the provenance")
     parser.add_argument("--seed", type=int, default=7, help="which training touches the shift statistics come from")
-    args = parser.parse_args()
+    return parser
+
+
+def main():
+    args = parser().parse_args()
     torch.set_num_threads(1)
-    out = Path(args.out)
-    out.mkdir(parents=True, exist_ok=True)
-    manifest = WHAT[args.what](args, out)
-    (out / "manifest.json").write_text(json.dumps(manifest, indent=2) + "\n")
+    manifest, out = bundle(args), Path(args.out)
     print(json.dumps({"bundle": str(out), "bytes": sum(f.stat().st_size for f in out.iterdir()),
                       "onnx_minus_torch_max": manifest["provenance"]["onnx_minus_torch_max"]}))
 

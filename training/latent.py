@@ -8,18 +8,15 @@ import torch
 import torch.nn.functional as F
 
 from . import data, diffusion, models
-from .run import Run, condition, edges, indices, start, symmetries, target
+from .run import Run, batches, condition, edges, start, symmetries, target
 
 
 def autoencoder(args):
-    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
-    net = models.Autoencoder()
+    shards, net = data.Shards(args.data), models.Autoencoder()
     start(net.decoder, args, "decoder", "decoder.")
     net = net.to(memory_format=torch.channels_last)
     run = Run(args, "autoencoder", {"autoencoder": net}, 1.5e-3)
-    for batch in indices(shards, rng, 8):
-        if run.over():
-            break
+    for batch, rng in batches(shards, run, 8):
         # A bundle has no encoder: a new one first learns the latents that the bundle's decoder knows.
         frozen = bool(args.start) and run.progress() < 0.4
         net.decoder.requires_grad_(not frozen)
@@ -36,17 +33,24 @@ def autoencoder(args):
 
 
 class Latents:
-    """The clean imprints' latents, whitened per cell, computed once per sample and symmetry."""
+    """The clean imprints' latents, whitened per cell, computed once per sample and symmetry.
 
-    def __init__(self, net, shards, args):
+    `known`: mean and deviation, where they were taken before.
+    """
+
+    def __init__(self, net, shards, args, known=None):
         self.net, self.shards, self.args, self.store = net.eval(), shards, args, {}
+        self.mean, self.std = known or self._statistics()
+
+    def _statistics(self):
+        shards = self.shards
         chosen = np.random.default_rng(1).choice(len(shards), min(1024, len(shards)), replace=False)
         parts = [np.sort(chosen[i:i + 32]) for i in range(0, len(chosen), 32)]
         z, log_var = (torch.cat(x) for x in zip(*(self._raw(p, np.zeros(len(p), int)) for p in parts)))
-        self.mean = z.mean(dim=0, keepdim=True)
+        mean = z.mean(dim=0, keepdim=True)
         # The posterior's own spread counts too: a channel that carries little must not be blown up to full size.
-        spread = (z - self.mean) ** 2 + log_var.exp()
-        self.std = spread.mean(dim=(0, 2, 3), keepdim=True).sqrt()
+        spread = (z - mean) ** 2 + log_var.exp()
+        return mean, spread.mean(dim=(0, 2, 3), keepdim=True).sqrt()
 
     @torch.no_grad()
     def _raw(self, batch, k):
@@ -55,18 +59,17 @@ class Latents:
 
     def take(self, batch, k):
         pairs = list(zip(batch.tolist(), k.tolist()))
-        missing = [i for i, pair in enumerate(pairs) if pair not in self.store]
-        if missing:
-            for i, z in zip(missing, self._raw(batch[missing], k[missing])[0].half()):
-                self.store[pairs[i]] = z
+        # One by one: the last bits of a batch depend on its size, which depends on what is in the store.
+        for i, pair in enumerate(pairs):
+            if pair not in self.store:
+                self.store[pair] = self._raw(batch[i:i + 1], k[i:i + 1])[0][0].half()
         return (torch.stack([self.store[pair] for pair in pairs]).float() - self.mean) / self.std
 
 
 def generator(args):
-    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
-    ae = models.Autoencoder()
+    shards, ae = data.Shards(args.data), models.Autoencoder()
     ae.load_state_dict(torch.load(Path(args.out) / "autoencoder.pt", weights_only=True)["nets"]["autoencoder"])
-    encoder, denoiser = models.ConditionEncoder(), models.Denoiser()
+    encoder, denoiser = models.ConditionEncoder(geometry=args.geometry), models.Denoiser()
     start(encoder, args, "condition_encoder")
     start(denoiser, args, "denoiser")
     encoder, denoiser = (n.to(memory_format=torch.channels_last) for n in (encoder, denoiser))
@@ -74,17 +77,16 @@ def generator(args):
     for net in averages.values():
         net.requires_grad_(False)
     run = Run(args, "generator", {"encoder": encoder, "denoiser": denoiser, **averages}, 7e-4)
-    latents = Latents(ae, shards, args)
+    known = None
     if "latent_mean" in run.extra:
-        latents.mean, latents.std = run.extra["latent_mean"], run.extra["latent_std"]
+        known = run.extra["latent_mean"], run.extra["latent_std"]
     elif args.start:
-        known = start(models.Autoencoder().decoder, args, "decoder", "decoder.")
-        latents.mean, latents.std = known["mean"], known["std"]
+        whitening = start(models.Autoencoder().decoder, args, "decoder", "decoder.")
+        known = whitening["mean"], whitening["std"]
+    latents = Latents(ae, shards, args, known)
     run.extra = {"latent_mean": latents.mean, "latent_std": latents.std}
     bars = torch.from_numpy(diffusion.alpha_bar()).float()
-    for batch in indices(shards, rng, 16):
-        if run.over():
-            break
+    for batch, rng in batches(shards, run, 16):
         # Pairs turned and mirrored together, as the lab's own augmentation does: the colours tell which way up.
         k = symmetries(args, rng, len(batch))
         z, gelslim = latents.take(batch, k), condition(shards, batch, k, args, rng)

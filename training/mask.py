@@ -7,7 +7,7 @@ import torch
 import torch.nn.functional as F
 
 from . import data, evaluate, models, weights
-from .run import Run, indices
+from .run import Run, batches
 
 # Share of predicted imprints where a generator was named; of the others: measured, nearly clean, redrawn.
 PREDICTED = 0.4
@@ -63,8 +63,7 @@ class Predicted:
 
 
 def mask(args):
-    shards, rng = data.Shards(args.data), np.random.default_rng(args.seed)
-    net = models.MaskUNet()
+    shards, net = data.Shards(args.data), models.MaskUNet()
     net.train()
     if args.start:
         # An exported graph has its batch norms folded in: from there on they stay fixed scales and shifts.
@@ -74,11 +73,10 @@ def mask(args):
     run = Run(args, "mask", {"mask": net}, 6e-4 if args.start else 3e-3)
     predicted = Predicted(args, shards) if args.predicted_by else None
     run.extra = {"predicted_by": data.sha256(Path(args.predicted_by) / "denoiser.onnx") if predicted else None}
-    for batch in indices(shards, rng, 8):
-        if run.over():
-            break
+    for batch, rng in batches(shards, run, 8):
         batch = batch[shards.contact_known(batch)]
         if not len(batch):
+            run.pass_over()
             continue
         generated = rng.random(len(batch)) < (PREDICTED if predicted else 0)
         drawn = torch.zeros(0, 1, 140, 175)

@@ -87,25 +87,29 @@ def raster(n, x0, x1, y0, y1):
     return x.flatten(), y.flatten()
 
 
+# The bubble's view and what the GelSlim sees of it, in pixels of the rotated bubble image (data.FRAME_PX): x, then y.
+VIEW, SEEN = (0.0, 175.0, 0.0, 140.0), (84.5, 127.0, 54.0, 86.0)
+
+
 class ConditionEncoder(nn.Module):
     """GelSlim to a condition on the latent's grid.
 
     The GelSlim sees about a sixth of what the bubble sees, magnified four times: its pixels do not lie over the
     bubble's. So a convolutional trunk makes 64 tokens, attention mixes them, and one learnt query per latent cell
     reads from them. The first four channels are a direct estimate of the latent, supervised in training.
+    `geometry` ("full", "padding", "cropping") says which of both the two pictures are of.
     """
 
-    def __init__(self, dim=160, depth=3):
+    def __init__(self, dim=160, depth=3, geometry="full"):
         super().__init__()
         # Four GelSlim pixels of 128 are one bubble pixel of 128, so the trunk works from a quarter of the size.
         self.trunk = nn.Sequential(
             nn.Conv2d(3, 48, 8, stride=4, padding=2), ResBlock(48, 48),
             nn.Conv2d(48, 96, 3, stride=2, padding=1), ResBlock(96, 96),
             nn.Conv2d(96, dim, 3, stride=2, padding=1), ResBlock(dim, dim), norm(dim))
-        # Both rasters in pixels of the rotated bubble image (175 x 140); the GelSlim's window lies there (data.FRAME_PX).
         # Learnt from this start, so that a cell first reads from what lies under it.
-        self.place = nn.Parameter(sinusoids(*raster(8, 84.5, 127.0, 54.0, 86.0), dim))
-        self.query = nn.Parameter(sinusoids(*raster(16, 0.0, 175.0, 0.0, 140.0), dim))
+        self.place = nn.Parameter(sinusoids(*raster(8, *(VIEW if geometry == "padding" else SEEN)), dim))
+        self.query = nn.Parameter(sinusoids(*raster(16, *(SEEN if geometry == "cropping" else VIEW)), dim))
         self.mix = nn.ModuleList(Transformer(dim, 5) for _ in range(depth))
         self.read = Transformer(dim, 5)
         with torch.no_grad():

@@ -3,6 +3,7 @@
 import json
 import os
 import time
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -14,21 +15,28 @@ from . import data, weights
 class Run:
     """Progress, learning rate, log and checkpoints of one training run."""
 
-    def __init__(self, args, kind, nets, rate):
+    def __init__(self, args, kind, nets, rate, others=None):
+        """`others`: further optimisers by name, to be kept with the checkpoint."""
         self.args, self.kind, self.nets, self.rate = args, kind, nets, getattr(args, "rate", None) or rate
         self.out = Path(args.out)
         self.out.mkdir(parents=True, exist_ok=True)
         self.optimiser = torch.optim.AdamW([p for n in nets.values() for p in n.parameters() if p.requires_grad],
                                            lr=rate, betas=(0.9, 0.99), weight_decay=0.01)
+        self.others = others or {}
         self.step, self.samples, self.spent, self.means, self.extra = 0, 0, 0.0, {}, {}
+        self.worked = -time.process_time()
         self.checkpoint = self.out / f"{kind}.pt"
         if self.checkpoint.exists():
             state = torch.load(self.checkpoint, weights_only=True)
             for name, net in nets.items():
                 net.load_state_dict(state["nets"][name])
             self.optimiser.load_state_dict(state["optimiser"])
+            for name, optimiser in self.others.items():
+                if name in state.get("others", {}):
+                    optimiser.load_state_dict(state["others"][name])
             self.step, self.samples, self.spent = state["step"], state["samples"], state["minutes"]
-            self.extra = state["extra"]
+            self.worked += 60 * state.get("processor_minutes", 0.0)
+            self.means, self.extra = state["losses"], state["extra"]
         self.started = self.saved = self.logged = time.monotonic()
 
     def minutes(self):
@@ -42,9 +50,14 @@ class Run:
     def over(self):
         return self.progress() >= 1
 
+    def fallen(self):
+        """How far the rate has fallen, 0..1: it does over the last `fall` of the budget, and never where that is 0."""
+        share = self.args.fall
+        return min(max((self.progress() - 1 + share) / share, 0), 1) if share else 0.0
+
     def learning_rate(self):
-        """Warm-up, then constant, then a cosine fall over the last 60 percent."""
-        fall = min(max((self.progress() - 0.4) / 0.6, 0), 1)
+        """Warm-up, then constant, then a cosine fall."""
+        fall = self.fallen()
         return float(self.rate * min(1, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
 
     def descend(self, loss, count, figures):
@@ -69,33 +82,55 @@ class Run:
         if now - self.saved > 120:
             self.save()
 
+    def pass_over(self):
+        """A step without a sample that can be learnt from."""
+        self.step += 1
+
     def save(self):
         self.saved = time.monotonic()
         state = {"nets": {k: n.state_dict() for k, n in self.nets.items()}, "optimiser": self.optimiser.state_dict(),
-                 "step": self.step, "samples": self.samples, "minutes": self.minutes(), "extra": self.extra,
+                 "others": {k: o.state_dict() for k, o in self.others.items()},
+                 "step": self.step, "samples": self.samples, "minutes": self.minutes(),
+                 "processor_minutes": (self.worked + time.process_time()) / 60, "extra": self.extra,
                  "losses": self.means, "seed": self.args.seed, "options": options(self.args)}
         partial = self.checkpoint.with_suffix(".partial")
         torch.save(state, partial)
         os.replace(partial, self.checkpoint)
-        facts = {k: state[k] for k in ("step", "samples", "minutes", "losses", "seed", "options")}
+        facts = {k: state[k] for k in ("step", "samples", "minutes", "processor_minutes", "losses", "seed", "options")}
         (self.out / f"{self.kind}.json").write_text(json.dumps(facts, indent=1))
 
 
 def options(args):
     """The switches that make one run differ from another, for the checkpoint and the provenance."""
-    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise", "rate")
+    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise", "rate", "fall")
     return {k: getattr(args, k) for k in keys} | {"begun_from_a_bundle": bool(args.start)}
 
 
-def indices(shards, rng, batch):
-    """Endless batches of sample numbers; looks for new shards after each pass."""
-    while True:
-        if len(shards) < batch:
-            raise SystemExit(f"{shards.folder} holds {len(shards)} samples, fewer than one batch of {batch}")
-        order = rng.permutation(len(shards))
-        for i in range(0, len(order) - batch + 1, batch):
-            yield np.sort(order[i:i + batch])
-        shards.refresh()
+@lru_cache(maxsize=2)
+def order(seed, turn, total):
+    """The samples in the order of pass `turn`."""
+    return np.random.default_rng((seed, turn)).permutation(total)
+
+
+def numbers(seed, first, count, total):
+    """Samples `first` to `first + count` of the endless list of passes that `seed` draws from `total` samples."""
+    return np.array([order(seed, at // total, total)[at % total] for at in range(first, first + count)])
+
+
+def batches(shards, run, size):
+    """Sample numbers (size,) and the random numbers of each step, until the budget is spent.
+
+    All of it, torch's random numbers too, is a function of seed and step alone: every method is given the same samples in
+    the same order, and a run that was stopped goes on as if it had not been. New shards are looked for after each pass.
+    """
+    while not run.over():
+        if len(shards) < size:
+            raise SystemExit(f"{shards.folder} holds {len(shards)} samples, fewer than one batch of {size}")
+        seed, step = run.args.seed, run.step
+        torch.manual_seed(seed * 1_000_003 + step)
+        yield np.sort(numbers(seed, step * size, size, len(shards))), np.random.default_rng((seed, step, size))
+        if (step + 1) * size % len(shards) < size:
+            shards.refresh()
 
 
 def symmetries(args, rng, count):

@@ -23,7 +23,7 @@ WHAT = {
 }
 
 
-def main():
+def parser():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=tuple(WHAT))
     parser.add_argument("--data", default="training/data/train", help="folder of shards")
@@ -35,6 +35,7 @@ def main():
     parser.add_argument("--bf16", action="store_true", help="bfloat16 autocast: faster where the CPU has AMX, else slower")
     parser.add_argument("--from", dest="start", help="bundle whose weights to begin with (default: from scratch)")
     parser.add_argument("--rate", type=float, help="peak learning rate (default: each network's own); lower for a start from good weights")
+    parser.add_argument("--fall", type=float, default=0.6, help="last share of the budget, over which the learning rate falls")
     parser.add_argument("--turned", type=float, default=0.6, help="share of pairs turned or mirrored")
     parser.add_argument("--no-rotation", dest="rotation", action="store_false", help="ablation: never turn a pair")
     parser.add_argument("--no-flip", dest="flip", action="store_false", help="ablation: never mirror a pair")
@@ -46,7 +47,11 @@ def main():
                         help="white noise on the GelSlim image, in its standard deviations")
     parser.add_argument("--predicted-by", help="mask: generator bundle on whose predictions to learn as well")
     parser.add_argument("--predicted", type=int, default=2000, help="mask: number of touches to predict")
-    args = parser.parse_args()
+    return parser
+
+
+def main():
+    args = parser().parse_args()
     torch.set_num_threads(args.threads)
     torch.manual_seed(args.seed)
     WHAT[args.what](args)

@@ -1,0 +1,123 @@
+"""Command line: `python -m training.study --out DIR --json FILE [--only SECTION ...] [--budgets N,N,N] [--equal N]`.
+
+Trains every method on the same shards, with the same number of samples from the same seed in the same order, has the
+product score it (`touch2touch evaluate`), and adds a row to FILE. Rows that are in FILE are not made again; what lies in DIR
+is gone on from: stopped at any time, it loses two minutes at most. `--table` prints FILE as Markdown and makes nothing.
+"""
+
+import argparse
+import datetime
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import torch
+
+from . import study_table
+from .study_rows import Rows, compact
+from .study_runs import AUTOENCODER, SECTIONS
+from .study_training import FALL, TURNED, exported
+from .study_verbs import MODELS, Program, Refused
+
+ROOT = Path(__file__).resolve().parent.parent
+# Of the drawn sensors that count as another rig.
+OTHER_SEED = 77
+
+
+def commit():
+    """Commit of the working tree, and `+` where it was changed."""
+    def git(*words):
+        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
+
+    return git("rev-parse", "--short=12", "HEAD") + ("+" if git("status", "--porcelain", "--", "training") else "")
+
+
+def machine():
+    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
+    model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
+    return f"{model}, {os.cpu_count()} threads, one of them used"
+
+
+def made(row, args, program):
+    """Makes a row: trains, fits, evaluates. The row, and that of the measured imprints of the same grasps."""
+    bundle, cost, data = MODELS / "generator_ldm", None, row.test
+    if row.test.startswith("other"):
+        pairs, data = program.other(row.test, OTHER_SEED)
+    if row.training:
+        shards = program.shards(row.training.condition, args.grasps, args.seed)
+        bundle, cost = exported(row.training, row.samples, shards, Path(args.out) / "runs", args.seed)
+    if row.fit:
+        place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
+        bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
+    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features)
+    if not answer["complete"] or answer["skipped"]:
+        raise Refused(f"not every grasp could be scored: {answer['skipped'][:3]}")
+    facts = {"date": datetime.date.today().isoformat(), "commit": commit(), "program": program.version(), "machine": machine(),
+             "torch": torch.__version__, "command": command, "runtime": answer["runtime"], "seconds": round(answer["seconds"])}
+    for figures, scores in zip(answer["rows"], answer["pairs"], strict=True):
+        own = not figures["upper_bound"]
+        what = settings(row, args) if own else measured(row, args)
+        yield {"settings": what, "made": facts | ({"training": cost} if own else {}), "groups": figures["groups"],
+               "grasps": compact(scores)}
+
+
+def settings(row, args):
+    common = scoring(args)
+    if row.training:
+        common |= {"seed": args.seed, "training_grasps": args.grasps, "turned": TURNED, "fall": FALL}
+        common |= {"autoencoder": AUTOENCODER}
+    return row.settings() | common
+
+
+def measured(row, args):
+    return {"method": "measured imprints", "test": row.test} | scoring(args)
+
+
+def scoring(args):
+    return {"test_grasps": args.test_grasps, "features": Path(args.features).name if args.features else None}
+
+
+def parser():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", help="folder of shards, checkpoints and bundles")
+    parser.add_argument("--json", required=True, help="file of the rows")
+    parser.add_argument("--only", nargs="*", choices=tuple(SECTIONS), default=tuple(SECTIONS))
+    parser.add_argument("--budgets", type=lambda text: [int(n) for n in text.split(",")], default=[10_000, 20_000, 40_000],
+                        help="samples that every method is given")
+    parser.add_argument("--equal", type=int, default=20_000, help="samples of each training in the tables of conditions and ablations")
+    parser.add_argument("--grasps", type=int, default=1500, help="grasps of the training shards of each condition, both fingers")
+    parser.add_argument("--test-grasps", type=int, help="score only so many grasps of each tool (default: all 46)")
+    parser.add_argument("--features", help="bundle of `training.fid_features`: a FID in the place of the Fréchet distance")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program")
+    parser.add_argument("--table", action="store_true", help="print the file's tables and make nothing")
+    return parser
+
+
+def main():
+    args = parser().parse_args()
+    rows = Rows(args.json)
+    if args.table:
+        print(study_table.markdown(rows.read()))
+        return
+    torch.set_num_threads(1)
+    program = Program(args.touch2touch, args.out)
+    for name in args.only:
+        for row in SECTIONS[name](args.budgets, args.equal):
+            if rows.find(settings(row, args)):
+                continue
+            begun = time.monotonic()
+            try:
+                for each in made(row, args, program):
+                    if not rows.find(each["settings"]):
+                        rows.add(each)
+            except Refused as why:
+                print(f"{name}: {row} is left out: {why}", file=sys.stderr, flush=True)
+                continue
+            print(f"{name}: {row} in {time.monotonic() - begun:.0f} s", flush=True)
+
+
+if __name__ == "__main__":
+    main()
