@@ -87,7 +87,7 @@ fn held(verb: &str) -> Option<Held> {
         }
         "masks compare" => Not("the studio compares one person with oneself only (masks stats)"),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
-        "trials" => Not("the studio plays no trials yet; its pane is to call the same function of the job"),
+        "trials" => Not("it simulates its grasps; the studio plays the trial of a pair, as `pose --trial`"),
         "training-data" => Not("only the training in Python reads it"),
         "doctor" => By(&[super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb]),
         "unit" => By(&[files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb]),
