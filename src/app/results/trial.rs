@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{ImprintSource, TrialKey};
-use super::super::pane::Demand;
 use super::super::results;
 use super::super::results::{Computes, Demands, Registered};
 use super::super::services::SharedServices;
@@ -36,13 +35,8 @@ pub fn trial(state: &State, source: ImprintSource) -> Lookup<'_, Arc<PairTrial>>
 pub(crate) fn want_trial(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
     let Ok(Some(pose)) = results::pose_key(state, source) else { return };
-    let asked = shows_trial(state, source) && results::truth(state).is_some();
+    let asked = results::shows_trial(state, source) && results::truth(state).is_some();
     if asked && state.results.poses.contains(&pose) {
         wants.ask(TrialKey(pose));
     }
-}
-
-/// True where the trial by the pose of an imprint is looked at.
-pub(crate) fn shows_trial(state: &State, source: ImprintSource) -> bool {
-    state.needs(Demand::Trial) && state.workbench.side == source
 }
