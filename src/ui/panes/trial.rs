@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use eframe::egui::{self, Align, Layout, RichText, Slider, Ui, vec2};
+use eframe::egui::{self, RichText, Slider, Ui, vec2};
 use glam::DVec3;
 
 use super::images;
@@ -116,7 +116,7 @@ fn transport(ui: &mut Ui, memory: &mut Memory) {
         memory.played_at = (memory.share < 1.0).then_some(now);
         ui.ctx().request_repaint_after(std::time::Duration::from_secs_f64(PACE_S));
     }
-    ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+    ui.horizontal(|ui| {
         let plays = memory.played_at.is_some();
         let button = egui::Button::new(if plays { "Pause" } else { "Play" }).min_size(vec2(52.0, 20.0));
         let button = ui.add(button).accessible_name("Play the trial");
