@@ -57,7 +57,10 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
     };
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
-        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus) if in_figure(state, pane).is_some() => {
+        // Of two imprints against each other the figures are the answer, and a picture is one of its files.
+        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus)
+            if in_figure(state, pane).is_some_and(|shown| shown != FigurePane::Compare) =>
+        {
             let shown = in_figure(state, pane)?;
             let both = state.selection.both_fingers;
             let range = state.settings.range;
@@ -70,7 +73,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
                 .option_if("--error-range-mm", shown.is_difference().then_some(error_m * 1e3))
                 .word_if(state.settings.color_map == ColorMap::Gray, "--gray")
                 .word_if(!state.settings.footprint_visible, "--no-window");
-            let words = if shown == FigurePane::Compare { of_compared(state, words) } else { words };
             if shown.is_predicted() { words.then(drawn()) } else { words }
         }
         (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
@@ -95,8 +97,13 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
             words.option("--seeds", state.seeds.count).then(drawn())
         }
-        (Pane::Compare, _) => of_compared(state, of_pair("compare")?)
-            .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose)),
+        (Pane::Compare, _) => {
+            let versus = state.settings.compared();
+            of_pair("compare")?
+                .option("--a", placed(state, &versus.a))
+                .option("--b", placed(state, &versus.b))
+                .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
+        }
         (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
         (Pane::Masks, _) => of_pair("label")?,
         (Pane::Results | Pane::Table | Pane::Scatter, _) => {
@@ -127,11 +134,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
         _ => return None,
     };
     Some(words.list())
-}
-
-fn of_compared(state: &State, words: Words) -> Words {
-    let versus = state.settings.compared();
-    words.option("--a", placed(state, &versus.a)).option("--b", placed(state, &versus.b))
 }
 
 fn dial_words(state: &State, words: Words) -> Option<Words> {

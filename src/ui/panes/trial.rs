@@ -15,7 +15,7 @@ use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::PointSize;
 use crate::gpu::scene::SceneData;
 use crate::gpu::view::Camera;
-use crate::spatial::{self, items};
+use crate::spatial::items;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::scene_view::{Grip, SceneView};
 use crate::ui::parts::theme::{SMALL, caption, pane_frame};
@@ -36,6 +36,8 @@ const REACH_M: f64 = 0.03;
 const BLOCK_M: [f64; 2] = [0.012, 0.008];
 /// Diameter of the mark of the first touch, meters.
 const TOUCH_M: f32 = 0.001_2;
+/// Height over the mouth up to which the camera shows a tool, meters.
+const NEAR_M: f64 = 0.022;
 /// Direction of the camera at first, degrees: from before the cut block, a little from above.
 const CAMERA_DEG: [f64; 2] = [20.0, 14.0];
 
@@ -152,7 +154,7 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
         let [yaw, pitch] = CAMERA_DEG.map(f64::to_radians);
         let camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
         memory.view.camera = camera;
-        memory.view.camera.frame(&whole_way(&tool, &block, trial), spatial::FILLED.max(0.9));
+        memory.view.camera.frame(&whole_way(&tool, &block, trial), 0.95);
         memory.view.placed = true;
     }
     let scene = SceneData { moving: output.moved || memory.played_at.is_some(), ..scene };
@@ -176,13 +178,14 @@ fn update(cx: &Cx<'_>, memory: &mut Memory, trial: &Arc<PairTrial>) {
     }
 }
 
-/// The corners of tool and block on the whole way: what the camera has to show.
+/// The corners of the block and of what comes near it on the whole way: what the camera has to show.
 fn whole_way(tool: &TriMesh, block: &TriMesh, trial: &PairTrial) -> Vec<DVec3> {
     let path = &trial.attempt.path;
     let ends = [path.first(), path.last()].into_iter().flatten();
     let tools = ends.flat_map(|at| {
         let world_from_object = at.world_from_object.to_affine();
-        tool.vertices.iter().map(move |p| world_from_object.transform_point3(*p))
+        let placed = tool.vertices.iter().map(move |p| world_from_object.transform_point3(*p));
+        placed.filter(|p| p.z > -NEAR_M)
     });
     tools.chain(block.vertices.iter().copied()).collect()
 }
