@@ -199,9 +199,13 @@ fn bundles_are_found_once_and_broken_ones_reported() {
     let found = find(&roots);
     let names: Vec<&str> = found.bundles.iter().map(Bundle::name).collect();
     let all = ["Tiny tool classifier of the tests", "Tiny generator of the tests", "Tiny mask UNet of the tests"];
-    let between = ["Tiny generator from Soft Bubble to GelSlim", "Tiny generator from DIGIT to Soft Bubble"];
+    let between = [
+        "Tiny generator from Soft Bubble to GelSlim",
+        "Tiny generator from DIGIT to Soft Bubble",
+        "Small features (test)",
+    ];
     let each_once = |name: &&str| names.iter().filter(|found| *found == name).count() == 1;
-    assert!(names.len() == 5 && all.iter().chain(&between).all(each_once), "{names:?}");
+    assert!(names.len() == 6 && all.iter().chain(&between).all(each_once), "{names:?}");
     assert!(found.problems.iter().any(|p| p.what.contains("output.classes")));
 }
 
