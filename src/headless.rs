@@ -98,7 +98,7 @@ enum Verb {
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Turn a dial (mask threshold or probability, gate, trim, shift) over all pairs, and say what it does to every pose.
     Sweep(Box<sweep::SweepArgs>),
-    /// What a robot would do with the poses: simulated grasps of a tool, put into a hole of its own outline; cup on cup.
+    /// Trials of a robot with the poses: simulated grasps of a tool, put into a hole of its own outline; cup on cup.
     Trials(Box<trials::TrialsArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
     Figure(Box<figure::FigureArgs>),

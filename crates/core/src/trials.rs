@@ -1,4 +1,4 @@
-//! What a robot would do with a pose: a peg put into a hole, a cup set on a cup, and whether the verdict helps.
+//! Trials of a robot with a pose: a peg put into a hole, a cup set on a cup, and whether the verdict helps.
 //!
 //! The robot knows the *estimated* pose in the hand and turns and moves the gripper so that a tool held like that would
 //! stand upright over its goal. The tool is held by its *true* pose; the difference of the two is what decides.

@@ -26,7 +26,7 @@ macro_rules! kinds {
                 match self { $( Self::$kind => $name, )* }
             }
 
-            /// What stopping it means, in a sentence.
+            /// Meaning of stopping it, in a sentence.
             pub(crate) fn kept(self) -> &'static str {
                 match self { $( Self::$kind => $kept, )* }
             }

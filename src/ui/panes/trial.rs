@@ -1,4 +1,4 @@
-//! What a robot would do with the pose: the tool let down into a hole of its own outline, played in 3D.
+//! Trial of a robot with the pose: the tool let down into a hole of its own outline, played in 3D.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use eframe::egui::{self, RichText, Slider, Ui, vec2};
 use glam::DVec3;
 
 use super::images;
-use super::scene::rgb;
+use super::scene::{SceneMesh, rgb, update_mesh};
 use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PairKey};
 use crate::app::results;
@@ -48,7 +48,7 @@ pub(crate) struct Memory {
     /// The pair and the imprint that the view was framed for.
     of: Option<(PairKey, ImprintSource)>,
     block: Option<(Arc<PairTrial>, Arc<TriMesh>)>,
-    tool: Option<Arc<TriMesh>>,
+    tool: Option<SceneMesh>,
     revision: u64,
     /// Share of the trial that is over, 0 to 1.
     share: f64,
@@ -145,7 +145,8 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
         }
     };
     update(cx, memory, trial);
-    let (Some(tool), Some((_, block))) = (memory.tool.clone(), memory.block.clone()) else { return };
+    let tool = memory.tool.as_ref().map(|held| held.mesh.clone());
+    let (Some(tool), Some((_, block))) = (tool, memory.block.clone()) else { return };
     let scene = scene(cx, (&tool, &block, memory.revision), trial, memory.share);
     let output = memory.view.interact(ui, "3D view, trial", Grip::Nothing);
     let of = cx.state.pair_key().map(|pair| (pair, source));
@@ -166,12 +167,7 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
 
 /// Makes the meshes, where the trial or the tool changed.
 fn update(cx: &Cx<'_>, memory: &mut Memory, trial: &Arc<PairTrial>) {
-    if let Lookup::Ready(tool) = results::tool(cx.state)
-        && memory.tool.as_deref().is_none_or(|held| *held != tool.model.mesh)
-    {
-        memory.tool = Some(Arc::new(tool.model.mesh.clone()));
-        memory.revision += 1;
-    }
+    update_mesh(cx, &mut memory.tool, &mut memory.revision);
     if memory.block.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, trial)) {
         memory.block = Some((trial.clone(), Arc::new(cut_block(trial.insertion.hole()))));
         memory.revision += 1;

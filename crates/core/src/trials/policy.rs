@@ -21,7 +21,7 @@ impl Tried {
     }
 }
 
-/// What the robot does after a second grasp whose pose is not good either.
+/// Choice of the robot after a second grasp whose pose is not good either.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum After {
@@ -34,7 +34,7 @@ pub enum After {
 /// Counts of trials with the verdict in the loop.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Loop {
-    /// What was done after a second doubt.
+    /// Choice after a second doubt.
     pub after: After,
     /// Grasps that were made anew.
     pub regrasps: usize,

@@ -1,4 +1,4 @@
-//! What a robot would do with the poses of a recipe: simulated grasps from fixed seeds, felt up to the pose, and tried in a
+//! Trials of a robot with the poses of a recipe: simulated grasps from fixed seeds, felt up to the pose, and tried in a
 //! hole of the tool's own outline, or on another cup: [`trials`]. The verb `trials` calls it.
 //!
 //! Every method is given the same grasps: the measured imprints as the upper bound, each generator, and no correction at
@@ -175,7 +175,7 @@ pub fn trials(setup: &TrialsSetup, models: &Models, cx: &JobCx) -> Result<Trials
     })
 }
 
-/// What all trials of a tool have in common.
+/// Context that all trials of a tool have in common.
 struct Run<'a> {
     setup: &'a TrialsSetup,
     task: &'a Task,

@@ -84,7 +84,7 @@ pub struct MethodTrials {
 pub struct ToolTrials {
     /// Name of the tool.
     pub tool: String,
-    /// What was done with it.
+    /// Task that it was tried with.
     pub task: TaskKind,
     /// One per method, in the order of the settings.
     pub methods: Vec<MethodTrials>,
