@@ -124,6 +124,45 @@ fn a_second_evaluation_computes_nothing_and_says_the_same() {
     assert!(known(&dataset, &other, &models(&cache)).unwrap().iter().all(|s| s.grasps.is_empty()));
 }
 
+#[test]
+fn an_evaluation_is_compared_with_an_earlier_file_on_the_same_grasps() {
+    let folder = tempfile::tempdir().unwrap();
+    let (data, cache) = (folder.path().join("data"), folder.path().join("cache"));
+    write(&data, 0..3);
+    let write_report = |evaluation: &Evaluation, pairs: bool| {
+        let report = Report { evaluation, published: Vec::new(), pairs: pairs.then_some(&evaluation.scores) };
+        let file = folder.path().join("yesterday.json");
+        std::fs::write(&file, serde_json::to_vec(&report).unwrap()).unwrap();
+        file
+    };
+    let (mut first, _) = run(&data, &setup(), &cache);
+    assert!(first.differences.is_empty(), "one generator alone");
+    // From itself, as the file has it, it differs by nothing: poses that were not found are in the file too.
+    let file = write_report(&first, true);
+    first.against(&file).unwrap();
+    let [same] = first.differences.as_slice() else { panic!("{:?}", first.differences) };
+    assert_eq!(same.from, format!("{} (yesterday)", same.to));
+    assert!(same.groups.iter().all(|g| g.grasps > 0 && g.figures.contains_key("success_10")));
+    assert!(
+        same.groups.iter().flat_map(|g| g.figures.values()).all(|d| d.value == 0.0 && d.interval == Some([0.0; 2]))
+    );
+    // Another mask gives other poses and the same images.
+    let mask = MaskChoice { threshold_m: 0.004, ..setup().recipe.mask };
+    let other = Setup { recipe: Recipe { mask, ..Recipe::default() }, ..setup() };
+    let (mut other, _) = run(&data, &other, &cache);
+    other.against(&file).unwrap();
+    let group = &other.differences[0].groups[0];
+    assert_eq!(group.figures["psnr_db"].value, 0.0);
+    let figure = |evaluation: &Evaluation, key| evaluation.rows[1].groups[0].named(key).map(|e| e.value);
+    let angle = figure(&other, "angle_deg").zip(figure(&first, "angle_deg")).map(|(to, from)| to - from);
+    assert_eq!(group.figures.get("angle_deg").map(|d| d.value), angle);
+    // What cannot be compared is refused.
+    let why = other.against(&write_report(&first, false)).unwrap_err();
+    assert!(why.hint.is_some_and(|hint| hint.contains("--pairs")));
+    std::fs::write(&file, "{}").unwrap();
+    assert!(other.against(&file).is_err() && other.against(&folder.path().join("none.json")).is_err());
+}
+
 /// The studio as it stands when nothing is left to compute.
 fn studio(data: &Path, home: &Path, commands: Vec<Command>) -> State {
     let services = LiveServices::with_config_folder(Some(home.to_owned()));

@@ -7,7 +7,7 @@ use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sample::{ColorTouch, DepthTouch, Sample};
-use touch2touch_core::sim::{self, Grasp, SimConfig};
+use touch2touch_core::sim::{self, Grasp, Sensors, SimConfig};
 
 fn bubble_of(sample: &Sample, finger: PadId) -> &DepthTouch {
     sample.pad(finger).and_then(|t| t.depth()).expect("both fingers have a bubble")
@@ -75,6 +75,35 @@ fn the_same_seed_gives_the_same_sample_in_any_thread() {
     assert!(!same_bits(&here, &make(6)));
     assert_eq!(SimConfig::randomised(3), SimConfig::randomised(3));
     assert_ne!(SimConfig::randomised(3), SimConfig::randomised(4));
+}
+
+#[test]
+fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
+    let (nominal, drawn) = (SimConfig::default(), Sensors::Drawn(5).config());
+    assert_eq!((Sensors::Nominal.config(), &drawn), (nominal.clone(), &SimConfig::randomised(5)));
+    let other = Sensors::OtherGelslims(5).config();
+    assert_eq!(other.bubble, nominal.bubble);
+    let (of, by) = (&other.gelslim, &drawn.gelslim);
+    assert_eq!((of.indentation_m, of.noise, of.decay_m), (nominal.gelslim.indentation_m, 2.4, nominal.gelslim.decay_m));
+    for c in 0..3 {
+        let (base, far) = (nominal.gelslim.base[c], by.base[c]);
+        assert!((of.base[c] - base - 2.0 * (far - base)).abs() < 1e-9 && of.base[c] != base);
+    }
+    assert!((1..200).all(|seed| {
+        let gel = Sensors::OtherGelslims(seed).config().gelslim;
+        gel.base.iter().chain(&gel.led_gain).all(|v| *v > 0.0) && 2.0 * gel.marker_radius_m < gel.marker_pitch_m
+    }));
+    // The same grasp: what the bubble feels stays to the last bit.
+    let felt = |sensors: Sensors| sim::simulate(&catalog::tools()[4], sim::grid_grasp(7), 3, &sensors.config());
+    let (a, b) = (felt(Sensors::Nominal), felt(Sensors::OtherGelslims(5)));
+    let pads = |s: &Sample| {
+        (
+            s.pad(lab::RIGHT).unwrap().depth().unwrap().imprint.clone(),
+            s.pad(lab::RIGHT).unwrap().color().unwrap().difference.clone(),
+        )
+    };
+    assert_eq!(pads(&a).0, pads(&b).0);
+    assert_ne!(pads(&a).1, pads(&b).1);
 }
 
 /// The key property: depth, intrinsics, rig, pose and CAD agree for both fingers.

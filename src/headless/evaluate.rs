@@ -74,6 +74,9 @@ pub(super) struct EvaluateArgs {
     /// Drawings for the 95 % intervals; 0 leaves them out.
     #[arg(long, default_value_t = Setup::default().resamples)]
     resamples: usize,
+    /// Add the paired differences from an earlier evaluation, a file of --json with --pairs or of --out; repeat for several.
+    #[arg(long, value_name = "FILE")]
+    against: Vec<PathBuf>,
     /// Add what the paper and the lab published on real data.
     #[arg(long)]
     paper: bool,
@@ -107,7 +110,10 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let setup = setup(args, &dataset)?;
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::cache::store() });
-    let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
+    let mut evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
+    for file in &args.against {
+        evaluation.against(file)?;
+    }
     super::notes::say_found(&output, &dataset, &evaluation.findings);
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
@@ -141,6 +147,7 @@ fn write(file: &Path, text: &str) -> anyhow::Result<()> {
 
 fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
     let mut text = format!("{}\n\n{}", evaluation.dataset, evaluation::text(rows));
+    text += &evaluation::differences_text(&evaluation.differences);
     text += &format!("- {}\n", evaluation.conventions);
     for note in &evaluation.notes {
         text += &format!("- {note}\n");

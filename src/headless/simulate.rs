@@ -9,10 +9,10 @@ use serde::Serialize;
 use serde_json::json;
 use strum::IntoEnumIterator;
 
-use super::args::at_least_one;
+use super::args::{SensorsArgs, at_least_one};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::catalog::{self, ToolSpec};
-use touch2touch_core::sim::{self, Condition, Fault, SimConfig};
+use touch2touch_core::sim::{self, Condition, Fault, Sensors};
 use touch2touch_work::io::simulated::{Layout, Writing};
 
 /// Arguments of `simulate`.
@@ -38,9 +38,11 @@ pub(super) struct SimulateArgs {
     /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
+    #[command(flatten)]
+    sensors: SensorsArgs,
     /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
     /// millimeters) instead: to learn what each looks like in the studio.
-    #[arg(long, conflicts_with_all = ["tools", "grasps", "seed"])]
+    #[arg(long, conflicts_with_all = ["tools", "grasps", "seed", "sensors", "gelslims"])]
     faults: bool,
     /// Layout, one of the lab's.
     #[arg(long, value_enum, default_value_t = Part::Test)]
@@ -78,6 +80,7 @@ struct Written {
     pairs: usize,
     tools: Vec<String>,
     condition: Condition,
+    sensors: Sensors,
     /// `None` for the test set, whose seeds are its own.
     seed: Option<u64>,
     seconds: f64,
@@ -92,7 +95,8 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     let grasps = if args.test_set { sim::TEST_GRASPS } else { args.grasps.into() };
     let output = Output::new(args.common, "simulating", chosen.len() * grasps as usize);
     let layout = args.part.layout();
-    let config = SimConfig::default();
+    let sensors = args.sensors.sensors();
+    let config = sensors.config();
     // A condition gives at most two forms of a tool, one to even pairs and one to odd ones.
     let models: BTreeMap<String, ToolSpec> = chosen
         .iter()
@@ -103,10 +107,14 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     let pairs = chosen.len() * grasps as usize;
     // In the order of the list: it decides the seeds.
     let order: Vec<&str> = chosen.iter().map(|tool| tool.name.as_str()).collect();
-    let recipe = json!({
+    let mut recipe = json!({
         "tools": order, "condition": args.condition, "grasps": grasps, "seed": (!args.test_set).then_some(args.seed),
         "test_set": args.test_set,
     });
+    // Folders that were written before there were others name none.
+    if sensors != Sensors::Nominal {
+        recipe["sensors"] = json!(sensors);
+    }
     let writing = Writing::begin(&args.out, layout, &tools, pairs, recipe)?;
     for (t, tool) in chosen.iter().enumerate() {
         for g in 0..grasps {
@@ -130,6 +138,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
         pairs,
         tools: models.keys().cloned().collect(),
         condition: args.condition,
+        sensors,
         seed: (!args.test_set).then_some(args.seed),
         seconds: start.elapsed().as_secs_f64(),
     };

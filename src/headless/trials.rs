@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::args::{JsonArgs, RegistrationParser, at_least_one, keyed};
+use super::args::{JsonArgs, RegistrationParser, SensorsArgs, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::{Output, VerbResult};
-use touch2touch_core::diffusion::{GenerateConfig, Sampler};
+use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::trials::{After, Compliance, HoleShape, Loop};
@@ -32,6 +32,8 @@ pub(super) struct TrialsArgs {
     /// Seed of the grasps; the noise that a generator starts from is the bundle's own.
     #[arg(long, default_value_t = TrialsSetup::default().seed)]
     seed: u64,
+    #[command(flatten)]
+    sensors: SensorsArgs,
     /// Room to each side of the upright tool in its hole. Others, 0.5 to 5 mm, are tried with the same poses.
     #[arg(long, value_name = "MM", default_value_t = mm(TrialsSetup::default().hole.clearance_m))]
     clearance_mm: f64,
@@ -115,13 +117,9 @@ fn setup(args: &TrialsArgs) -> anyhow::Result<TrialsSetup> {
     let mut methods = vec![Method::of(&recipe.of(ImprintSource::Measured))];
     for bundle in generators {
         let info = bundle.generator.as_ref();
-        let defaults = info.ok_or_else(|| anyhow::anyhow!("the bundle {} is no generator", bundle.name))?.defaults;
+        let info = info.ok_or_else(|| anyhow::anyhow!("the bundle {} is no generator", bundle.name))?;
         bundle.ends(&rig).transpose()?;
-        let config = GenerateConfig {
-            steps: args.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
-            sampler: args.sampler.unwrap_or(defaults.sampler),
-            ..defaults
-        };
+        let config = info.config(args.steps, None, args.sampler);
         let predicted = recipe.of(ImprintSource::Predicted);
         methods.push(Method::of(&Recipe { generator: Some((bundle.into(), config)), ..predicted }));
     }
@@ -131,6 +129,7 @@ fn setup(args: &TrialsArgs) -> anyhow::Result<TrialsSetup> {
         tools: if args.tool.is_empty() { usual.tools } else { args.tool.clone() },
         count: args.count,
         seed: args.seed,
+        sensors: args.sensors.sensors(),
         methods,
         hole: HoleShape {
             depth_m: 1e-3 * args.depth_mm,

@@ -5,12 +5,16 @@
 //! SSIM with the range of the tool's predictions; every figure per tool, then the mean over the tools. Where the source
 //! lost its scale, PSNR and SSIM are those of images stretched to 0..1 one by one, and their mean.
 //!
-//! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay.
+//! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay. So are those of
+//! the [`Difference`] of two methods, whose grasps are drawn in pairs.
 
 mod columns;
 mod metric;
+mod paired;
 mod paper;
 mod write;
+
+use std::collections::BTreeMap;
 
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -26,8 +30,9 @@ use super::verdict::Grade;
 use columns::{COLUMNS, FID, FRECHET, Of};
 pub use columns::{Column, NOTES, TableMetrics, columns, conventions};
 pub use metric::{Condition, Metric};
+pub use paired::{Difference, GroupDifference, difference};
 pub use paper::paper_rows;
-pub use write::{csv, latex, markdown, text};
+pub use write::{csv, differences_text, latex, markdown, text};
 
 /// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;
@@ -143,11 +148,13 @@ pub struct GraspScore {
     /// Column group.
     pub group: Group,
     /// Scale of the images, which says what their figures mean.
-    #[serde(skip)]
+    #[serde(default)]
     pub scale: Scale,
     /// One per finger that was compared.
     pub images: Vec<ImageScore>,
-    /// Error of the in-hand angle, radians, without sign; NaN (null) without a pose, `None` where no truth is known.
+    /// Error of the in-hand angle, radians, without sign; NaN (null in files) without a pose, `None` (absent in files) where
+    /// no truth is known.
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "null_is_nan")]
     pub angle_error_rad: Option<f64>,
     /// Distance of the estimated place of the tool in the hand from the true one, meters; `None` without a pose or truth.
     #[serde(default)]
@@ -166,8 +173,12 @@ pub struct GraspScore {
     pub seed_spread_m: Option<f64>,
 }
 
+fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+    Ok(Some(Option::deserialize(from)?.unwrap_or(f64::NAN)))
+}
+
 /// A method with its grasps.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scores {
     /// The row's name.
     pub method: String,
@@ -256,13 +267,9 @@ pub fn groups_of<'a>(grasps: impl IntoIterator<Item = &'a GraspScore>) -> Vec<Gr
 }
 
 fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples: usize) -> TableMetrics {
-    let mut names: Vec<Option<&str>> = grasps.iter().map(|g| g.tool.as_deref()).collect();
-    names.sort_unstable();
-    names.dedup();
-    let tools: Vec<Vec<&GraspScore>> =
-        names.iter().map(|name| grasps.iter().copied().filter(|g| g.tool.as_deref() == *name).collect()).collect();
+    let tools = by_tool(grasps, |grasp| grasp);
     let figure = |column: &Column| match &column.of {
-        Of::Tool(of) => estimate(&tools, *of, resamples),
+        Of::Tool(of) => estimate(&tools, of, resamples),
         Of::Group(of) => of(grasps, measured).map(|value| Estimate { value, interval: None }),
         Of::Published => None,
     };
@@ -310,18 +317,23 @@ fn angles(grasps: &[&GraspScore]) -> Option<AngleSummary> {
     (!errors.is_empty()).then(|| AngleSummary::from_errors(&errors))
 }
 
+/// Grasps, alone or in pairs, by the tool of `grasp`, in the order of the tools' names.
+fn by_tool<'a, T: Copy>(grasps: &[T], grasp: impl Fn(T) -> &'a GraspScore) -> Vec<Vec<T>> {
+    let mut tools: BTreeMap<Option<&str>, Vec<T>> = BTreeMap::new();
+    for &one in grasps {
+        tools.entry(grasp(one).tool.as_deref()).or_default().push(one);
+    }
+    tools.into_values().collect()
+}
+
 /// The mean over the tools of a figure of each tool's grasps, with its interval.
-fn estimate(
-    tools: &[Vec<&GraspScore>],
-    figure: fn(&[&GraspScore]) -> Option<f64>,
-    resamples: usize,
-) -> Option<Estimate> {
-    let over = |tools: &[Vec<&GraspScore>]| mean(tools.iter().filter_map(|grasps| figure(grasps)));
+fn estimate<T: Copy>(tools: &[Vec<T>], figure: impl Fn(&[T]) -> Option<f64>, resamples: usize) -> Option<Estimate> {
+    let over = |tools: &[Vec<T>]| mean(tools.iter().filter_map(|grasps| figure(grasps)));
     let value = over(tools)?;
     let mut rng = ChaCha8Rng::seed_from_u64(BOOTSTRAP_SEED);
     let mut drawn: Vec<f64> = (0..resamples)
         .filter_map(|_| {
-            let again: Vec<Vec<&GraspScore>> = tools
+            let again: Vec<Vec<T>> = tools
                 .iter()
                 .map(|grasps| (0..grasps.len()).map(|_| grasps[rng.random_range(0..grasps.len())]).collect())
                 .collect();
@@ -345,7 +357,7 @@ pub fn squared_error(prediction: &super::grid::Grid<f32>, truth: &super::grid::G
 mod tests {
     use super::*;
 
-    fn grasp(tool: &str, group: Group, rms_m: f64, angle_deg: f64) -> GraspScore {
+    pub(super) fn grasp(tool: &str, group: Group, rms_m: f64, angle_deg: f64) -> GraspScore {
         let error = SquaredError { sum: rms_m * rms_m * 100.0, pixels: 100 };
         let image = ImageScore {
             error,
@@ -383,8 +395,16 @@ mod tests {
         // 20 log10(22.5 / 2).
         assert!((grasps[0].metric(Metric::Psnr).unwrap() - 21.023).abs() < 1e-3);
         assert_eq!(grasps[0].metric(Metric::Ssim), Some(0.5));
+        // A file tells a grasp without a pose from one without a truth.
+        let read = |grasp: &GraspScore| -> Option<f64> {
+            let text = serde_json::to_string(grasp).unwrap();
+            serde_json::from_str::<GraspScore>(&text).unwrap().angle_error_rad
+        };
+        assert_eq!(read(&grasps[1]), grasps[1].angle_error_rad);
+        assert!(read(&grasps[2]).unwrap().is_nan());
         let bare = GraspScore { images: Vec::new(), angle_error_rad: None, ..grasps[0].clone() };
         assert!([Metric::Angle, Metric::Psnr, Metric::Ssim].iter().all(|f| bare.metric(*f).is_none()));
+        assert_eq!(read(&bare), None);
     }
 
     #[test]

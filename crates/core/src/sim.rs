@@ -27,8 +27,8 @@ mod training;
 use glam::{DAffine3, DQuat, DVec3};
 
 pub use condition::{Condition, TEST_GRASPS, test_grasp};
-pub use config::SimConfig;
 pub(crate) use config::{BubbleConfig, GelSlimConfig};
+pub use config::{Sensors, SimConfig};
 pub use faults::Fault;
 pub use grasp::{Grasp, grid_grasp, random_grasp};
 pub use membrane::{Dome, Membrane};

@@ -1,7 +1,7 @@
 //! The table as text, Markdown, LaTeX and CSV.
 
 use super::columns::{COLUMNS, Column, columns};
-use super::{Estimate, Group, Row, TableMetrics};
+use super::{Difference, Estimate, Group, GroupDifference, Row, TableMetrics};
 
 fn groups(rows: &[Row]) -> Vec<Group> {
     let mut groups: Vec<Group> =
@@ -32,33 +32,65 @@ fn with_interval(estimate: Option<Estimate>, decimals: usize) -> String {
 /// A table per column group, for people.
 pub fn text(rows: &[Row]) -> String {
     let columns = columns(rows);
-    let mut out = String::new();
-    for group in groups(rows) {
-        let present: Vec<(&Row, &TableMetrics)> = rows.iter().filter_map(|r| Some((r, of(r, group)?))).collect();
-        let name = present.iter().map(|(r, _)| r.method.chars().count()).max().unwrap_or(0).max(8);
-        let cells: Vec<Vec<String>> = present
-            .iter()
-            .map(|(_, f)| columns.iter().map(|c| with_interval(f.get(c), c.decimals)).collect())
-            .collect();
-        let width = |i: usize| {
-            cells.iter().map(|row| row[i].chars().count()).max().unwrap_or(0).max(columns[i].heading.chars().count())
-        };
-        let widths: Vec<usize> = (0..columns.len()).map(width).collect();
-        out += &format!("{}\n", group.label());
-        out += &format!("  {:<name$}  {:>6}", "method", "grasps");
-        for (column, width) in columns.iter().zip(&widths) {
-            out += &format!("  {:>width$}", column.heading);
-        }
-        out.push('\n');
-        for ((row, figures), cells) in present.iter().zip(&cells) {
-            out += &format!("  {:<name$}  {:>6}", row.method, figures.grasps);
-            for (cell, width) in cells.iter().zip(&widths) {
-                out += &format!("  {cell:>width$}");
-            }
-            out.push('\n');
+    let of_group = |group: Group| {
+        let present = rows.iter().filter_map(|r| Some((r, of(r, group)?)));
+        let lines = present.map(|(row, figures)| Line {
+            name: row.method.clone(),
+            grasps: figures.grasps,
+            cells: columns.iter().map(|c| with_interval(figures.get(c), c.decimals)).collect(),
+        });
+        table(group, "method", &columns, &lines.collect::<Vec<_>>())
+    };
+    groups(rows).into_iter().map(of_group).collect()
+}
+
+/// The differences of methods, a table per column group, for people; empty without any.
+pub fn differences_text(differences: &[Difference]) -> String {
+    let all = || differences.iter().flat_map(|d| &d.groups);
+    let columns: Vec<&Column> = COLUMNS.iter().filter(|c| all().any(|g| g.get(c).is_some())).collect();
+    let mut groups: Vec<Group> = all().map(|g| g.group).collect();
+    groups.sort_unstable();
+    groups.dedup();
+    let of_group = |group: Group| {
+        let present =
+            differences.iter().flat_map(|d| d.groups.iter().map(move |g| (d, g))).filter(|(_, g)| g.group == group);
+        let lines = present.map(|(difference, figures): (&Difference, &GroupDifference)| Line {
+            name: format!("{}, less {}", difference.to, difference.from),
+            grasps: figures.grasps,
+            cells: columns.iter().map(|c| with_interval(figures.get(c), c.decimals)).collect(),
+        });
+        table(group, "difference", &columns, &lines.collect::<Vec<_>>())
+    };
+    groups.into_iter().map(of_group).collect()
+}
+
+/// A line of a table for people.
+struct Line {
+    name: String,
+    grasps: usize,
+    cells: Vec<String>,
+}
+
+fn table(group: Group, first: &str, columns: &[&Column], lines: &[Line]) -> String {
+    let name = lines.iter().map(|line| line.name.chars().count()).max().unwrap_or(0).max(first.len() + 2);
+    let width = |i: usize| {
+        let cells = lines.iter().map(|line| line.cells[i].chars().count());
+        cells.max().unwrap_or(0).max(columns[i].heading.chars().count())
+    };
+    let widths: Vec<usize> = (0..columns.len()).map(width).collect();
+    let mut out = format!("{}\n  {first:<name$}  {:>6}", group.label(), "grasps");
+    for (column, width) in columns.iter().zip(&widths) {
+        out += &format!("  {:>width$}", column.heading);
+    }
+    out.push('\n');
+    for line in lines {
+        out += &format!("  {:<name$}  {:>6}", line.name, line.grasps);
+        for (cell, width) in line.cells.iter().zip(&widths) {
+            out += &format!("  {cell:>width$}");
         }
         out.push('\n');
     }
+    out.push('\n');
     out
 }
 

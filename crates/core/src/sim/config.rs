@@ -1,6 +1,7 @@
 //! The simulated sensors' settings.
 
 use glam::DVec2;
+use serde::{Deserialize, Serialize};
 
 use crate::noise::{Noise, Stream};
 use crate::rig::lab;
@@ -161,7 +162,52 @@ impl Default for GelSlimConfig {
     }
 }
 
+/// The sensors that grasps are simulated with.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Sensors {
+    /// The nominal ones.
+    #[default]
+    Nominal,
+    /// Another pair, drawn by this seed as training draws them ([`SimConfig::randomised`]).
+    Drawn(u64),
+    /// The nominal bubbles with GelSlims in other colors and with other dots, drawn by this seed: twice as far from the
+    /// nominal ones as those of the training, so that most lie outside of what is trained on.
+    OtherGelslims(u64),
+}
+
+impl Sensors {
+    /// Settings of these sensors.
+    pub fn config(self) -> SimConfig {
+        match self {
+            Self::Nominal => SimConfig::default(),
+            Self::Drawn(seed) => SimConfig::randomised(seed),
+            Self::OtherGelslims(seed) => {
+                let gelslim = GelSlimConfig::default().in_other_colors(&SimConfig::randomised(seed).gelslim);
+                SimConfig { gelslim, ..SimConfig::default() }
+            }
+        }
+    }
+}
+
 impl GelSlimConfig {
+    /// This GelSlim with its colors and dots moved twice as far as `drawn` has them; the gel stays.
+    fn in_other_colors(self, drawn: &Self) -> Self {
+        let beyond = |from: f64, to: f64| from + 2.0 * (to - from);
+        let each = |from: [f64; 3], to: [f64; 3]| std::array::from_fn(|c| beyond(from[c], to[c]));
+        Self {
+            led_angle_rad: each(self.led_angle_rad, drawn.led_angle_rad),
+            led_gain: each(self.led_gain, drawn.led_gain),
+            base: each(self.base, drawn.base),
+            marker_pitch_m: beyond(self.marker_pitch_m, drawn.marker_pitch_m),
+            marker_radius_m: beyond(self.marker_radius_m, drawn.marker_radius_m),
+            marker_angle_rad: beyond(self.marker_angle_rad, drawn.marker_angle_rad),
+            marker_phase: drawn.marker_phase,
+            sensor_seed: drawn.sensor_seed,
+            ..self
+        }
+    }
+
     /// Unit vectors towards the LEDs, picture axes.
     pub(super) fn led_directions(&self) -> [DVec2; 3] {
         self.led_angle_rad.map(DVec2::from_angle)

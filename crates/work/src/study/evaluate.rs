@@ -2,6 +2,7 @@
 //! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
 //! studio's Evaluate pane both call [`evaluate`].
 
+mod against;
 mod apart;
 mod doubt;
 mod export;
@@ -28,7 +29,7 @@ use kept::KeptScores;
 use methods::Models;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
-use touch2touch_core::evaluation::{self, Group, Row, Scores};
+use touch2touch_core::evaluation::{self, Difference, Group, Row, Scores};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
@@ -104,6 +105,8 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
     /// The column groups.
     pub groups: Vec<Group>,
+    /// Each further generator less the first, on the same grasps; and all of them less those of [`Evaluation::against`].
+    pub differences: Vec<Difference>,
     /// Meaning of PSNR and SSIM.
     pub conventions: &'static str,
     /// Meaning of the columns, and reasons for what is missing.
@@ -222,6 +225,7 @@ pub fn evaluate(
         dataset: dataset.title.clone(),
         rows,
         groups,
+        differences: against::among(&scores, setup.resamples),
         conventions: evaluation::conventions(scale),
         notes,
         findings: findings.into_list(),

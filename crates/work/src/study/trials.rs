@@ -22,12 +22,11 @@ use crate::job::JobCx;
 use crate::labels::{ImprintSource, PairLabels};
 use crate::models::Models;
 use crate::recipe::{Recipe, Stage};
-use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::sample::Sample;
-use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
+use touch2touch_core::sim::{Sensors, SimConfig, random_grasp, simulate};
 use touch2touch_core::trials::{Compliance, HoleShape, InHand, Published, published};
 use touch2touch_core::units::angle_error;
 
@@ -79,6 +78,8 @@ pub struct TrialsSetup {
     pub count: usize,
     /// Seed of the grasps.
     pub seed: u64,
+    /// The sensors that feel them.
+    pub sensors: Sensors,
     /// The methods, a row each.
     pub methods: Vec<Method>,
     /// The hole of the insertions.
@@ -97,6 +98,7 @@ impl Default for TrialsSetup {
             tools: default_tools(),
             count: 30,
             seed: 1,
+            sensors: Sensors::Nominal,
             methods: Vec::new(),
             hole: HoleShape { depth_m: 0.01, clearance_m: 0.001, chamfer_m: 0.0 },
             clearances_m: (1..=10).map(|half_mm| 0.0005 * f64::from(half_mm)).collect(),
@@ -138,10 +140,11 @@ pub fn trials(setup: &TrialsSetup, models: &Models, cx: &JobCx) -> Result<Trials
     let (done, total) = (AtomicUsize::new(0), tasks.len() * setup.count);
     // The way from a touch to a pose asks no data set for anything; a touch names one all the same.
     let dataset = Dataset::demo();
+    let config = setup.sensors.config();
     let mut tools = Vec::new();
     for task in &tasks {
         let model = ToolModel::new(task.spec.mesh()).map_err(|err| TaskError::from_error(WHAT, &err))?;
-        let run = Run { setup, task, model: &model, dataset: &dataset, models, cx };
+        let run = Run { setup, task, config: &config, model: &model, dataset: &dataset, models, cx };
         cx.progress(done.load(Ordering::Relaxed) as u64, total as u64, task.name());
         let one = |number: usize| -> Result<Vec<Trial>, TaskError> {
             let trial = run.trial(number)?;
@@ -179,6 +182,7 @@ pub fn trials(setup: &TrialsSetup, models: &Models, cx: &JobCx) -> Result<Trials
 struct Run<'a> {
     setup: &'a TrialsSetup,
     task: &'a Task,
+    config: &'a SimConfig,
     model: &'a ToolModel,
     dataset: &'a Dataset,
     models: &'a Models,
@@ -189,17 +193,25 @@ impl Run<'_> {
     /// A trial by every method, in their order.
     fn trial(&self, number: usize) -> Result<Vec<Trial>, TaskError> {
         let methods = &self.setup.methods;
-        let first = Grasped::new(&self.task.spec, self.seed(number, 0));
+        let first = self.grasped(number, 0);
         let firsts = methods.iter().map(|method| self.held(method, &first)).collect::<Result<Vec<_>, _>>()?;
         let doubted = |method: &Method, held: &Held| method.recipe.is_some() && !held.tried().is_good();
         let again = methods.iter().zip(&firsts).any(|(method, held)| doubted(method, held));
-        let second = again.then(|| Grasped::new(&self.task.spec, self.seed(number, 1)));
+        let second = again.then(|| self.grasped(number, 1));
         let both = methods.iter().zip(firsts).map(|(method, first)| {
             let second = second.as_ref().filter(|_| doubted(method, &first));
             let second = second.map(|grasped| self.held(method, grasped)).transpose()?;
             Ok(Trial { number, first, second })
         });
         both.collect()
+    }
+
+    /// The first or second grasp of a trial, felt.
+    fn grasped(&self, number: usize, again: u64) -> Grasped {
+        let seed = self.seed(number, again);
+        let grasp = random_grasp(seed);
+        let sample = simulate(&self.task.spec, grasp, seed, self.config);
+        Grasped { seed, sample, truth: grasp.object_from_grasp().inverse() }
     }
 
     /// Seed of a grasp: by the tool's place among all, so that it does not depend on which others are asked for.
@@ -256,14 +268,6 @@ struct Grasped {
     seed: u64,
     sample: Sample,
     truth: PlanarPose,
-}
-
-impl Grasped {
-    fn new(spec: &ToolSpec, seed: u64) -> Self {
-        let grasp = random_grasp(seed);
-        let sample = simulate(spec, grasp, seed, &SimConfig::default());
-        Self { seed, sample, truth: grasp.object_from_grasp().inverse() }
-    }
 }
 
 #[cfg(test)]

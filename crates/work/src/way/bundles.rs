@@ -8,7 +8,7 @@ use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, Senso
 use crate::infer::generator::GenerateError;
 use crate::io::model_id::current;
 use touch2touch_core::dataset::Problem;
-use touch2touch_core::diffusion::GenerateConfig;
+use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::fit::FitSource;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
@@ -46,6 +46,19 @@ pub struct GeneratorInfo {
     pub sensors: SensorPair,
     /// From what it was fitted to a rig, if it was.
     pub fit: Option<FitSource>,
+}
+
+impl GeneratorInfo {
+    /// The recommended settings with those that are named instead. A bundle that draws in one step keeps its step.
+    pub fn config(&self, steps: Option<u32>, seed: Option<u64>, sampler: Option<Sampler>) -> GenerateConfig {
+        let own = self.defaults;
+        GenerateConfig {
+            steps: steps.filter(|_| own.steps > 1).unwrap_or(own.steps),
+            seed: seed.unwrap_or(own.seed),
+            sampler: sampler.unwrap_or(own.sampler),
+            ..own
+        }
+    }
 }
 
 /// Kind of a bundle, by its task.

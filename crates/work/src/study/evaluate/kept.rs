@@ -30,7 +30,7 @@ use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
 /// To be raised when a figure is computed in another way.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// The sheet of what files hold.
 const FILES: &str = "files";
 /// No larger file is a touch or a CAD model.
@@ -41,9 +41,6 @@ const MAX_FILE: u64 = 1 << 30;
 pub(super) struct Entry {
     /// As in the table; what a table's row adds is put in when it is read.
     pub(super) score: GraspScore,
-    /// True where no pose was found: NaN has no place in the file.
-    no_pose: bool,
-    scale: Scale,
     /// Features by the classifier or the extractor, bit for bit, by image.
     features: Vec<String>,
     /// Least and largest value of each prediction.
@@ -68,23 +65,12 @@ impl Entry {
         otherwise: Vec<(String, usize)>,
         inputs: Vec<String>,
     ) -> Self {
-        Self {
-            no_pose: score.angle_error_rad.is_some_and(f64::is_nan),
-            scale: score.scale,
-            features: Vec::new(),
-            spans: Vec::new(),
-            range: 0.0,
-            clipped,
-            notes,
-            otherwise,
-            inputs,
-            score,
-        }
+        Self { features: Vec::new(), spans: Vec::new(), range: 0.0, clipped, notes, otherwise, inputs, score }
     }
 
     /// True where its SSIM is with this range, or has none of the tool.
     pub(super) fn is_of_range(&self, range: f64) -> bool {
-        self.scale == Scale::Assumed || self.range.to_bits() == range.to_bits()
+        self.score.scale == Scale::Assumed || self.range.to_bits() == range.to_bits()
     }
 
     fn written(&self) -> Option<String> {
@@ -105,10 +91,6 @@ impl Entry {
         score.pair.clone_from(&entry.name);
         score.tool = entry.tool.as_deref().map(|name| pattern_of(name).to_owned());
         score.group = Group::of(entry, simulated, read.clipped);
-        score.scale = read.scale;
-        if read.no_pose {
-            score.angle_error_rad = Some(f64::NAN);
-        }
         if score.images.len() != read.features.len() || score.images.len() != read.spans.len() {
             return None;
         }

@@ -107,13 +107,7 @@ impl Models {
             let info = bundle.generator.as_ref();
             let info = info.ok_or_else(|| TaskError::new(WHAT, format!("{origin} declares no generator")))?;
             info.sensors.ends(&bundle.name, &dataset.rig).map_err(|err| fail(&err))?;
-            let (defaults, name) = (info.defaults, bundle.name.clone());
-            let config = GenerateConfig {
-                steps: setup.steps.filter(|_| defaults.steps > 1).unwrap_or(defaults.steps),
-                seed: setup.seed.unwrap_or(defaults.seed),
-                sampler: setup.sampler.unwrap_or(defaults.sampler),
-                ..defaults
-            };
+            let (config, name) = (info.config(setup.steps, setup.seed, setup.sampler), bundle.name.clone());
             // Two runs of one trainer have the same name: their folders tell them apart.
             let name = if names.contains(&name) { format!("{name} ({})", origin.short_name()) } else { name };
             names.push(name.clone());

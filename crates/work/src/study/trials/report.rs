@@ -7,6 +7,7 @@ use super::task::{Task, TaskKind};
 use crate::error::TaskError;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::metrics::AngleSummary;
+use touch2touch_core::sim::Sensors;
 use touch2touch_core::trials::{After, Attempt, Cup, InHand, Loop, Share, Tried, with_verdict};
 use touch2touch_core::units::{text_deg, text_mm};
 use touch2touch_core::verdict::Grade;
@@ -138,6 +139,13 @@ pub(super) fn notes(setup: &TrialsSetup) -> Vec<String> {
         "in the plane of the in-hand angle, rigid, without friction: what the gripper gives way is taken to be found"
             .into(),
     ];
+    notes.push(match setup.sensors {
+        Sensors::Nominal => "the simulator's nominal sensors".into(),
+        Sensors::Drawn(seed) => format!("another pair of sensors, drawn by seed {seed} as training draws them"),
+        Sensors::OtherGelslims(seed) => {
+            format!("GelSlims in other colors and with other dots, drawn by seed {seed} beyond what training draws")
+        }
+    });
     notes.push("intervals: 95 %, Wilson's score".into());
     notes.push("the paper's counts are of a real robot, whose hole and clearance are not known here".into());
     notes
