@@ -2,46 +2,29 @@
 
 Trains every method on the same shards, with the same number of samples from the same seed in the same order, has the
 product score it (`touch2touch evaluate`), and adds a row to FILE. Rows that are in FILE are not made again; what lies in DIR
-is gone on from: stopped at any time, it loses two minutes at most. `--table` prints FILE as Markdown and makes nothing.
+is gone on from: stopped at any time, it loses two minutes at most. `./study --pages` makes tables of docs/study.json.
 """
 
 import argparse
-import datetime
-import os
-import subprocess
 import sys
 import time
 from pathlib import Path
 
 import torch
 
-from . import study_table
-from .study_rows import Rows, compact
+from benches.program import commit, machine, today
+
+from .study_rows import Rows
 from .study_runs import AUTOENCODER, SECTIONS
 from .study_training import FALL, TURNED, exported
-from .study_verbs import MODELS, Program, Refused
+from .study_verbs import MODELS, Product, Refused
 
-ROOT = Path(__file__).resolve().parent.parent
 # Of the drawn sensors that count as another rig.
 OTHER_SEED = 77
 
 
-def commit():
-    """Commit of the working tree, and `+` where it was changed."""
-    def git(*words):
-        return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=False).stdout.strip()
-
-    return git("rev-parse", "--short=12", "HEAD") + ("+" if git("status", "--porcelain", "--", "training") else "")
-
-
-def machine():
-    lines = Path("/proc/cpuinfo").read_text().splitlines() if Path("/proc/cpuinfo").exists() else []
-    model = next((line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")), "unknown")
-    return f"{model}, {os.cpu_count()} threads, one of them used"
-
-
-def made(row, args, program):
-    """Makes a row: trains, fits, evaluates. The row, and that of the measured imprints of the same grasps."""
+def made(row, args, program, rows):
+    """Makes a row: trains, fits, evaluates. Puts it into the file, and that of the measured imprints of the same grasps."""
     bundle, cost, data = MODELS / "generator_ldm", None, row.test
     if row.test.startswith("other"):
         pairs, data = program.other(row.test, OTHER_SEED)
@@ -51,16 +34,18 @@ def made(row, args, program):
     if row.fit:
         place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
         bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
-    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features)
+    alike = rows.alike(settings(row, args))
+    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features, map(rows.grasps, alike.values()))
     if not answer["complete"] or answer["skipped"]:
         raise Refused(f"not every grasp could be scored: {answer['skipped'][:3]}")
-    facts = {"date": datetime.date.today().isoformat(), "commit": commit(), "program": program.version(), "machine": machine(),
-             "torch": torch.__version__, "command": command, "runtime": answer["runtime"], "seconds": round(answer["seconds"])}
-    for figures, scores in zip(answer["rows"], answer["pairs"], strict=True):
-        own = not figures["upper_bound"]
-        what = settings(row, args) if own else measured(row, args)
-        yield {"settings": what, "made": facts | ({"training": cost} if own else {}), "groups": figures["groups"],
-               "grasps": compact(scores)}
+    facts = {"date": today(), "commit": commit(), "program": program.version(), "machine": machine(), "torch": torch.__version__,
+             "command": command, "runtime": answer["runtime"], "seconds": round(answer["seconds"])}
+    for figures in answer["rows"]:
+        if figures["upper_bound"] and not rows.find(measured(row, args)):
+            rows.add({"settings": measured(row, args), "made": facts, "groups": figures["groups"]}, answer | {"differences": []}, {})
+        elif not figures["upper_bound"]:
+            own = {"settings": settings(row, args), "made": facts | {"training": cost}, "groups": figures["groups"]}
+            rows.add(own, answer, alike)
 
 
 def settings(row, args):
@@ -81,7 +66,7 @@ def scoring(args):
 
 def parser():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", help="folder of shards, checkpoints and bundles")
+    parser.add_argument("--out", required=True, help="folder of shards, checkpoints and bundles")
     parser.add_argument("--json", required=True, help="file of the rows")
     parser.add_argument("--only", nargs="*", choices=tuple(SECTIONS), default=tuple(SECTIONS))
     parser.add_argument("--budgets", type=lambda text: [int(n) for n in text.split(",")], default=[10_000, 20_000, 40_000],
@@ -92,27 +77,21 @@ def parser():
     parser.add_argument("--features", help="bundle of `training.fid_features`: a FID in the place of the Fréchet distance")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program")
-    parser.add_argument("--table", action="store_true", help="print the file's tables and make nothing")
     return parser
 
 
 def main():
     args = parser().parse_args()
-    rows = Rows(args.json)
-    if args.table:
-        print(study_table.markdown(rows.read()))
-        return
+    rows = Rows(args.json, Path(args.out) / "rows")
     torch.set_num_threads(1)
-    program = Program(args.touch2touch, args.out)
+    program = Product(args.touch2touch, args.out)
     for name in args.only:
         for row in SECTIONS[name](args.budgets, args.equal):
             if rows.find(settings(row, args)):
                 continue
             begun = time.monotonic()
             try:
-                for each in made(row, args, program):
-                    if not rows.find(each["settings"]):
-                        rows.add(each)
+                made(row, args, program, rows)
             except Refused as why:
                 print(f"{name}: {row} is left out: {why}", file=sys.stderr, flush=True)
                 continue

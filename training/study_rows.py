@@ -1,49 +1,57 @@
 """The file of the study: a row for a line, and the paired differences between rows.
 
-{"rows": [{"settings", "made", "groups", "grasps"}], "differences": [{"from", "to", "groups"}]}. `groups` are the verb's own
-figures with their intervals. `grasps` holds of each tool, in the order of its grasps, root mean square error (0.1 um), SSIM
-(1e-4; measured imprints have neither) and angle error (0.01 degrees; null: no pose), so that a row made on another day can be compared grasp by grasp.
+{"rows": [{"settings", "made", "groups"}], "differences": [{"from", "to", "groups"}]}. `groups` are the verb's own figures with
+their intervals; `from` and `to` are settings, those of `to` only where they differ.
 """
 
+import hashlib
 import json
 import os
 from pathlib import Path
 
-from . import paired
 
-
-def compact(scores):
-    """The figures of every grasp, rounded, by tool."""
-    tools = {}
-    for grasp in sorted(scores["grasps"], key=lambda g: (g["tool"], int(g["pair"].rsplit("_", 1)[1]))):
-        squares, pixels = (sum(image["error"][key] for image in grasp["images"]) for key in ("sum", "pixels"))
-        ssim = [image["ssim"] for image in grasp["images"] if image["ssim"] is not None]
-        tool = tools.setdefault(grasp["tool"], {"group": grasp["group"], "rms": [], "ssim": [], "angle": []})
-        tool["rms"].append(round((squares / pixels) ** 0.5 * 1e7) if pixels else None)
-        tool["ssim"].append(round(sum(ssim) / len(ssim) * 1e4) if ssim else None)
-        angle = grasp["angle_error_rad"]
-        tool["angle"].append(None if angle is None else round(angle * 18000 / 3.141592653589793))
-    return tools
+def differ(a, b):
+    """The settings in which a row is compared with another: the one in which they differ, unless it is the test set."""
+    keys = [key for key in a if a[key] != b.get(key)]
+    return keys if len(keys) == 1 and keys != ["test"] and a.keys() == b.keys() else []
 
 
 class Rows:
-    """The rows of a file, read anew before each change."""
+    """The rows of a file, read anew before each change; every grasp of a row lies in `place`, for later ones to be compared with."""
 
-    def __init__(self, path):
-        self.path = Path(path)
+    def __init__(self, path, place):
+        self.path, self.place = Path(path), Path(place)
 
     def read(self):
-        return json.loads(self.path.read_text())["rows"] if self.path.exists() else []
+        return json.loads(self.path.read_text()) if self.path.exists() else {"rows": [], "differences": []}
 
     def find(self, settings):
-        return next((row for row in self.read() if row["settings"] == settings), None)
+        return next((row for row in self.read()["rows"] if row["settings"] == settings), None)
 
-    def add(self, row):
-        """Puts a row into the file, and its differences from the others."""
-        rows = [r for r in self.read() if r["settings"] != row["settings"]] + [row]
+    def grasps(self, settings):
+        """The file of a row's grasps."""
+        return self.place / f"{hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]}.json"
+
+    def alike(self, settings):
+        """Rows that differ in one setting and whose grasps are here: settings by the name of the file."""
+        known = (row["settings"] for row in self.read()["rows"])
+        return {self.grasps(other).stem: other for other in known if differ(other, settings) and self.grasps(other).exists()}
+
+    def add(self, row, answer, alike):
+        """Puts a row into the file with what the answer says of its differences, and its grasps beside it."""
+        self.place.mkdir(parents=True, exist_ok=True)
+        file = self.read()
+        rows = [r for r in file["rows"] if r["settings"] != row["settings"]] + [row]
+        differences = [d for d in file["differences"] if row["settings"] not in (d["from"], d["from"] | d["to"])]
+        for found in answer["differences"]:
+            before = next((s for stem, s in alike.items() if found["from"].endswith(f"({stem})")), None)
+            if before:
+                key, = differ(before, row["settings"])
+                differences.append({"from": before, "to": {key: row["settings"][key]}, "groups": found["groups"]})
         text = '{"rows": [\n%s\n],\n"differences": [\n%s\n]}\n' % tuple(
-            ",\n".join(json.dumps(item) for item in items) for items in (rows, paired.differences(rows)))
+            ",\n".join(json.dumps(item) for item in items) for items in (rows, differences))
         self.path.parent.mkdir(parents=True, exist_ok=True)
-        partial = self.path.with_suffix(".partial")
-        partial.write_text(text)
-        os.replace(partial, self.path)
+        for path, content in ((self.grasps(row["settings"]), json.dumps(answer)), (self.path, text)):
+            partial = path.with_suffix(".partial")
+            partial.write_text(content)
+            os.replace(partial, path)

@@ -13,7 +13,8 @@ mod unstretched;
 
 pub use angle::AngleSummary;
 pub use color::{LEVELS, color, planes};
-pub(crate) use frechet::{frechet_distance, frechet_extrapolated};
+pub use frechet::frechet_distance;
+pub(crate) use frechet::frechet_extrapolated;
 pub use image::{MetricError, Psnr, mse, psnr, unit_range};
 pub use joint::{Joint, Line, line};
 pub use split::{PixelMetrics, Split, split};

@@ -16,8 +16,8 @@ const PARTS_SEED: u64 = 1;
 
 /// The Fréchet distance of two sets of vectors: `|m1 - m2|² + tr(C1 + C2 - 2 (C1 C2)^½)`, with means `m` and unbiased
 /// covariances `C`. Behind published "FID" figures stand the features of an Inception network; with other features the
-/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only, or see
-/// [`frechet_extrapolated`].
+/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only, or follow it to
+/// infinitely many, as the results table does.
 ///
 /// `None` with fewer than two vectors on a side, vectors of different lengths or of none, or values that are not finite.
 ///
@@ -25,7 +25,7 @@ const PARTS_SEED: u64 = 1;
 /// In f64. The trace of the root is the sum of the singular values of `C1^½ C2^½`, which needs no root of a matrix that
 /// is not symmetric; eigenvalues below rounding count as 0. With fewer vectors than dimensions these singular values are
 /// those of the vectors' products with each other, `X1ᵀ X2` over the root of both degrees of freedom: no covariance is formed.
-pub(crate) fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
+pub fn frechet_distance(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
     let d = first.first()?.len();
     let sound = |set: &[&[f32]]| set.len() >= 2 && set.iter().all(|v| v.len() == d && v.iter().all(|x| x.is_finite()));
     if d == 0 || !sound(first) || !sound(second) {

@@ -1,0 +1,286 @@
+"""The tables of `docs/numbers.md` and of the pages that quote it: from kept figures to Markdown, by name."""
+
+GROUPS = {"seen_tools": "Unseen grasps of seen tools", "unseen_tools": "Unseen tools"}
+# Heading, the verb's name of the figure, digits.
+COLUMNS = (("PSNR dB", "psnr_db", 1), ("clean dB", "psnr_noise_free_db", 1), ("SSIM", "ssim", 2),
+           ("clean SSIM", "ssim_noise_free", 2), ("FD", "frechet", 2), ("FID", "fid", 0), ("angle °", "angle_deg", 1),
+           ("≤5° %", "success_5", 1), ("≤10° %", "success_10", 1), ("place mm", "position_mm", 1), ("mask IoU", "mask_iou", 2),
+           ("*good* %", "verdict_good", 0), ("tool named %", "tool_accuracy", 1))
+# Columns of a narrow table.
+FEW = ("psnr_db", "ssim", "angle_deg", "success_5", "success_10")
+
+
+def markdown(heads, rows):
+    """A table: text to the left in the first column, figures to the right."""
+    lines = [heads, ["---", *["--:"] * (len(heads) - 1)], *rows]
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def number(figure, digits, interval=True):
+    """A figure, with its 95 % interval where it has one."""
+    if figure is None:
+        return "-"
+    if not isinstance(figure, dict):
+        return f"{figure:.{digits}f}"
+    text, ends = f"{figure['value']:.{digits}f}", figure.get("interval")
+    return f"{text} [{ends[0]:.{digits}f}, {ends[1]:.{digits}f}]" if ends and interval else text
+
+
+def name_of(row):
+    names = {"Measured (upper bound)": "measured imprint (upper bound)", "Latent diffusion, simulated data": "shipped latent diffusion"}
+    return names.get(row["method"], row["method"]) + (" (published, real data)" if row.get("published") else "")
+
+
+def group_of(row, group):
+    return next((g for g in row["groups"] if g["group"] == group), None)
+
+
+def results_table(answer, group, columns=COLUMNS, interval=True, named=name_of):
+    """A group of `evaluate`'s table, the paper's rows below ours."""
+    rows = [(row, group_of(row, group)) for row in answer["rows"] + answer["published"]]
+    rows = [(row, figures) for row, figures in rows if figures]
+    columns = [c for c in columns if any(figures.get(c[1]) is not None for _, figures in rows)]
+    return markdown(["method", *(c[0] for c in columns)],
+                    [[named(row), *(number(figures.get(c[1]), c[2], interval) for c in columns)] for row, figures in rows])
+
+
+def results(steps):
+    answer = steps["results"]
+    text = []
+    for group, words in GROUPS.items():
+        ours = group_of(answer["rows"][0], group)
+        text += [f"**{words}** ({ours['grasps']} grasps of {ours['tools']} tools)", results_table(answer, group)]
+    return "\n\n".join(text)
+
+
+CONDITIONS = {"plain": "none", "ambiguous": "ambiguous (bare shaft)", "mixed": "mixed", "misaligned": "misaligned (up to 8 mm)",
+              "noise": "noise on the GelSlim"}
+
+
+def conditions(steps):
+    """The shipped generator on each condition, seen and unseen tools."""
+    answers = {"plain": steps["results"], **steps["conditions"]}
+    columns = [c for c in COLUMNS if c[1] in FEW or c[1] == "frechet"]
+    text = []
+    for group, words in GROUPS.items():
+        rows = []
+        for condition, label in CONDITIONS.items():
+            figures = group_of(next(r for r in answers[condition]["rows"] if not r["upper_bound"]), group)
+            rows.append([label, *(number(figures.get(c[1]), c[2]) for c in columns)])
+        text += [f"**{words}**", markdown(["fault of the pairs", *(c[0] for c in columns)], rows)]
+    return "\n\n".join(text)
+
+
+LAWS = {"other": "independent simulator", "own": "built-in simulator", "any_depth": "bubbles of any size and depth",
+        "predicted": "predicted imprints"}
+
+
+def registration(steps):
+    """A table for each law: all engines and peers."""
+    text = []
+    for law, words in LAWS.items():
+        if law not in steps["registration"]:
+            continue
+        found = steps["registration"][law]
+        rows = []
+        for row in found["engines"]:
+            default = row["name"] == "joint"
+            label = f"**{row['label']}**" if default else row["label"]
+            rows.append([label, str(row["count"]), number(row["median_ms"], 2), number(row["p95_ms"], 2), number(row["cpu_mean_ms"], 2),
+                         number(row["mean_deg"], 2), number(row["success_5"], 1), number(row["position_median_mm"], 2)])
+        heads = ["engine", "grasps", "median ms", "p95 ms", "processor ms", "mean °", "≤5° %", "place mm"]
+        text += [f"**Grasps of the {words}**", markdown(heads, rows)]
+        whole = found["depth_to_pose"]
+        text += [f"Depth and mask to the pose by the default: {whole['median_ms']:.2f} ms (p95 {whole['p95_ms']:.2f} ms)."]
+    return "\n\n".join(text)
+
+
+def engine(found, name):
+    return next(row for row in found["engines"] if row["name"] == name)
+
+
+KINDS = {"spoilt": "spoilt as a learned mask is", "clean": "clean", "threshold=5": "all deeper than 5 mm",
+         "threshold=2.5": "all deeper than 2.5 mm", "unet": "by the shipped mask model"}
+
+
+def masks(steps):
+    """Joint registration and mask alone, by the mask."""
+    rows, sure = [], []
+    for law, kinds in steps["masks"].items():
+        for kind, found in kinds.items():
+            both = [engine(found, name) for name in ("distance_field", "joint")]
+            cells = [f"{e['mean_deg']:.2f}°, {e['success_5']:.1f} %, {e['median_ms']:.2f} ms" for e in both]
+            rows.append([LAWS[law], KINDS[kind], str(both[0]["count"]), *cells])
+            if "rms" in both[1]:
+                scores = zip(both[1]["rms"], both[1]["within_2"], strict=True)
+                sure.append([LAWS[law], KINDS[kind], *(f"{rms:.2f} ({share:.0f} %)" for rms, share in scores)])
+    heads = ["grasps of", "mask", "N", "mask alone: mean, ≤5°, median", "joint (default): mean, ≤5°, median"]
+    return "\n\n".join([markdown(heads, rows), "Errors of the joint registration in its own standard deviations: root mean square "
+                        "(share within two); 1 and 95 % where they are right.",
+                        markdown(["grasps of", "mask", "angle", "y", "z"], sure)])
+
+
+def verdict(steps):
+    """Faults by what the verdict calls them."""
+    found = steps["verdict"]
+    sources = [s for s in ("own", "spoilt", "unet") if s in found]
+    words = {"own": "built-in simulator", "spoilt": "independent simulator", "unet": "the same, masks by the shipped model"}
+    rows = []
+    for at, fault in enumerate(found["own"]["faults"]):
+        of = [found[s]["faults"][at] for s in sources]
+        rows.append([fault["fault"].replace("_", " "), *(f"{f['told']:.1f} % ({f['wrong']:.1f} %)" for f in of)])
+    named = "; ".join(f"{words[s]} {found[s]['named']:.1f} %" for s in sources)
+    trials = ", ".join(f"{words[s]}: {found[s]['faults'][0]['trials']}" for s in sources)
+    return "\n\n".join([markdown(["fault", *(words[s] for s in sources)], rows),
+                        f"*Check* or *wrong* (of these, *wrong*). The first row are false alarms, of right poses alone. Grasps: {trials}. "
+                        f"With every tool tried, the own one comes first: {named}."])
+
+
+def doctor(steps):
+    found = steps["doctor"]
+    return (f"{found['spoilt_sets']} data sets of {found['pairs']} pairs, stored wrongly in {found['ways']} ways: "
+            f"{found['named_share']:.1f} % named rightly and nothing else, {found['noticed_share']:.1f} % noticed. "
+            f"{found['sound_sets']} sound ones: {found['false_alarms']} false alarms.")
+
+
+def dataset(steps):
+    found = steps["dataset"]
+    heads = ["from", "seconds", "pairs/s", "mean °", "≤5° %"]
+    words = {"points_to_pose": "contact points, by the mask alone", "depth_to_pose": "depth and mask, by the default"}
+    rows = []
+    for key, label in words.items():
+        stage = found[key]
+        rows.append([label, number(stage["seconds"], 1), number(stage["pairs_per_second"], 0), number(stage["mean_deg"], 2),
+                     number(stage["success_5"], 1)])
+    return f"{found['pairs']:,} pairs of {found['tools']} tools, all threads.\n\n" + markdown(heads, rows)
+
+
+def front(steps):
+    found = steps["front"]
+    rows = []
+    for row in found["rows"]:
+        share = row.get("share_of_reference")
+        rows.append([f"{row['sampler'].upper()} {row['steps']}", row["engine"], number(row["median_ms"], 0),
+                     "-" if share is None else f"{100 * share:.1f}", number(row["rmse_mm"], 2), number(row["psnr_db"], 1),
+                     number(row["mean_deg"], 2)])
+    heads = ["sampler, steps", "engine", "ms", "% of DDIM 200", "rms mm", "PSNR dB", "angle °"]
+    return markdown(heads, rows) + f"\n\nAngle of the measured imprints by the same masks: {found['measured_deg']:.2f}°."
+
+
+def share(success):
+    low, high = (100 * end for end in success["interval"])
+    return f"{success['hits']}/{success['of']} ({low:.0f}-{high:.0f} %)"
+
+
+SENSORS = {"nominal": "The simulator's nominal sensors", "drawn": "Another pair of sensors (seed 77), as training draws them",
+           "other_gelslims": "GelSlims in other colors and with other dots (seed 77), beyond what training draws"}
+
+
+def trials(steps):
+    """Success of each tool by each method, with the verdict in the loop."""
+    found, text = steps["trials"], []
+    for sensors, words in SENSORS.items():
+        rows = []
+        for tool, methods in found[sensors].items():
+            for method in methods:
+                loops = {loop["after"]: loop for loop in method["with_verdict"]}
+                sweep = " / ".join(str(s["hits"]) for s in method["sweep"].values()) or "-"
+                tried, gave_up = loops.get("try"), loops.get("give_up")
+                rows.append([tool, name_of(method), number(method["mean_deg"], 1), share(method["success"]), sweep,
+                             share(tried["per_trial"]) + f", {tried['regrasps']} regrasps" if tried else "-",
+                             f"{gave_up['per_try']['hits']}/{gave_up['per_try']['of']}, {gave_up['refusals']} refused" if gave_up else "-"])
+        heads = ["tool", "poses from", "mean °", "success", "room 0.5 / 2 / 5 mm", "verdict, then try", "verdict, then give up"]
+        text += [f"**{words}**", markdown(heads, rows)]
+    paper = "; ".join(f"{p['what']} {share(p['share'])}" for p in found["published"])
+    return "\n\n".join([*text, f"Published, the paper's diffusion model on a real robot: {paper}."])
+
+
+def scored(figures):
+    return [number(figures.get(key), digits) for key, digits in (("psnr_db", 1), ("ssim", 3), ("psnr_raw_db", 1), ("ssim_raw", 3),
+                                                                 ("psnr_line_db", 1))]
+
+
+def stored_row(steps):
+    """The predictions that lie beside the real pairs: the lab's VQ-VAE."""
+    row = next(r for r in steps["real"]["stored"]["rows"] if r["method"].lower().startswith(("stored", "predictions", "vq", "lab")))
+    return row, row["groups"]
+
+
+def mean_of_groups(row, key):
+    """A figure over all pictures of a row whose groups are by picture: the mean, weighted by images."""
+    of = [(g["images"], g[key]["value"]) for g in row["groups"] if g.get(key)]
+    return sum(n * value for n, value in of) / sum(n for n, _ in of) if of else None
+
+
+def real(steps):
+    """Scores on pairs that were left out, and time."""
+    found = steps["real"]
+    fits = found["fits"]
+    first = fits["0"]
+    fold = first["pairs"] - first["pairs"] // 3
+    rows = [["as shipped", "-", *scored(first["before"])],
+            [f"fitted to {fold} pairs in closed form", number(first["fit_seconds"], 0), *scored(first["closed_form"])]]
+    for steps_tuned, fit in fits.items():
+        if fit.get("after"):
+            rows.append([f"the same, and tuned for {steps_tuned} steps", number(fit["seconds"] / 4, 0), *scored(fit["after"])])
+    for row in found["stored"]["rows"]:
+        if not row["upper_bound"] and row["method"] != "Latent diffusion, simulated data":
+            keys = ("psnr_db", "ssim", "psnr_raw_db", "ssim_raw", "psnr_line_db")
+            rows.append([row["method"], "-", *scored({key: mean_of_groups(row, key) for key in keys})])
+    heads = ["generator", "seconds", "PSNR dB", "SSIM", "raw dB", "raw SSIM", "line dB"]
+    shipped, fitted = (group_mean(row, "psnr_db") for row in demo_rows(found))
+    return (markdown(heads, rows) + f"\n\n{first['pairs']} pairs, {first['touches']} touches; cross-validated in three parts, each score on "
+            "pairs that were not fitted. On the built-in demo, which is another rig, the model fitted to all of them has "
+            f"{fitted:.1f} dB where the shipped one has {shipped:.1f} dB.")
+
+
+def demo_rows(found):
+    return [row for row in found["demo"]["rows"] if not row["upper_bound"]]
+
+
+def group_mean(row, key):
+    """A figure over the tools of all groups."""
+    of = [(g["tools"], g[key]["value"]) for g in row["groups"] if g.get(key)]
+    return sum(n * value for n, value in of) / sum(n for n, _ in of)
+
+
+def three(steps):
+    """README: three results."""
+    rows = []
+    best = {}
+    for law, words in (("other", "an independent simulator"), ("own", "the built-in simulator, fresh")):
+        found = steps["registration"].get(law)
+        if not found:
+            continue
+        joint, lab = engine(found, "joint"), engine(found, "lab")
+        peers = [row for row in found["engines"] if row["peer"] and row["label"].startswith("Open3D")]
+        best[law] = min(peers, key=lambda row: row["mean_deg"]) if peers else None
+        cell = lambda row: f"{row['mean_deg']:.2f}°, {row['success_5']:.1f} %" if row else "-"
+        rows.append([f"**In-hand pose**, {joint['count']} grasps of {words}: mean error, within 5°", f"**{cell(joint)}**",
+                     f"ICP: {cell(lab)}", cell(best[law])])
+        time = lambda row: f"{row['median_ms']:.2f} ms" if row else "-"
+        rows.append(["**Time** of these poses from contact points, median", f"**{time(joint)}**", f"ICP: {time(lab)}", time(best[law])])
+    if "real" in steps:
+        fits = steps["real"]["fits"]
+        last = fits[max((k for k in fits if fits[k].get("after")), key=int)]
+        stored = next(row for row in steps["real"]["stored"]["rows"] if not row["upper_bound"] and "simulated" not in row["method"])
+        score = f"{last['after']['psnr_db']:.1f} dB, {last['after']['ssim']:.2f}"
+        lab = f"{mean_of_groups(stored, 'psnr_db'):.1f} dB, {mean_of_groups(stored, 'ssim'):.2f}"
+        rows.append(["**Prediction** on real pairs that were not fitted: PSNR, SSIM", f"**{score}**", f"VQ-VAE: {lab}", "-"])
+    return "\n".join("| " + " | ".join(line) + " |" for line in
+                     [["", "this program", "the lab's", "Open3D's best"], ["---"] * 4, *rows])
+
+
+# Name of a table: the steps that it needs, and the function.
+TABLES = {
+    "results": (("results",), results), "conditions": (("results", "conditions"), conditions), "real": (("real",), real),
+    "front": (("front",), front), "registration": (("registration",), registration), "masks": (("masks",), masks),
+    "verdict": (("verdict",), verdict), "doctor": (("doctor",), doctor), "dataset": (("dataset",), dataset),
+    "trials": (("trials",), trials), "three": (("registration",), three),
+}
+
+
+def table(name, steps):
+    """A table by name; `None` where a step that it needs was not made."""
+    needs, of = TABLES[name]
+    return of(steps) if all(step in steps for step in needs) else None

@@ -1,0 +1,152 @@
+//! Grids, points and transforms as numpy's arrays, and back.
+
+use glam::{DAffine3, DVec3};
+use numpy::{
+    Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _,
+};
+use pyo3::prelude::*;
+use touch2touch_core::grid::{Grid, RgbGrid};
+
+use crate::process::refused;
+
+/// An array of any shape.
+pub(crate) type Array<'py, T> = Bound<'py, PyArrayDyn<T>>;
+
+/// An array of this shape from its values, row by row.
+///
+/// # Errors
+/// If there are not as many values as the shape has.
+pub(crate) fn array<'py, T: Element>(py: Python<'py>, values: Vec<T>, shape: &[usize]) -> PyResult<Array<'py, T>> {
+    PyArray1::from_vec(py, values).reshape(shape)
+}
+
+/// Images of all pads as (pads, height, width); a pad without one is filled with `missing`. `None` where no pad has one.
+///
+/// # Errors
+/// If they differ in size.
+pub(crate) fn stack<'py, 'g, T: Element + Copy + 'g>(
+    py: Python<'py>,
+    images: impl Iterator<Item = Option<&'g Grid<T>>>,
+    missing: T,
+) -> PyResult<Option<Array<'py, T>>> {
+    let images: Vec<Option<&Grid<T>>> = images.collect();
+    let Some([width, height]) = size_of(&images)? else { return Ok(None) };
+    let mut values = Vec::with_capacity(images.len() * width * height);
+    for image in &images {
+        match image {
+            Some(image) => values.extend_from_slice(image.as_slice()),
+            None => values.resize(values.len() + width * height, missing),
+        }
+    }
+    array(py, values, &[images.len(), height, width]).map(Some)
+}
+
+/// Color images likewise as (pads, height, width, 3).
+///
+/// # Errors
+/// As [`stack`].
+pub(crate) fn stack_rgb<'py, 'g>(
+    py: Python<'py>,
+    images: impl Iterator<Item = Option<&'g RgbGrid>>,
+) -> PyResult<Option<Array<'py, f32>>> {
+    let images: Vec<Option<&RgbGrid>> = images.collect();
+    let Some([width, height]) = size_of(&images)? else { return Ok(None) };
+    let mut values = Vec::with_capacity(3 * images.len() * width * height);
+    for image in &images {
+        match image {
+            Some(image) => values.extend(image.as_slice().iter().flatten()),
+            None => values.resize(values.len() + 3 * width * height, f32::NAN),
+        }
+    }
+    array(py, values, &[images.len(), height, width, 3]).map(Some)
+}
+
+fn size_of<T>(images: &[Option<&Grid<T>>]) -> PyResult<Option<[usize; 2]>> {
+    let mut sizes = images.iter().flatten().map(|image| image.size());
+    let Some(size) = sizes.next() else { return Ok(None) };
+    match sizes.find(|other| *other != size) {
+        Some(other) => Err(refused(format!("the pads' images differ in size: {size:?} and {other:?}"))),
+        None => Ok(Some(size)),
+    }
+}
+
+/// Points as (N, 3).
+///
+/// # Errors
+/// None in practice.
+pub(crate) fn points<'py>(py: Python<'py>, points: &[DVec3]) -> PyResult<Array<'py, f64>> {
+    array(py, points.iter().flat_map(|p| p.to_array()).collect(), &[points.len(), 3])
+}
+
+/// Points of an array (N, 3).
+///
+/// # Errors
+/// If it has another shape.
+pub(crate) fn points_of(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResult<Vec<DVec3>> {
+    let shape = array.shape();
+    if shape[1] != 3 {
+        return Err(refused(format!("{what} must be an array of N x 3 coordinates, not {} x {}", shape[0], shape[1])));
+    }
+    Ok(match array.as_slice() {
+        Ok(values) => values.chunks_exact(3).map(DVec3::from_slice).collect(),
+        Err(_) => array.as_array().rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect(),
+    })
+}
+
+/// A transform as 4 x 4, which maps columns.
+///
+/// # Errors
+/// None in practice.
+pub(crate) fn transform<'py>(py: Python<'py>, transform: &DAffine3) -> PyResult<Array<'py, f64>> {
+    transforms(py, std::iter::once(Some(*transform)), false)
+}
+
+/// Transforms of the pads as (pads, 4, 4), NaN where there is none; or one alone as (4, 4).
+///
+/// # Errors
+/// None in practice.
+pub(crate) fn transforms<'py>(
+    py: Python<'py>,
+    transforms: impl Iterator<Item = Option<DAffine3>>,
+    stacked: bool,
+) -> PyResult<Array<'py, f64>> {
+    let mut values = Vec::new();
+    for transform in transforms {
+        match transform {
+            Some(t) => {
+                let [x, y, z, p] = [t.matrix3.x_axis, t.matrix3.y_axis, t.matrix3.z_axis, t.translation];
+                for row in 0..3 {
+                    values.extend([x[row], y[row], z[row], p[row]]);
+                }
+                values.extend([0.0, 0.0, 0.0, 1.0]);
+            }
+            None => values.resize(values.len() + 16, f64::NAN),
+        }
+    }
+    let shape: &[usize] = if stacked { &[values.len() / 16, 4, 4] } else { &[4, 4] };
+    array(py, values, shape)
+}
+
+/// An image of an array (height, width).
+///
+/// # Errors
+/// If it is empty.
+pub(crate) fn image_of<T: Element + Copy>(image: &PyReadonlyArray2<'_, T>, what: &str) -> PyResult<Grid<T>> {
+    let [height, width] = [image.shape()[0], image.shape()[1]];
+    let values = match image.as_slice() {
+        Ok(values) => values.to_vec(),
+        Err(_) => image.as_array().iter().copied().collect(),
+    };
+    Grid::from_vec(width, height, values).map_err(|err| refused(format!("{what}: {err}")))
+}
+
+/// Numbers as a square or longer table.
+///
+/// # Errors
+/// None in practice.
+pub(crate) fn table<'py, const N: usize>(
+    py: Python<'py>,
+    rows: &[[f64; N]],
+) -> PyResult<Bound<'py, PyArray<f64, numpy::IxDyn>>> {
+    array(py, rows.iter().flatten().copied().collect(), &[rows.len(), N])
+}

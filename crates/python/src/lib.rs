@@ -1,0 +1,41 @@
+//! The Python module `touch2touch._native`: the functions of the studio and its verbs with numpy's arrays.
+//!
+//! It computes nothing: each function takes arrays and words apart, calls the one function that the studio calls, and puts
+//! the answer together again. What makes it pleasant in Python (progress bars, notebooks, PyTorch) is written in Python, in
+//! `python/touch2touch`.
+
+mod arrays;
+mod data;
+mod felt;
+mod measures;
+mod picture;
+mod process;
+mod recipe;
+mod tables;
+mod tool;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use crate::data::{Dataset, Pair, open, simulate};
+    #[pymodule_export]
+    use crate::felt::{Felt, Pose, feel, feel_many, register, register_many};
+    #[pymodule_export]
+    use crate::measures::{frechet, psnr, ssim};
+    #[pymodule_export]
+    use crate::picture::figure;
+    #[pymodule_export]
+    use crate::process::{Cancelled, Refused};
+    #[pymodule_export]
+    use crate::recipe::Recipe;
+    #[pymodule_export]
+    use crate::tables::{Scores, adapt, bundles, evaluate};
+    #[pymodule_export]
+    use crate::tool::Tool;
+
+    #[pymodule_export]
+    #[allow(non_upper_case_globals, reason = "the name in Python")]
+    const __version__: &str = env!("CARGO_PKG_VERSION");
+}

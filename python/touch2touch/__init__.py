@@ -1,0 +1,69 @@
+"""Cross-modal tactile generation and in-hand poses, from Python.
+
+>>> import touch2touch as t2t
+>>> pair = t2t.open("demo")[0]
+>>> felt = t2t.feel(pair, t2t.Recipe("predicted"))
+>>> felt.pose.matrix, felt.pose.sigma, felt.verdict
+
+Lengths are meters and angles radians; images are (fingers, height, width), right finger first, in the cameras' own
+orientation; poses are float64 matrices that map columns, named `dst_from_src`. Everything is computed by the functions
+behind the studio and its command line, so the numbers are the same to the last bit.
+"""
+
+from . import _native
+from ._native import (
+    Cancelled,
+    Dataset,
+    Felt,
+    Pair,
+    Pose,
+    Recipe,
+    Refused,
+    Scores,
+    Tool,
+    __version__,
+    adapt,
+    bundles,
+    evaluate,
+    feel,
+    feel_many,
+    figure,
+    frechet,
+    open,
+    psnr,
+    register,
+    register_many,
+    simulate,
+    ssim,
+)
+from ._many import predict, predict_many, table
+
+__all__ = [
+    "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
+    "evaluate", "feel", "feel_many", "figure", "frechet", "open", "predict", "predict_many", "psnr", "register",
+    "register_many", "simulate", "ssim", "table",
+]
+
+
+# How the classes pickle: by what they were made of, so that another process reads the data itself.
+
+
+def _dataset(path, read_as, tool_unit, names):
+    data = open(path, read_as=read_as, tool_unit=tool_unit)
+    return data if names is None else data._named(names)
+
+
+def _pair(data, at):
+    return data[at]
+
+
+def _simulated(tool, angle, x, y, seed, sensors, gelslims):
+    return simulate(tool, angle, x, y, seed=seed, sensors=sensors, gelslims=gelslims)
+
+
+def _recipe(choices):
+    return Recipe(**choices)
+
+
+def _tool(vertices, faces, name):
+    return Tool(vertices, faces, name=name)
