@@ -149,7 +149,7 @@ def test_what_is_not_known_is_refused_in_words(pair):
         (lambda: t2t.feel(pair, stage="end"), "no stage"),
         (lambda: t2t.simulate("hammer"), "pattern_36"),
         (lambda: t2t.simulate("pattern_36", float("nan")), "finite"),
-        (lambda: t2t.ssim(np.zeros((9, 9), np.float32), np.zeros((9, 8), np.float32)), "size"),
+        (lambda: t2t.ssim(np.zeros((9, 9), np.float32), np.zeros((9, 8), np.float32)), "9x9"),
         (lambda: t2t.figure(pair, columns=["3d:both"]), "gelslim"),
     ]:
         with pytest.raises(t2t.Refused, match=words):
@@ -256,6 +256,7 @@ def test_measures_are_those_of_their_conventions():
     a, b = (rng.uniform(0, 0.02, (40, 50)).astype(np.float32) for _ in range(2))
     mse = np.mean((a.astype(float) - b) ** 2)
     assert np.isclose(t2t.psnr(a, b), 10 * np.log10(0.0225**2 / mse), atol=1e-6)
+    assert t2t.psnr(np.asfortranarray(a), b) == t2t.psnr(a, b) == t2t.psnr(np.tile(a, 2)[:, :50], b)
     assert t2t.psnr(a, a) == np.inf and np.isclose(t2t.ssim(a, a), 1.0)
     standard, lab = t2t.ssim(a, b), t2t.ssim(a, b, convention="lab")
     assert standard != lab and t2t.ssim(a, b, data_range=0.1) > standard
@@ -291,11 +292,11 @@ def test_the_numbers_are_the_verbs(demo):
     ]:
         said = verb("pose", "demo", "--limit", "4", "--no-cache", *words)
         for case in said["cases"]:
-            pose = t2t.feel(demo[case["pair"]], recipe).pose
+            pose = t2t.feel(demo[case["name"]], recipe).pose
             if pose is None:
                 assert case["angle_deg"] is None
                 continue
-            assert np.degrees(pose.angle) == case["angle_deg"], case["pair"]
+            assert np.degrees(pose.angle) == case["angle_deg"], case["name"]
             assert pose.verdict == case["verdict"]["grade"]
 
 

@@ -87,9 +87,10 @@ pub(crate) fn points_of(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResu
     if shape[1] != 3 {
         return Err(refused(format!("{what} must be an array of N x 3 coordinates, not {} x {}", shape[0], shape[1])));
     }
+    // A slice of an array in Fortran's order runs down its columns.
     Ok(match array.as_slice() {
-        Ok(values) => values.chunks_exact(3).map(DVec3::from_slice).collect(),
-        Err(_) => array.as_array().rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect(),
+        Ok(values) if array.is_c_contiguous() => values.chunks_exact(3).map(DVec3::from_slice).collect(),
+        _ => array.as_array().rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect(),
     })
 }
 
@@ -134,8 +135,8 @@ pub(crate) fn transforms<'py>(
 pub(crate) fn image_of<T: Element + Copy>(image: &PyReadonlyArray2<'_, T>, what: &str) -> PyResult<Grid<T>> {
     let [height, width] = [image.shape()[0], image.shape()[1]];
     let values = match image.as_slice() {
-        Ok(values) => values.to_vec(),
-        Err(_) => image.as_array().iter().copied().collect(),
+        Ok(values) if image.is_c_contiguous() => values.to_vec(),
+        _ => image.as_array().iter().copied().collect(),
     };
     Grid::from_vec(width, height, values).map_err(|err| refused(format!("{what}: {err}")))
 }

@@ -137,6 +137,11 @@ impl Dataset {
         Ok(self.load(py, *id)?.into_pyobject(py)?.into_any())
     }
 
+    fn __iter__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let (builtins, get) = (slf.py().import("builtins")?, slf.getattr("__getitem__")?);
+        builtins.call_method1("map", (get, builtins.call_method1("range", (slf.get().ids.len(),))?))
+    }
+
     /// Names of the pairs, in order.
     #[getter]
     fn names(&self) -> Vec<&str> {

@@ -11,14 +11,14 @@ use crate::process::refused;
 /// Peak signal-to-noise ratio of two images (height, width), float32, decibels; infinite for equal ones. Pixels that are not
 /// finite in either are left out. `peak`: 0.0225 m, the lab's, unless named.
 #[pyfunction]
-#[pyo3(signature = (prediction, truth, *, peak=PEAK_M))]
+#[pyo3(signature = (prediction, truth, *, peak=None))]
 pub(crate) fn psnr(
     prediction: PyReadonlyArray2<'_, f32>,
     truth: PyReadonlyArray2<'_, f32>,
-    peak: f64,
+    peak: Option<f64>,
 ) -> PyResult<f64> {
     let (prediction, truth) = (image_of(&prediction, "prediction")?, image_of(&truth, "truth")?);
-    let found = metrics::psnr(&prediction, &truth, peak).map_err(refused)?;
+    let found = metrics::psnr(&prediction, &truth, peak.unwrap_or(PEAK_M)).map_err(refused)?;
     Ok(found.db().unwrap_or(f64::INFINITY))
 }
 
