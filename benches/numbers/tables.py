@@ -59,7 +59,7 @@ CONDITIONS = {"plain": "none", "ambiguous": "ambiguous (bare shaft)", "mixed": "
 
 def conditions(steps):
     """The shipped generator on each condition, seen and unseen tools."""
-    answers = {"plain": steps["results"], **steps["conditions"]}
+    answers = steps["conditions"]
     columns = [c for c in COLUMNS if c[1] in FEW or c[1] == "frechet"]
     text = []
     for group, words in GROUPS.items():
@@ -273,7 +273,7 @@ def three(steps):
 
 # Name of a table: the steps that it needs, and the function.
 TABLES = {
-    "results": (("results",), results), "conditions": (("results", "conditions"), conditions), "real": (("real",), real),
+    "results": (("results",), results), "conditions": (("conditions",), conditions), "real": (("real",), real),
     "front": (("front",), front), "registration": (("registration",), registration), "masks": (("masks",), masks),
     "verdict": (("verdict",), verdict), "doctor": (("doctor",), doctor), "dataset": (("dataset",), dataset),
     "trials": (("trials",), trials), "three": (("registration",), three),
