@@ -20,14 +20,14 @@ pub(super) fn all() -> Vec<(String, String)> {
     files.into_iter().map(read).collect()
 }
 
-/// The commands in the code fences (those of drawings and data have none), without what follows ` # `, and the rest of
+/// The commands in the code fences (those of drawings, data and Python have none), without what follows ` # `, and the rest of
 /// the text.
 pub(super) fn fenced(text: &str) -> (Vec<String>, String) {
     let (mut lines, mut rest, mut inside, mut no_commands) = (Vec::new(), String::new(), false, false);
     for line in text.lines() {
         if let Some(kind) = line.trim_start().strip_prefix("```") {
             inside = !inside;
-            no_commands = matches!(kind, "text" | "json");
+            no_commands = matches!(kind, "text" | "json" | "python");
         } else if inside && no_commands {
             // Letters that draw something, or the content of a file.
         } else if inside {
