@@ -16,6 +16,7 @@ class Bench:
     def __init__(self, programs, out, places):
         self.verbs, self.benches = (Program(programs / name, out) for name in ("touch2touch", "touch2touch-bench"))
         self.out, self.places, self.commands = out, places, []
+        out.mkdir(parents=True, exist_ok=True)
 
     def said(self, name, words):
         """A command as a person would give it, folders by their names in capitals."""
