@@ -52,7 +52,7 @@ python=target/python-venv/bin/python
 "$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
 "$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
 TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
-"$python" -m mypy.stubtest touch2touch
+"$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 
 step "the pages say what was measured"
 python3 -m benches.numbers --check

@@ -222,7 +222,7 @@ def test_progress_is_told_and_ctrl_c_stops(demo):
         def close(self):
             self.closed = True
 
-    t2t.evaluate(demo[:4], grasps=1, resamples=0, progress=Bar)
+    t2t.evaluate(demo, grasps=1, resamples=0, progress=Bar)
     assert len(Bar.made) == 1 and Bar.made[0].closed and Bar.made[0].total > 0
 
     def fail(done, total, text):
@@ -275,6 +275,8 @@ def test_scores_are_a_table_and_filter_the_data(demo):
     worse = demo.filter("psnr<99", scores)
     assert 0 < len(worse) < len(demo), "only what was scored"
     assert len(demo.filter("measured:angle>90", scores)) == 0
+    with pytest.raises(t2t.Refused, match="scored whole"):
+        t2t.evaluate(demo[:4])
 
 
 def test_pictures_draw_themselves(pair):

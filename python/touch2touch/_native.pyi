@@ -5,7 +5,11 @@ from typing import Any, final, overload
 import numpy as np
 from numpy.typing import NDArray
 
-__all__: list[str]
+__all__ = [
+    "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
+    "bundles", "evaluate", "feel", "feel_many", "figure", "frechet", "open", "psnr", "register", "register_many",
+    "simulate", "ssim",
+]
 __version__: str
 
 _Progress = Callable[[int, int, str], object] | type | None

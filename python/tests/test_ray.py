@@ -1,0 +1,95 @@
+"""Rows of many touches: by two workers, one of them killed, and by two processes of a job array."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import pytest
+import touch2touch as t2t
+
+ray = pytest.importorskip("ray")
+pq = pytest.importorskip("pyarrow.parquet")
+
+import touch2touch.ray as many  # noqa: E402
+
+
+def rows(folder):
+    table = pq.read_table(folder).sort_by("pair")
+    return table.to_pylist()
+
+
+@pytest.fixture(scope="module")
+def data():
+    return t2t.open("demo")[:24]
+
+
+@pytest.fixture(scope="module")
+def alone(data, tmp_path_factory):
+    """What one process makes."""
+    folder = tmp_path_factory.mktemp("alone")
+    recipe = t2t.Recipe("predicted")
+    many.write(folder / "rows-all.parquet", [many.row(pair, recipe, recipe.id()) for pair in data])
+    return rows(folder)
+
+
+def killer(stop, killed):
+    """Kills one of the actors once it works."""
+    while not stop.is_set() and not killed:
+        listed = subprocess.run(["pgrep", "-f", "^ray::.*MapWorker"], capture_output=True, text=True, check=False)
+        workers = [int(pid) for pid in listed.stdout.split()]
+        if len(workers) >= 2:
+            time.sleep(1.0)
+            os.kill(workers[0], signal.SIGKILL)
+            killed.append(workers[0])
+        time.sleep(0.05)
+
+
+def same(a, b):
+    """Equal to the last bit, NaN too."""
+    return len(a) == len(b) and all(
+        x.keys() == y.keys() and all(x[k] == y[k] or (x[k] != x[k] and y[k] != y[k]) for k in x) for x, y in zip(a, b))
+
+
+def test_two_workers_one_killed_make_the_rows_of_one_process(data, alone, tmp_path):
+    ray.init(num_cpus=2, include_dashboard=False, runtime_env={"env_vars": many.THREADS}, log_to_driver=False)
+    stop, killed = threading.Event(), []
+    thread = threading.Thread(target=killer, args=(stop, killed))
+    thread.start()
+    try:
+        out, made = many.evaluate(data, t2t.Recipe("predicted"), tmp_path, batch=2, workers=2)
+    finally:
+        stop.set()
+        thread.join()
+    assert killed, "a worker was killed"
+    assert made == len(data) and same(rows(out), alone)
+    # Nothing is made again; another recipe has rows of its own in the same folder.
+    assert many.evaluate(data, t2t.Recipe("predicted"), tmp_path)[1] == 0
+    assert many.evaluate(data[:2], t2t.Recipe("predicted", seed=5), tmp_path, workers=1)[1] == 2
+    assert len(rows(out)) == len(data) + 2
+    ray.shutdown()
+
+
+def test_a_job_array_makes_the_same_rows(tmp_path):
+    """As a cluster's scheduler starts it: a process for each share."""
+    run = [sys.executable, "-m", "touch2touch.ray", "demo", str(tmp_path), "--batch", "4"]
+    processes = [subprocess.Popen([*run, "--shard", f"{n}/40"], stdout=subprocess.PIPE, text=True) for n in (1, 40)]
+    said = [process.communicate()[0] for process in processes]
+    names = t2t.open("demo").names
+    batches = [names[n:n + 4] for n in range(0, len(names), 4)]
+    expected = [name for share in (0, 39) for batch in batches[share::40] for name in batch]
+    made = pq.read_table(tmp_path)
+    assert sorted(made["pair"].to_pylist()) == sorted(expected) and all("rows in" in text for text in said)
+    assert set(made["verdict"].to_pylist()) <= {"good", "check", "wrong", None}
+    assert subprocess.run([*run, "--shard", "41/40"], capture_output=True, check=False).returncode == 2
+
+
+def test_a_touch_that_fails_is_a_row_too():
+    pair = t2t.open("demo")[0]
+    recipe = t2t.Recipe(mask="threshold", threshold_mm=40.0, engine="distance_field")
+    row = many.row(pair, recipe, recipe.id())
+    assert row["verdict"] is None and row["angle_rad"] != row["angle_rad"] and len(row["why"]) > 10
+    row = many.row(pair, t2t.Recipe(mask="unet", mask_bundle=None), "x")
+    assert row["verdict"] == "good" or row["verdict"] in ("check", "wrong")
