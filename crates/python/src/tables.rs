@@ -101,7 +101,9 @@ pub(crate) fn evaluate(
 ) -> PyResult<Scores> {
     let data = dataset_of(py, data)?;
     if data.get().ids.len() != data.get().opened.source.index.pairs.len() {
-        return Err(refused("a data set is scored whole: open it without a filter, and name grasps= for fewer of each tool"));
+        return Err(refused(
+            "a data set is scored whole: open it without a filter, and name grasps= for fewer of each tool",
+        ));
     }
     let usual = py.get_type::<Recipe>().call0()?;
     let whole =

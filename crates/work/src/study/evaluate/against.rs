@@ -6,7 +6,11 @@ use serde::Deserialize;
 
 use super::{Evaluation, WHAT};
 use crate::error::TaskError;
+use crate::io::files;
 use touch2touch_core::evaluation::{self, Difference, Scores};
+
+/// No larger file is an evaluation: the lab's 32,256 pairs by two methods take some 50 MB.
+const MAX_FILE: u64 = 1 << 30;
 
 /// The part of an evaluation's file that is compared.
 #[derive(Deserialize)]
@@ -34,7 +38,8 @@ impl Evaluation {
     /// If the file cannot be read, has no grasps, or none in common with this evaluation.
     pub fn against(&mut self, file: &Path) -> Result<(), TaskError> {
         let fail = |why: String| TaskError::new(WHAT, format!("{why} ({})", file.display()));
-        let text = std::fs::read(file).map_err(|err| fail(format!("the earlier evaluation cannot be read: {err}")))?;
+        let text =
+            files::read(file, MAX_FILE).map_err(|err| fail(format!("the earlier evaluation cannot be read: {err}")))?;
         let earlier: Earlier =
             serde_json::from_slice(&text).map_err(|err| fail(format!("this is no evaluation: {err}")))?;
         let earlier = earlier.pairs.ok_or_else(|| {
