@@ -252,7 +252,7 @@ def three(steps):
         found = steps["registration"].get(law)
         if not found:
             continue
-        joint, lab = engine(found, "joint"), engine(found, "lab")
+        joint, lab = engine(found, "joint"), engine(found, "lab_icp")
         peers = [row for row in found["engines"] if row["peer"] and row["label"].startswith("Open3D")]
         best[law] = min(peers, key=lambda row: row["mean_deg"]) if peers else None
         cell = lambda row: f"{row['mean_deg']:.2f}°, {row['success_5']:.1f} %" if row else "-"
