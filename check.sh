@@ -55,6 +55,7 @@ TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet 
 "$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 
 step "the pages say what was measured"
+python3 -m unittest --quiet benches.numbers.test_pages
 python3 -m benches.numbers --check
 
 step "all passed"

@@ -89,6 +89,8 @@ def main():
             print(f"{step.name}: {why}", file=sys.stderr, flush=True)
             failed = True
             continue
+        # Another run may have added a step meanwhile.
+        kept = read(KEPT) | {step.name: kept[step.name]}
         keep({s.name: kept[s.name] for s in STEPS if s.name in kept})
         print(f"{step.name}: {kept[step.name]['made']['seconds']} s", flush=True)
     pages.write(steps(), kept, read(STUDY))
