@@ -224,6 +224,10 @@ fn felt(
     process: &Process,
     cx: &JobCx,
 ) -> Result<Results, TaskError> {
+    let decides = recipe.until(stage);
+    if decides.generator.is_some() || decides.mask_model.is_some() {
+        process.run_models(recipe.engine)?;
+    }
     pair.with_touch(tool, |touch| way::feel(touch, recipe, stage, &process.models, cx))
 }
 

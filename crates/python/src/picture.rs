@@ -82,6 +82,9 @@ fn svg(py: Python<'_>, pair: &Pair, recipe: &Whole, panes: Vec<FigurePane>) -> P
             space: |_, _: &Sample, _: &_, _: &JobCx| Err(nothing()),
             apart: |_, _: &Arc<Sample>, _: &JobCx| Ok(PerPad::default()),
         };
+        if made.is_some() {
+            process.run_models(recipe.engine)?;
+        }
         draw(dataset, &setup, makers, cx)?.svg()
     })
 }

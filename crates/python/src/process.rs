@@ -1,5 +1,6 @@
 //! The work of a process: its threads and loaded models, jobs that Ctrl-C stops, and errors as Python knows them.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
@@ -9,6 +10,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use touch2touch_work::error::{TaskError, TaskErrorKind};
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
 use touch2touch_work::job::{Cancel, JobCx, Progress};
 use touch2touch_work::models::Models;
 
@@ -22,9 +24,14 @@ const LOOK: Duration = Duration::from_millis(50);
 pub(crate) struct Process {
     id: u32,
     pool: ThreadPool,
+    /// True in a fork of a process whose built-in engine had run: its threads are not here, and whoever asks them waits for ever.
+    pub(crate) without_engine: bool,
     /// The models that are loaded; nothing is kept on the disk.
     pub(crate) models: Models,
 }
+
+/// True once models were run in this process, or in the one that it is a fork of.
+static RAN_MODELS: AtomicBool = AtomicBool::new(false);
 
 static PROCESS: Mutex<Option<Arc<Process>>> = Mutex::new(None);
 
@@ -40,10 +47,28 @@ pub(crate) fn process() -> PyResult<Arc<Process>> {
     }
     let pool = ThreadPoolBuilder::new().build();
     let pool = pool.map_err(|err| PyRuntimeError::new_err(format!("the system gives no threads: {err}")))?;
-    let process = Arc::new(Process { id, pool, models: Models::new(None) });
+    let process =
+        Arc::new(Process { id, pool, without_engine: RAN_MODELS.load(Ordering::Relaxed), models: Models::new(None) });
     // The parent's threads are not here to be joined.
     std::mem::forget(known.replace(process.clone()));
     Ok(process)
+}
+
+impl Process {
+    /// Says that models are about to be run by an engine.
+    ///
+    /// # Errors
+    /// If that is the built-in one and cannot run here.
+    pub(crate) fn run_models(&self, engine: EngineChoice) -> Result<(), TaskError> {
+        if self.without_engine && resolve(engine).is_ok_and(|kind| kind == EngineKind::Rten) {
+            let why =
+                "this process is a fork of one that has run models, and the built-in engine's threads are not in it";
+            let hint = "Start processes by \"spawn\" or \"forkserver\", or run models after the fork only.";
+            return Err(TaskError::new("Run a model", why).with_hint(hint));
+        }
+        RAN_MODELS.store(true, Ordering::Relaxed);
+        Ok(())
+    }
 }
 
 /// An error of the program as Python's.

@@ -122,6 +122,7 @@ pub(crate) fn evaluate(
             resamples,
             ..Setup::default()
         };
+        process.run_models(setup.recipe.engine)?;
         score(&data.get().opened.source, &setup, &process.models, cx)
     })?;
     Ok(Scores { evaluation })
@@ -165,6 +166,7 @@ pub(crate) fn adapt<'py>(
             force,
             replace,
         };
+        process.run_models(setup.recipe.engine)?;
         fit(&data.get().opened.source, &setup, &process.models, cx)
     })?;
     python(py, &adapted)
