@@ -120,11 +120,10 @@ def masks(bench):
         for kind in ("spoilt", "clean", f"threshold={THRESHOLDS[law]}", "unet"):
             words = ("registration", "--cases", folder, "--masks", kind, *BOTH)
             found.setdefault(law, {})[kind] = engines(bench.bench(f"masks_{law}_{kind.split('=')[0]}", *words))
-    for name, words in (("any_depth", ("--any-depth",)), ("predicted", ("--predicted",))):
-        folder = bench.cases(name, "--count", "100", "--seed", "6161", *words)
-        for kind in ("spoilt", "unet"):
-            answer = bench.bench(f"masks_{name}_{kind}", "registration", "--cases", folder, "--masks", kind, *BOTH)
-            found.setdefault(name, {})[kind] = engines(answer)
+    folder = bench.cases("any_depth", "--count", "100", "--seed", "6161", "--any-depth")
+    for kind in ("spoilt", "unet"):
+        answer = bench.bench(f"masks_any_depth_{kind}", "registration", "--cases", folder, "--masks", kind, *BOTH)
+        found.setdefault("any_depth", {})[kind] = engines(answer)
     return found
 
 

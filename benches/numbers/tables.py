@@ -71,8 +71,7 @@ def conditions(steps):
     return "\n\n".join(text)
 
 
-LAWS = {"other": "independent simulator", "own": "built-in simulator", "any_depth": "bubbles of any size and depth",
-        "predicted": "predicted imprints"}
+LAWS = {"other": "independent simulator", "own": "built-in simulator", "any_depth": "bubbles of any size and depth"}
 
 
 def registration(steps):
