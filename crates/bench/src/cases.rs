@@ -76,9 +76,14 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
     (0..count).into_par_iter().try_for_each(|i| {
         let (sample, mut case) = suite.felt(i);
         if let Some(generator) = &generator {
-            let mut generator = generator.lock().unwrap_or_else(PoisonError::into_inner);
-            let config = generator.spec().defaults;
-            (_, case.imprints) = timed_run(&mut generator, &sample, &config)?;
+            let predict = || {
+                let mut generator = generator.lock().unwrap_or_else(PoisonError::into_inner);
+                let config = generator.spec().defaults;
+                timed_run(&mut generator, &sample, &config)
+            };
+            // A thread of the pool that waits for the engine takes on another case, which would wait for this lock for ever.
+            let made = std::thread::scope(|scope| scope.spawn(predict).join());
+            (_, case.imprints) = made.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))?;
             case.predicted = true;
         }
         output.step(&suite.tools()[case.tool].name);
