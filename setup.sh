@@ -4,7 +4,7 @@
 need_packages() {
   local packages=(build-essential pkg-config libvulkan1 mesa-vulkan-drivers libx11-6 libx11-xcb1 libxcursor1 libxi6
     libxkbcommon0 libxkbcommon-x11-0)
-  [ "$1" = test ] && packages+=(python3 python3-pip)
+  [ "$1" = test ] && packages+=(python3 python3-pip python3-venv)
   if ! command -v apt-get >/dev/null; then
     echo "not a Debian or Ubuntu machine: please see to a C linker, a Vulkan driver and the X11 or Wayland libraries" >&2
     return 0
@@ -13,7 +13,7 @@ need_packages() {
   for package in "${packages[@]}"; do
     # A Python with pip from elsewhere serves as well as Debian's.
     case $package in
-      python3 | python3-pip) python3 -m pip --version >/dev/null 2>&1 && continue ;;
+      python3 | python3-pip | python3-venv) python3 -m pip --version >/dev/null 2>&1 && python3 -c "import ensurepip" 2>/dev/null && continue ;;
     esac
     dpkg-query -W -f '${Status}' "$package" 2>/dev/null | grep -q 'ok installed' || missing+=("$package")
   done
