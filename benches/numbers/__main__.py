@@ -36,7 +36,7 @@ def listed(kept):
         facts = kept.get(step.name, {}).get("made")
         when = f"{facts['seconds']} s, made {facts['date']} at {facts['commit']}" if facts else "not made"
         needs = f" (needs --{', --'.join(step.needs)})" if step.needs else ""
-        print(f"{step.name:<14}{when:<52}{step.what}{needs}")
+        print(f"{step.name:<14}{when:<66}{step.what}{needs}")
 
 
 def measure(step, args, kept):
