@@ -34,7 +34,7 @@ def quoted(text, steps):
 
 
 def made(facts):
-    """Where a section's figures are from."""
+    """Origin of a section's figures."""
     lines = [f"Made {facts['date']} at commit {facts['commit']} in {facts['seconds']} s on {facts['machine']}:"]
     return "\n".join([*lines, "", "```text", *facts["commands"], "```"])
 
@@ -47,8 +47,7 @@ def page(steps, kept, study):
             "simulated sensors unless it says real. What the columns mean: [words](glossary.md), `touch2touch evaluate --help`. "
             "OTHER are 40 grasps of an independent simulator and REAL 36 published real pairs, which are not part of the repository."]
     for step in STEPS:
-        name = next((n for n, (needs, _) in TABLES.items() if needs[-1] == step.name and n == step.name), None)
-        body = table(name, steps) if name else None
+        body = table(step.name, steps)
         if body:
             text += [f"## {step.what}", body, made(kept[step.name]["made"])]
     if study:
@@ -62,7 +61,7 @@ STUDY = ("Every method is trained from nothing on the same shards, with the same
 
 
 def wrong(steps, kept, study):
-    """What the pages say and the figures do not, a line each."""
+    """Contradictions of the pages to the figures, a line each."""
     said = []
     if not PAGE.exists() or PAGE.read_text() != page(steps, kept, study):
         said.append("docs/numbers.md is not what its figures give: ./study --pages")

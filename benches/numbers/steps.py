@@ -128,7 +128,7 @@ def masks(bench):
 
 
 def verdict(bench):
-    """What the verdict says of grasps with a known fault."""
+    """The verdict on grasps with a known fault."""
     answer = bench.bench("verdict", "verdict", "--count", "400", "--simulation-seed", "202")
     found = {"own": {key: answer[key] for key in ("faults", "named")}}
     if bench.places["other"]:

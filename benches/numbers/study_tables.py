@@ -1,6 +1,6 @@
 """The rows of `docs/study.json` as Markdown, in the paper's form: a table for each test set and group of tools."""
 
-from .tables import COLUMNS, GROUPS, markdown, number
+from .tables import COLUMNS, GROUPS, group_of, markdown, number
 
 SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "fid", "angle_deg", "success_5", "success_10")]
 # Columns of the paired differences.
@@ -8,7 +8,7 @@ PAIRED = [c for c in SHOWN if c[1] in ("psnr_db", "ssim", "angle_deg", "success_
 
 
 def label(settings):
-    """What a row is of, in words."""
+    """Name of a row, in words."""
     name = settings["method"]
     if settings.get("samples"):
         name += f", {settings['samples']:,} samples"
@@ -23,10 +23,6 @@ def label(settings):
         pairs, steps = settings["fit"]
         name += f", fitted to {pairs} pairs" + (f", tuned {steps} steps" if steps else "")
     return name
-
-
-def group_of(row, group):
-    return next((g for g in row["groups"] if g["group"] == group), None)
 
 
 def table(rows, group):

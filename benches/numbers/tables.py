@@ -199,12 +199,6 @@ def scored(figures):
                                                                  ("psnr_line_db", 1))]
 
 
-def stored_row(steps):
-    """The predictions that lie beside the real pairs: the lab's VQ-VAE."""
-    row = next(r for r in steps["real"]["stored"]["rows"] if r["method"].lower().startswith(("stored", "predictions", "vq", "lab")))
-    return row, row["groups"]
-
-
 def mean_of_groups(row, key):
     """A figure over all pictures of a row whose groups are by picture: the mean, weighted by images."""
     of = [(g["images"], g[key]["value"]) for g in row["groups"] if g.get(key)]
@@ -226,14 +220,10 @@ def real(steps):
             keys = ("psnr_db", "ssim", "psnr_raw_db", "ssim_raw", "psnr_line_db")
             rows.append([row["method"], *scored({key: mean_of_groups(row, key) for key in keys})])
     heads = ["generator", "PSNR dB", "SSIM", "raw dB", "raw SSIM", "line dB"]
-    shipped, fitted = (group_mean(row, "psnr_db") for row in demo_rows(found))
+    shipped, fitted = (group_mean(row, "psnr_db") for row in found["demo"]["rows"] if not row["upper_bound"])
     return (markdown(heads, rows) + f"\n\n{first['pairs']} pairs, {first['touches']} touches; cross-validated in three parts, each score on "
             "pairs that were not fitted. On the built-in demo, which is another rig, the model fitted to all of them has "
             f"{fitted:.1f} dB where the shipped one has {shipped:.1f} dB.")
-
-
-def demo_rows(found):
-    return [row for row in found["demo"]["rows"] if not row["upper_bound"]]
 
 
 def group_mean(row, key):
@@ -245,19 +235,18 @@ def group_mean(row, key):
 def three(steps):
     """README: three results."""
     rows = []
-    best = {}
     for law, words in (("other", "an independent simulator"), ("own", "the built-in simulator, fresh")):
         found = steps["registration"].get(law)
         if not found:
             continue
         joint, lab = engine(found, "joint"), engine(found, "lab_icp")
         peers = [row for row in found["engines"] if row["peer"] and row["label"].startswith("Open3D")]
-        best[law] = min(peers, key=lambda row: row["mean_deg"]) if peers else None
+        best = min(peers, key=lambda row: row["mean_deg"]) if peers else None
         cell = lambda row: f"{row['mean_deg']:.2f}°, {row['success_5']:.1f} %" if row else "-"
         rows.append([f"**In-hand pose**, {joint['count']} grasps of {words}: mean error, within 5°", f"**{cell(joint)}**",
-                     f"ICP: {cell(lab)}", cell(best[law])])
+                     f"ICP: {cell(lab)}", cell(best)])
         time = lambda row: f"{row['median_ms']:.2f} ms" if row else "-"
-        rows.append(["**Time** of these poses from contact points, median", f"**{time(joint)}**", f"ICP: {time(lab)}", time(best[law])])
+        rows.append(["**Time** of these poses from contact points, median", f"**{time(joint)}**", f"ICP: {time(lab)}", time(best)])
     if "real" in steps:
         fits = steps["real"]["fits"]
         last = fits[max((k for k in fits if fits[k].get("after")), key=int)]
@@ -269,16 +258,12 @@ def three(steps):
                      [["", "this program", "the lab's", "Open3D's best"], ["---"] * 4, *rows])
 
 
-# Name of a table: the steps that it needs, and the function.
-TABLES = {
-    "results": (("results",), results), "conditions": (("conditions",), conditions), "real": (("real",), real),
-    "front": (("front",), front), "registration": (("registration",), registration), "masks": (("masks",), masks),
-    "verdict": (("verdict",), verdict), "doctor": (("doctor",), doctor), "dataset": (("dataset",), dataset),
-    "trials": (("trials",), trials), "three": (("registration",), three),
-}
+# Name of a table: the step that it needs, and the function. Each step has one of its own name.
+TABLES = {of.__name__: (of.__name__, of) for of in (results, conditions, real, front, registration, masks, verdict, doctor, dataset,
+                                                    trials)} | {"three": ("registration", three)}
 
 
 def table(name, steps):
-    """A table by name; `None` where a step that it needs was not made."""
-    needs, of = TABLES[name]
-    return of(steps) if all(step in steps for step in needs) else None
+    """A table by name; `None` where the step that it needs was not made."""
+    step, of = TABLES[name]
+    return of(steps) if step in steps else None

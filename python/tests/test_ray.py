@@ -28,7 +28,7 @@ def data():
 
 @pytest.fixture(scope="module")
 def alone(data, tmp_path_factory):
-    """What one process makes."""
+    """Rows that one process makes."""
     folder = tmp_path_factory.mktemp("alone")
     recipe = t2t.Recipe("predicted")
     many.write(folder / "rows-all.parquet", [many.row(pair, recipe, recipe.id()) for pair in data])

@@ -8,7 +8,7 @@ use pyo3::exceptions::{PyIndexError, PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PySlice, PyTuple};
 use touch2touch_core::catalog;
-use touch2touch_core::dataset::{PairEntry, PairId};
+use touch2touch_core::dataset::{PairEntry, PairId, Problem};
 use touch2touch_core::evaluation::GraspScore;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::read_as::parse_list;
@@ -20,6 +20,7 @@ use touch2touch_work::feel::Touch;
 use touch2touch_work::filter::Filter;
 use touch2touch_work::io::dataset::{Dataset as Source, ToolScale};
 use touch2touch_work::labels::{Labels, PairLabels, Review};
+use touch2touch_work::recipe::Recipe;
 use touch2touch_work::tool::load_tool;
 
 use crate::arrays::{Array, array, stack, stack_rgb, transform, transforms};
@@ -32,7 +33,7 @@ use crate::tool::Tool;
 pub(crate) struct Opened {
     pub(crate) source: Source,
     labels: Labels,
-    /// How it was opened, by which it pickles.
+    /// Path and choices that it was opened with, by which it pickles.
     path: PathBuf,
     read_as: Option<String>,
     tool_unit: Option<String>,
@@ -78,6 +79,11 @@ pub(crate) fn open(
         let tools = Mutex::default();
         Ok(Dataset { opened: Arc::new(Opened { source, labels, path, read_as, tool_unit, tools }), ids })
     })
+}
+
+/// A problem in a line.
+fn said(problem: &Problem) -> String {
+    format!("{}: {}. {}", problem.file.display(), problem.what, problem.hint)
 }
 
 /// A source of paired touches. `len(data)`, `data[0]`, `data["tool/data_7"]`, `data[:10]`, iteration.
@@ -166,7 +172,6 @@ impl Dataset {
     /// Faults of the data set as far as names and folders tell, a line each.
     #[getter]
     fn problems(&self) -> Vec<String> {
-        let said = |p: &touch2touch_core::dataset::Problem| format!("{}: {}. {}", p.file.display(), p.what, p.hint);
         self.opened.source.problems.iter().map(said).collect()
     }
 
@@ -423,7 +428,7 @@ impl Pair {
     /// Oddities of its files and numbers, a line each.
     #[getter]
     fn notes(&self) -> Vec<String> {
-        self.sample.notes.iter().map(|p| format!("{}: {}. {}", p.file.display(), p.what, p.hint)).collect()
+        self.sample.notes.iter().map(said).collect()
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyTuple>> {
@@ -443,7 +448,7 @@ impl Pair {
     }
 
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        self.place().map(|_| picture::measured(py, self)).transpose()
+        self.place().map(|_| picture::filled(py, self, &Recipe::default())).transpose()
     }
 
     fn __repr__(&self) -> String {

@@ -20,7 +20,7 @@ use crate::arrays::{Array, array, points as points_array, points_of, stack, tabl
 use crate::data::Pair;
 use crate::picture;
 use crate::process::{Process, failed, refused, watched};
-use crate::recipe::{self, Recipe, default_recipe};
+use crate::recipe::{self, Recipe, given_or};
 use crate::tool::Tool;
 
 /// Pose of a tool in the hand, with how sure it is and whether to rely on it.
@@ -203,7 +203,7 @@ impl Felt {
     }
 
     fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
-        picture::felt(py, &self.pair, self.results.recipe())
+        picture::filled(py, &self.pair, self.results.recipe())
     }
 
     fn __repr__(&self) -> String {
@@ -249,9 +249,8 @@ pub(crate) fn feel(
     tool: Option<&Tool>,
 ) -> PyResult<Felt> {
     let (stage, tool) = (recipe::stage(stage)?, shared(tool));
-    let usual = default_recipe(py, recipe)?;
-    let whole = recipe.map_or(&usual, |recipe| &recipe.whole);
-    let results = watched(py, None, |process, cx| felt(pair, tool.as_ref(), whole, stage, process, cx))?;
+    let whole = given_or(py, recipe, "measured")?;
+    let results = watched(py, None, |process, cx| felt(pair, tool.as_ref(), &whole, stage, process, cx))?;
     Ok(Felt::of(results, pair))
 }
 
@@ -268,14 +267,13 @@ pub(crate) fn feel_many(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Vec<Felt>> {
     let stage = recipe::stage(stage)?;
-    let usual = default_recipe(py, recipe)?;
-    let whole = recipe.map_or(&usual, |recipe| &recipe.whole);
+    let whole = given_or(py, recipe, "measured")?;
     let pairs: Vec<&Pair> = pairs.iter().map(Py::get).collect();
     let results = watched(py, progress, |process, cx| {
         let done = std::sync::atomic::AtomicU64::new(0);
         let one = |pair: &&Pair| {
             cx.check("Feel")?;
-            let results = felt(pair, None, whole, stage, process, &cx.quiet())?;
+            let results = felt(pair, None, &whole, stage, process, &cx.quiet())?;
             let so_far = done.fetch_add(1, std::sync::atomic::Ordering::Relaxed) + 1;
             cx.progress(so_far, pairs.len() as u64, "feeling");
             Ok(results)

@@ -13,7 +13,7 @@ use touch2touch_work::recipe::Recipe as Whole;
 
 use crate::data::Pair;
 use crate::process::{refused, watched};
-use crate::recipe::{Recipe, default_recipe};
+use crate::recipe::{Recipe, given_or};
 
 /// Columns that need a renderer or a second recipe, which a package without a window has not.
 fn can_draw(pane: FigurePane) -> bool {
@@ -32,12 +32,8 @@ pub(crate) fn figure(
     recipe: Option<&Recipe>,
     columns: Option<Vec<String>>,
 ) -> PyResult<String> {
-    let usual = default_recipe(py, recipe)?;
-    let whole = recipe.map_or(&usual, |recipe| &recipe.whole);
-    let columns = columns.unwrap_or_else(|| {
-        let predicted: &[&str] = if whole.generator.is_some() { &["predicted", "error"] } else { &[] };
-        ["gelslim", "measured"].iter().chain(predicted).map(|&name| name.to_owned()).collect()
-    });
+    let whole = given_or(py, recipe, "measured")?;
+    let Some(columns) = columns else { return filled(py, pair, &whole) };
     let panes = columns.iter().map(|name| {
         let pane = name.parse::<FigurePane>().ok().filter(|pane| can_draw(*pane));
         pane.ok_or_else(|| {
@@ -45,16 +41,11 @@ pub(crate) fn figure(
             refused(format!("columns: there is no {name:?}; there are {}", all.join(", ")))
         })
     });
-    svg(py, pair, whole, panes.collect::<PyResult<_>>()?)
+    svg(py, pair, &whole, panes.collect::<PyResult<_>>()?)
 }
 
-/// Columns of a pair that has no prediction.
-pub(crate) fn measured(py: Python<'_>, pair: &Pair) -> PyResult<String> {
-    svg(py, pair, &Whole::default(), vec![FigurePane::GelSlim, FigurePane::Measured])
-}
-
-/// Columns of a result.
-pub(crate) fn felt(py: Python<'_>, pair: &Pair, recipe: &Whole) -> PyResult<String> {
+/// The figure with the columns that a recipe fills: a prediction and its error where it makes one.
+pub(crate) fn filled(py: Python<'_>, pair: &Pair, recipe: &Whole) -> PyResult<String> {
     let mut panes = vec![FigurePane::GelSlim, FigurePane::Measured];
     if recipe.generator.is_some() {
         panes.extend([FigurePane::Predicted, FigurePane::Error]);

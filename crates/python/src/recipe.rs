@@ -1,7 +1,6 @@
 //! `Recipe`: everything that decides the result of a touch, as one value.
 
 use std::path::PathBuf;
-use std::str::FromStr;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -20,7 +19,7 @@ use crate::process::{failed, refused};
 
 /// Everything that decides the result of a touch: the imprint, the models with their choices, the mask, the registration.
 ///
-/// What is not said is as the verbs have it. `imprint`: "measured" or "predicted". `bundle`, `mask_bundle`: folders of model
+/// Choices that are not said are as the verbs have them. `imprint`: "measured" or "predicted". `bundle`, `mask_bundle`: folders of model
 /// bundles (default: the shipped ones). `steps`, `seed`, `sampler`: of the generator (default: the bundle's). `shift`: the
 /// mapping to meters, "exact", "paper" or "raw". `mask`: "auto", "unet", "threshold", "top_percent", "cad" or "truth", with
 /// `threshold_mm`. `engine`: the registration, such as "joint" or "gicp:gate=1.5". `hand`: masks drawn by hand win.
@@ -32,15 +31,19 @@ pub(crate) struct Recipe {
     named: Py<PyDict>,
 }
 
-/// A choice by its word, one of `all`.
+/// The choice of this name.
 ///
 /// # Errors
-/// If it is none of them; they are said.
-fn word<T: FromStr>(what: &str, text: &str, all: impl Iterator<Item = &'static str>) -> PyResult<T> {
-    text.parse().map_err(|_| {
-        let all: Vec<&str> = all.collect();
-        refused(format!("{what}: there is no {text:?}; there are {}", all.join(", ")))
-    })
+/// If there is none; those that there are are said.
+fn choice<T>(what: &str, name: &str, all: impl IntoIterator<Item = (&'static str, T)>) -> PyResult<T> {
+    let mut names = Vec::new();
+    for (known, value) in all {
+        if known == name {
+            return Ok(value);
+        }
+        names.push(known);
+    }
+    Err(refused(format!("{what}: there is no {name:?}; there are {}", names.join(", "))))
 }
 
 /// The stage of this name.
@@ -62,42 +65,15 @@ pub(crate) fn stage(name: &str) -> PyResult<Stage> {
     })
 }
 
-fn shift(name: &str) -> PyResult<ShiftMode> {
-    Ok(match name {
-        "exact" => ShiftMode::ExactInverse,
-        "paper" => ShiftMode::PaperShift,
-        "raw" => ShiftMode::Raw,
-        other => return Err(refused(format!("shift: there is no {other:?}; there are exact, paper, raw"))),
-    })
-}
-
-fn runtime(name: &str) -> PyResult<EngineChoice> {
-    Ok(match name {
-        "auto" => EngineChoice::Auto,
-        "rten" => EngineChoice::Rten,
-        "ort" => EngineChoice::Ort,
-        other => return Err(refused(format!("runtime: there is no {other:?}; there are auto, rten, ort"))),
-    })
-}
-
-fn source(name: &str) -> PyResult<ImprintSource> {
-    Ok(match name {
-        "measured" => ImprintSource::Measured,
-        "predicted" => ImprintSource::Predicted,
-        other => return Err(refused(format!("imprint: there is no {other:?}; there are measured, predicted"))),
-    })
-}
-
-/// The recipe that goes without saying, where none is given.
+/// The recipe that was given, else the one that goes without saying for this imprint.
 ///
 /// # Errors
 /// If a bundle that was found cannot be used.
-pub(crate) fn default_recipe(py: Python<'_>, given: Option<&Recipe>) -> PyResult<Whole> {
-    if given.is_some() {
-        return Ok(Whole::default());
+pub(crate) fn given_or(py: Python<'_>, given: Option<&Recipe>, imprint: &str) -> PyResult<Whole> {
+    match given {
+        Some(recipe) => Ok(recipe.whole.clone()),
+        None => Ok(Recipe::new(py, imprint, None)?.whole),
     }
-    let made = py.get_type::<Recipe>().call0()?;
-    Ok(made.cast::<Recipe>()?.get().whole.clone())
 }
 
 #[pymethods]
@@ -121,22 +97,26 @@ impl Recipe {
         let text = |key: &str, default: &str| -> PyResult<String> {
             Ok(take(key)?.map(|value| value.extract()).transpose()?.unwrap_or_else(|| default.to_owned()))
         };
-        let imprint = source(&text("imprint", "measured")?)?;
+        let imprint = [ImprintSource::Measured, ImprintSource::Predicted].map(|source| (source.key(), source));
+        let imprint = choice("imprint", &text("imprint", "measured")?, imprint)?;
         let bundle: Option<PathBuf> = take("bundle")?.map(|v| v.extract()).transpose()?;
         let mask_bundle: Option<PathBuf> = take("mask_bundle")?.map(|v| v.extract()).transpose()?;
         let steps: Option<u32> = take("steps")?.map(|v| v.extract()).transpose()?;
         let seed: Option<u64> = take("seed")?.map(|v| v.extract()).transpose()?;
         let sampler = take("sampler")?.map(|v| v.extract::<String>()).transpose()?;
-        let sampler = sampler.map(|name| word::<Sampler>("sampler", &name, Sampler::iter().map(Into::into)));
+        let samplers = Sampler::iter().map(|sampler| (sampler.into(), sampler));
+        let sampler = sampler.map(|name| choice("sampler", &name, samplers));
         let sampler = sampler.transpose()?;
-        let shift = shift(&text("shift", "exact")?)?;
-        let mask: MaskSource =
-            word("mask", &text("mask", MaskSource::default().key())?, MaskSource::iter().map(MaskSource::key))?;
+        let shifts = [("exact", ShiftMode::ExactInverse), ("paper", ShiftMode::PaperShift), ("raw", ShiftMode::Raw)];
+        let shift = choice("shift", &text("shift", "exact")?, shifts)?;
+        let masks = MaskSource::iter().map(|source| (source.key(), source));
+        let mask = choice("mask", &text("mask", MaskSource::default().key())?, masks)?;
         let threshold_mm: Option<f64> = take("threshold_mm")?.map(|v| v.extract()).transpose()?;
         let registration = text("engine", &RegistrationChoice::default().to_string())?;
         let registration: RegistrationChoice = registration.parse().map_err(refused)?;
         let hand: Option<bool> = take("hand")?.map(|v| v.extract()).transpose()?;
-        let engine = runtime(&text("runtime", "auto")?)?;
+        let engines = [("auto", EngineChoice::Auto), ("rten", EngineChoice::Rten), ("ort", EngineChoice::Ort)];
+        let engine = choice("runtime", &text("runtime", "auto")?, engines)?;
         if let Some(unknown) = left.keys().iter().next() {
             return Err(refused(format!("a recipe has no choice {unknown}; see help(touch2touch.Recipe)")));
         }

@@ -17,7 +17,7 @@ use touch2touch_work::tuning::unfinished_folder;
 
 use crate::data::dataset_of;
 use crate::process::{refused, watched};
-use crate::recipe::Recipe;
+use crate::recipe::{Recipe, given_or};
 
 /// A JSON object as Python's dictionaries and lists.
 fn python<'py>(py: Python<'py>, value: &impl Serialize) -> PyResult<Bound<'py, PyAny>> {
@@ -105,9 +105,7 @@ pub(crate) fn evaluate(
             "a data set is scored whole: open it without a filter, and name grasps= for fewer of each tool",
         ));
     }
-    let usual = py.get_type::<Recipe>().call0()?;
-    let whole =
-        recipe.map_or_else(|| usual.cast::<Recipe>().map(|made| made.get().whole.clone()), |r| Ok(r.whole.clone()))?;
+    let whole = given_or(py, recipe, "measured")?;
     let evaluation = watched(py, progress, |process, cx| {
         let all = found::find(&[]).bundles;
         let named = bundles.map(|folders| folders.iter().map(Origin::from).collect::<Vec<_>>());
@@ -150,11 +148,7 @@ pub(crate) fn adapt<'py>(
         return Err(refused("validate must be 0, or 2 or more parts"));
     }
     let data = dataset_of(py, data)?;
-    let keywords = PyDict::new(py);
-    keywords.set_item("imprint", "predicted")?;
-    let usual = py.get_type::<Recipe>().call((), Some(&keywords))?;
-    let whole =
-        recipe.map_or_else(|| usual.cast::<Recipe>().map(|made| made.get().whole.clone()), |r| Ok(r.whole.clone()))?;
+    let whole = given_or(py, recipe, "predicted")?;
     let adapted = watched(py, progress, |process, cx| {
         let setup = AdaptSetup {
             recipe: whole,

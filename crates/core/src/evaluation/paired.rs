@@ -9,7 +9,7 @@ use super::{Column, Estimate, GraspScore, Group, Scores, by_tool, estimate, grou
 
 /// The figures of one method less those of another, over the grasps that both have.
 ///
-/// What makes a grasp hard is the same for both, so these intervals are narrower than those of the two rows. One without 0
+/// The hardness of a grasp is the same for both, so these intervals are narrower than those of the two rows. One without 0
 /// in it tells the methods apart.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
