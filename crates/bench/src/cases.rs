@@ -16,6 +16,7 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::infer::generator::Generator;
 use touch2touch_work::io::cases::{self, Suite};
 use touch2touch_work::io::stl;
+use touch2touch_work::models::outside_of_pools;
 
 /// Arguments of `bench cases`.
 #[derive(Debug, Args)]
@@ -81,9 +82,7 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
                 let config = generator.spec().defaults;
                 timed_run(&mut generator, &sample, &config)
             };
-            // A thread of the pool that waits for the engine takes on another case, which would wait for this lock for ever.
-            let made = std::thread::scope(|scope| scope.spawn(predict).join());
-            (_, case.imprints) = made.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))?;
+            (_, case.imprints) = outside_of_pools(predict)?;
             case.predicted = true;
         }
         output.step(&suite.tools()[case.tool].name);

@@ -74,7 +74,7 @@ fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 /// Runs what holds a model's lock while the engine computes. A thread of a pool takes on other work of the pool while it
 /// waits for the engine's threads, and that work may want the same lock, which it then waits for for ever: such a thread has
 /// another one do it.
-fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
+pub fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
     if rayon::current_thread_index().is_none() {
         return job();
     }
