@@ -30,11 +30,12 @@ fi
 step "tests: the science, the job without model engines, the tuning of networks"
 cargo test --locked -p touch2touch-core -p touch2touch-work -p touch2touch-tuning
 
-step "the ONNX Runtime library, fetched by the product itself"
-runtime_dir="$PWD/target/onnxruntime"
-cargo run --locked --quiet --features ui-test -- runtime --fetch --dir "$runtime_dir"
-ORT_DYLIB_PATH="$(find "$runtime_dir" -name 'libonnxruntime*' -type f | head -n 1)"
-export ORT_DYLIB_PATH
+step "the ONNX Runtime library, plain and with a provider, fetched by the product itself"
+export ORT_DYLIB_PATH="$PWD/target/onnxruntime" TOUCH2TOUCH_OPENVINO="$PWD/target/openvino"
+cargo run --locked --quiet --features ui-test -- runtime --fetch --dir "$ORT_DYLIB_PATH"
+if [ "$(uname -sm)" = "Linux x86_64" ]; then
+  cargo run --locked --quiet --features ui-test -- runtime --fetch --provider openvino --dir "$TOUCH2TOUCH_OPENVINO"
+fi
 
 step "tests: files, models on both engines, GPU on a software driver, the studio by clicks and keys"
 export REQUIRE_GPU=1 REQUIRE_ORT=1

@@ -29,11 +29,7 @@ fn main() -> Result<()> {
     let [bundle, engine, input, output, seed] = args.as_slice() else {
         bail!("usage: graph_outputs BUNDLE rten|ort IN.npz OUT.npz SEED");
     };
-    let choice = match engine.as_str() {
-        "rten" => EngineChoice::Rten,
-        "ort" => EngineChoice::Ort,
-        other => bail!("the engine is \"{other}\"; it must be \"rten\" or \"ort\""),
-    };
+    let choice: EngineChoice = engine.parse().map_err(anyhow::Error::msg)?;
     let seed: u64 = seed.parse().context("SEED must be a whole number")?;
     let engine = resolve(choice)?;
     let bundle = Bundle::open(&PathBuf::from(bundle))?;

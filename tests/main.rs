@@ -39,6 +39,8 @@ mod handed_on;
 #[cfg(feature = "onnx")]
 mod kept_scores;
 #[cfg(feature = "onnx")]
+mod providers;
+#[cfg(feature = "onnx")]
 mod sensors;
 #[cfg(feature = "onnx")]
 mod sweep;

@@ -140,56 +140,63 @@ def begin(args, kind, net, rate, nets=None, others=None):
     return data.Shards(args.data), Run(args, kind, {kind: net, **(nets or {})}, rate, others)
 
 
+def pair(shards, batch, args, rng):
+    """GelSlim images and the clean imprints of the same touches, turned alike."""
+    k = symmetries(args, rng, len(batch))
+    return {"gelslim": condition(shards, batch, k, args, rng), "clean": target(shards, "clean", batch, k, args)}
+
+
 def pairs(shards, run, size=16):
     """Batches of (GelSlim, clean imprint) until the budget is spent."""
-    for batch, rng in batches(shards, run, size):
-        k = symmetries(run.args, rng, len(batch))
-        yield condition(shards, batch, k, run.args, rng), target(shards, "clean", batch, k, run.args)
+    for batch in batches(shards, run, size, pair):
+        yield batch["gelslim"], batch["clean"]
 
 
 def l1unet(args):
     net = L1UNet()
     shards, run = begin(args, "l1unet", net, 1e-3)
     for gelslim, clean in pairs(shards, run):
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+        with run.place.autocast():
             loss = (net(gelslim).float() - clean).abs().mean()
         run.descend(loss, len(gelslim), {"l1": loss})
-    run.save()
+    run.end()
 
 
 def visgel(args):
-    """L1 and a least-squares GAN; the critic has its own optimiser."""
+    """L1 and a least-squares GAN; the critic has its own optimiser, and a step in each part."""
     net, critic = L1UNet(), PatchCritic()
     optimiser = torch.optim.AdamW(critic.parameters(), lr=3e-4, betas=(0.5, 0.99))
     critic.requires_grad_(False)
     shards, run = begin(args, "visgel", net, 7e-4, {"critic": critic}, {"critic": optimiser})
     for gelslim, clean in pairs(shards, run):
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+        with run.place.autocast():
             drawn = net(gelslim).float()
         critic.requires_grad_(True)
         real, fake = critic(gelslim, clean), critic(gelslim, drawn.detach())
         judged = ((real - 1) ** 2).mean() + (fake**2).mean()
         optimiser.zero_grad()
         judged.backward()
+        run.place.average(critic.parameters())
         optimiser.step()
         critic.requires_grad_(False)
         l1, fooled = (drawn - clean).abs().mean(), ((critic(gelslim, drawn) - 1) ** 2).mean()
         run.descend(20 * l1 + 0.1 * fooled, len(gelslim), {"l1": l1, "critic": judged})
-    run.save()
+    run.end()
 
 
 def vqvae(args):
     net = VqVae()
     shards, run = begin(args, "vqvae", net, 1e-3)
     for gelslim, clean in pairs(shards, run):
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+        with run.place.autocast():
             drawn, z, q = net(gelslim)
         l1, edge = (drawn.float() - clean).abs().mean(), edges(drawn.float(), clean)
         book = F.mse_loss(q, z.detach()) + 0.25 * F.mse_loss(z, q.detach())
-        run.descend(10 * l1 + 10 * edge + book, len(gelslim), {"l1": l1, "edge": edge, "book": book})
-        if run.step % 100 == 0 and not run.fallen():
-            revive(net, z.detach())
-    run.save()
+        stepped = run.descend(10 * l1 + 10 * edge + book, len(gelslim), {"l1": l1, "edge": edge, "book": book})
+        if stepped and run.step % 100 == 0 and not run.fallen():
+            revive(net, z.detach().float())
+            run.place.agree([net.book])
+    run.end()
 
 
 @torch.no_grad()
@@ -197,18 +204,22 @@ def revive(net, z):
     """Moves codes that no feature of the batch chose to random features."""
     flat = z.permute(0, 2, 3, 1).reshape(-1, z.shape[1])
     distance = (net.book * net.book).sum(dim=1) - 2 * flat @ net.book.t()
-    unused = torch.ones(len(net.book), dtype=torch.bool)
+    unused = torch.ones(len(net.book), dtype=torch.bool, device=z.device)
     unused[distance.argmin(dim=1).unique()] = False
-    net.book[unused] = flat[torch.randint(len(flat), (int(unused.sum()),))]
+    net.book[unused] = flat[torch.randint(len(flat), (int(unused.sum()),)).to(z.device)]
+
+
+def named_imprints(shards, batch, args, rng):
+    batch = batch[shards.meta[batch, 5] >= 0]
+    key = "imprint" if rng.random() < 0.5 else "clean"
+    return {"image": data.to_model(shards.metres(key, batch)), "tool": torch.from_numpy(shards.meta[batch, 5]).long()}
 
 
 def classifier(args):
     net = Classifier()
     shards, run = begin(args, "classifier", net, 1e-3)
-    for batch, rng in batches(shards, run, 32):
-        batch = batch[shards.meta[batch, 5] >= 0]
-        tool = torch.from_numpy(shards.meta[batch, 5]).long()
-        image = data.to_model(shards.metres("imprint" if rng.random() < 0.5 else "clean", batch))
-        loss = F.cross_entropy(net(image), tool)
-        run.descend(loss, len(batch), {"cross": loss})
-    run.save()
+    for batch in batches(shards, run, 32, named_imprints):
+        with run.place.autocast():
+            loss = F.cross_entropy(net(batch["image"]).float(), batch["tool"])
+        run.descend(loss, len(batch["tool"]), {"cross": loss})
+    run.end()

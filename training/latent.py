@@ -11,25 +11,30 @@ from . import data, diffusion, models
 from .run import Run, batches, condition, edges, start, symmetries, target
 
 
+def imprints(shards, batch, args, rng):
+    """Imprints to be drawn, and those to be drawn from: the same, or as measured."""
+    k = rng.integers(8, size=len(batch))
+    clean = target(shards, "clean", batch, k, args)
+    return {"clean": clean, "image": target(shards, "imprint", batch, k, args) if rng.random() < 0.5 else clean}
+
+
 def autoencoder(args):
     shards, net = data.Shards(args.data), models.Autoencoder()
     start(net.decoder, args, "decoder", "decoder.")
     net = net.to(memory_format=torch.channels_last)
     run = Run(args, "autoencoder", {"autoencoder": net}, 1.5e-3)
-    for batch, rng in batches(shards, run, 8):
+    for batch in batches(shards, run, 8, imprints):
         # A bundle has no encoder: a new one first learns the latents that the bundle's decoder knows.
         frozen = bool(args.start) and run.progress() < 0.4
         net.decoder.requires_grad_(not frozen)
-        k = rng.integers(8, size=len(batch))
-        clean = target(shards, "clean", batch, k, args)
-        image = target(shards, "imprint", batch, k, args) if rng.random() < 0.5 else clean
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
-            mean, log_var = net.encode(image)
+        clean = batch["clean"]
+        with run.place.autocast():
+            mean, log_var = net.encode(batch["image"])
             drawn = net.decode(mean + torch.exp(0.5 * log_var) * torch.randn_like(mean)).float()
         l1, edge = (drawn - clean).abs().mean(), edges(drawn, clean)
         kl = 0.5 * (mean**2 + log_var.exp() - 1 - log_var).mean()
-        run.descend(10 * l1 + 20 * edge + 4e-4 * kl, len(batch), {"l1": l1, "edge": edge, "kl": kl})
-    run.save()
+        run.descend(10 * l1 + 20 * edge + 4e-4 * kl, len(clean), {"l1": l1, "edge": edge, "kl": kl})
+    run.end()
 
 
 class Latents:
@@ -38,9 +43,9 @@ class Latents:
     `known`: mean and deviation, where they were taken before.
     """
 
-    def __init__(self, net, shards, args, known=None):
-        self.net, self.shards, self.args, self.store = net.eval(), shards, args, {}
-        self.mean, self.std = known or self._statistics()
+    def __init__(self, net, shards, args, device, known=None):
+        self.net, self.shards, self.args, self.device, self.store = net.eval().to(device), shards, args, device, {}
+        self.mean, self.std = (x.to(device) for x in known or self._statistics())
 
     def _statistics(self):
         shards = self.shards
@@ -55,7 +60,7 @@ class Latents:
     @torch.no_grad()
     def _raw(self, batch, k):
         """Mean and log variance for samples `batch`, each turned by its own symmetry."""
-        return self.net.encode(target(self.shards, "clean", batch, k, self.args))
+        return self.net.encode(target(self.shards, "clean", batch, k, self.args).to(self.device))
 
     def take(self, batch, k):
         pairs = list(zip(batch.tolist(), k.tolist()))
@@ -83,25 +88,34 @@ def generator(args):
     elif args.start:
         whitening = start(models.Autoencoder().decoder, args, "decoder", "decoder.")
         known = whitening["mean"], whitening["std"]
-    latents = Latents(ae, shards, args, known)
+    place = run.place
+    latents = Latents(ae, shards, args, place.device, known)
     run.extra = {"latent_mean": latents.mean, "latent_std": latents.std}
-    bars = torch.from_numpy(diffusion.alpha_bar()).float()
-    for batch, rng in batches(shards, run, 16):
-        # Pairs turned and mirrored together, as the lab's own augmentation does: the colours tell which way up.
-        k = symmetries(args, rng, len(batch))
-        z, gelslim = latents.take(batch, k), condition(shards, batch, k, args, rng)
+    bars = torch.from_numpy(diffusion.alpha_bar()).float().to(place.device)
+    for batch in batches(shards, run, 16, turned_pairs):
+        z, gelslim = latents.take(batch["numbers"], batch["turned"]), batch["gelslim"]
         # Stratified steps: the batch covers the whole schedule.
-        t = ((torch.arange(len(batch)) + torch.rand(len(batch))) / len(batch) * diffusion.STEPS).long()
-        t = t[torch.randperm(len(batch))]
+        t = ((torch.arange(len(z)) + torch.rand(len(z))) / len(z) * diffusion.STEPS).long()
+        t = t[torch.randperm(len(z))].to(place.device)
         x, v = diffusion.noised(z, torch.randn_like(z), t, bars)
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
+        with place.autocast():
             seen = encoder(gelslim)
             guess = denoiser(x, t, seen).float()
         loss = F.mse_loss(guess, v)
         direct = F.mse_loss(seen[:, :models.LATENT].float(), z)
-        run.descend(loss + 0.5 * direct, len(batch), {"v": loss, "direct": direct})
+        if not run.descend(loss + 0.5 * direct, len(z), {"v": loss, "direct": direct}):
+            continue
         decay = min(0.998, (1 + run.step) / (20 + run.step))
         for average, net in ((averages["encoder_ema"], encoder), (averages["denoiser_ema"], denoiser)):
             for a, p in zip(average.parameters(), net.parameters()):
                 a.lerp_(p.detach(), 1 - decay)
-    run.save()
+    run.end()
+
+
+def turned_pairs(shards, batch, args, rng):
+    """Numbers of the samples, how each is turned, and GelSlim images that are: the latents are kept by number and turn.
+
+    Pairs are turned and mirrored together, as the lab's own augmentation does: the colours tell which way up.
+    """
+    k = symmetries(args, rng, len(batch))
+    return {"numbers": batch, "turned": k, "gelslim": condition(shards, batch, k, args, rng)}

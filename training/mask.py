@@ -73,11 +73,12 @@ def mask(args):
     run = Run(args, "mask", {"mask": net}, 6e-4 if args.start else 3e-3)
     predicted = Predicted(args, shards) if args.predicted_by else None
     run.extra = {"predicted_by": data.sha256(Path(args.predicted_by) / "denoiser.onnx") if predicted else None}
-    for batch, rng in batches(shards, run, 8):
+
+    def varied(shards, batch, args, rng):
+        """Inputs of the network and where contact is, of imprints from measured to generated; no input where none is known."""
         batch = batch[shards.contact_known(batch)]
         if not len(batch):
-            run.pass_over()
-            continue
+            return {}
         generated = rng.random(len(batch)) < (PREDICTED if predicted else 0)
         drawn = torch.zeros(0, 1, 140, 175)
         if generated.any():
@@ -94,12 +95,19 @@ def mask(args):
         truth = shards.contact(batch)
         flips = [d for d in (1, 2) if rng.random() < 0.5]
         x, truth = torch.flip(x, [d + 1 for d in flips]), torch.flip(truth, flips)
-        with torch.autocast("cpu", torch.bfloat16, enabled=args.bf16):
-            logits = net(data.to_mask_input(x).contiguous(memory_format=torch.channels_last)).float()
+        return {"input": data.to_mask_input(x).contiguous(memory_format=torch.channels_last), "truth": truth}
+
+    for batch in batches(shards, run, 8, varied):
+        if not batch:
+            run.pass_over()
+            continue
+        truth = batch["truth"]
+        with run.place.autocast():
+            logits = net(batch["input"]).float()
         cross = F.cross_entropy(logits, truth)
         dice = dice_loss(logits.softmax(dim=1)[:, 1], truth.float())
         with torch.no_grad():
             on, there = logits[:, 1] > logits[:, 0], truth == 1
             iou = (on & there).sum() / (on | there).sum().clamp(min=1)
-        run.descend(cross + dice, len(batch), {"cross": cross, "dice": dice, "iou": iou})
-    run.save()
+        run.descend(cross + dice, len(truth), {"cross": cross, "dice": dice, "iou": iou})
+    run.end()

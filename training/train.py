@@ -3,7 +3,8 @@
 NAME: autoencoder, generator (after the autoencoder), mask; the baselines l1unet, visgel, vqvae; classifier.
 
 Each command stops after the given minutes (or `--steps`), writes `NAME.pt` every two minutes and goes on from it
-when started again with the same folder. One thread by default.
+when started again with the same folder, on whatever device. One thread by default. `torchrun --nproc-per-node N -m
+training.train ...` shares each step by N processes.
 """
 
 import argparse
@@ -11,6 +12,7 @@ import argparse
 import torch
 
 from . import baselines, latent, mask
+from .place import PRECISIONS
 
 WHAT = {
     "autoencoder": latent.autoencoder,
@@ -32,7 +34,13 @@ def parser():
     parser.add_argument("--steps", type=int, default=0, help="number of steps instead of the minutes")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--threads", type=int, default=1)
-    parser.add_argument("--bf16", action="store_true", help="bfloat16 autocast: faster where the CPU has AMX, else slower")
+    parser.add_argument("--device", choices=("auto", "cpu", "cuda", "mps"), default="auto",
+                        help="auto: the first GPU that PyTorch can use, else the processor")
+    parser.add_argument("--precision", choices=("auto", *PRECISIONS), default="auto",
+                        help="of the networks' inner values; auto: bfloat16 on a GPU that has it")
+    parser.add_argument("--workers", type=int, default=0, help="processes that prepare the batches")
+    parser.add_argument("--parts", type=int, default=1,
+                        help="parts of a step, each of the usual batch, that a process takes one after the other")
     parser.add_argument("--from", dest="start", help="bundle whose weights to begin with (default: from scratch)")
     parser.add_argument("--rate", type=float, help="peak learning rate (default: each network's own); lower for a start from good weights")
     parser.add_argument("--fall", type=float, default=0.6, help="last share of the budget, over which the learning rate falls")

@@ -148,10 +148,10 @@ impl JsonArgs {
 /// Reads the key of one of a few things, such as a registration.
 pub(super) fn keyed<T>() -> impl TypedValueParser<Value = T>
 where
-    T: IntoEnumIterator + FromStr + Into<&'static str> + Default + Clone + Send + Sync + 'static,
+    T: IntoEnumIterator + FromStr + Into<&'static str> + Clone + Send + Sync + 'static,
 {
-    // The parser has compared the key with the list.
-    PossibleValuesParser::new(T::iter().map(Into::into)).map(|key| key.parse().unwrap_or_default())
+    PossibleValuesParser::new(T::iter().map(Into::into))
+        .try_map(|key| key.parse().map_err(|_| format!("{key} is none of them")))
 }
 
 /// Reads a registration, and lists them in the help.

@@ -65,8 +65,7 @@ pub(super) struct EvaluateArgs {
     sampler: Option<Sampler>,
     #[command(flatten)]
     mapping: MappingArgs,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     runtime: RuntimeArg,
     /// Images that go through a generator at once.
     #[arg(long, default_value_t = Setup::default().batch, value_parser = batch)]

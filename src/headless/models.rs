@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::recipe::RuntimeArg;
+use super::args::keyed;
 use super::{Common, Output, VerbResult};
 use touch2touch_work::infer::bundle::Bundle;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Provider, resolve};
 use touch2touch_work::infer::{runtime, sandbox};
 
 /// Verbs of a bundle.
@@ -35,8 +35,8 @@ pub(super) struct BundleArgs {
 #[derive(Debug, Args)]
 pub(super) struct TryArgs {
     path: PathBuf,
-    #[arg(long, value_enum)]
-    engine: RuntimeArg,
+    #[arg(long)]
+    engine: EngineChoice,
 }
 
 #[derive(Serialize)]
@@ -57,8 +57,8 @@ pub(super) fn bundle(verb: &BundleVerb) -> VerbResult {
 }
 
 fn check(args: &BundleArgs) -> VerbResult {
-    let engines: Vec<EngineKind> =
-        [EngineChoice::Rten, EngineChoice::Ort].into_iter().filter_map(|choice| resolve(choice).ok()).collect();
+    let named = EngineChoice::all().filter(|choice| *choice != EngineChoice::Auto);
+    let engines: Vec<EngineKind> = named.filter_map(|choice| resolve(choice).ok()).collect();
     let output = Output::new(args.common, "checking", 1 + engines.len());
     let mut report =
         BundleReport { bundle: args.path.clone(), name: None, hash: None, engines: Vec::new(), problems: Vec::new() };
@@ -107,7 +107,7 @@ fn attempt(args: &TryArgs) -> VerbResult {
     let output = Output::new(Common { json: false }, "trying", 1);
     let bundle = Bundle::open(&args.path)?;
     let mut written = Ok(());
-    let taken = sandbox::run(&bundle, args.engine.choice(), &mut |text| {
+    let taken = sandbox::run(&bundle, args.engine, &mut |text| {
         if written.is_ok() {
             written = output.line(&text, || text.to_owned());
         }
@@ -121,6 +121,9 @@ pub(super) struct RuntimeArgs {
     /// Fetch the ONNX Runtime library for this platform (by Python's pip) and keep it for the studio.
     #[arg(long)]
     fetch: bool,
+    /// The one with this execution provider, in the place of the plain one.
+    #[arg(long, requires = "fetch", value_parser = keyed::<Provider>())]
+    provider: Option<Provider>,
     /// Folder to keep it in instead of the application's data folder.
     #[arg(long, requires = "fetch")]
     dir: Option<PathBuf>,
@@ -131,7 +134,7 @@ pub(super) struct RuntimeArgs {
 pub(super) fn runtime(args: &RuntimeArgs) -> VerbResult {
     let output = Output::new(args.common, "runtime", 1);
     if args.fetch {
-        let library = runtime::fetch_runtime(args.dir.as_deref())?;
+        let library = runtime::fetch_runtime(args.dir.as_deref(), args.provider)?;
         output.note(&format!("fetched {}", library.display()));
     }
     let report = runtime::runtime_report();

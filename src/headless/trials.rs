@@ -74,8 +74,7 @@ pub(super) struct TrialsArgs {
     sampler: Option<Sampler>,
     #[command(flatten)]
     mapping: MappingArgs,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     runtime: RuntimeArg,
     /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]

@@ -5,7 +5,6 @@ use std::{sync::mpsc, thread, time::Duration};
 
 use super::{Common, Output, VerbResult};
 use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::engine::EngineKind;
 use touch2touch_work::infer::runtime::runtime_report;
 
 /// Name and version.
@@ -42,7 +41,7 @@ fn engines() -> String {
     let report = runtime_report();
     let onnx_runtime = match (&report.engine, &report.library) {
         (None, _) => return report.reason,
-        (Some(EngineKind::Ort), Some(library)) => format!("ONNX Runtime at {} is used", library.display()),
+        (Some(engine), Some(library)) => format!("{} at {} is used", engine.label(), library.display()),
         _ => "no ONNX Runtime was found (`touch2touch runtime` says where it was looked for)".to_owned(),
     };
     format!("rten {RTEN} (built in); {onnx_runtime}")

@@ -78,7 +78,7 @@ fn registration() -> impl Strategy<Value = RegistrationChoice> {
 
 pub(super) fn recipe() -> impl Strategy<Value = Recipe> {
     let imprint = proptest::sample::select(ImprintSource::iter().collect::<Vec<_>>());
-    let engine = proptest::sample::select(vec![EngineChoice::Auto, EngineChoice::Rten, EngineChoice::Ort]);
+    let engine = proptest::sample::select(EngineChoice::all().collect::<Vec<_>>());
     let (generator, unet) = (model("generator"), model("mask"));
     (imprint, config(), shift(), mask(), any::<bool>(), registration(), engine).prop_map(
         move |(imprint, config, shift, mask, hand, registration, engine)| {

@@ -66,6 +66,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
     // Without an engine on the machine it says so by its exit code.
     ("touch2touch runtime", How::Run(&[], "", &[0, 1])),
+    ("touch2touch runtime --fetch", How::Parse),
 ];
 
 fn how(command: &str) -> &'static How {

@@ -47,8 +47,7 @@ pub(super) struct DoctorArgs {
     /// Poses are not known.
     #[arg(long)]
     no_poses: bool,
-    /// Engine that runs the generator.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     runtime: RuntimeArg,
     #[command(flatten)]
     json: JsonArgs,

@@ -62,9 +62,10 @@ pub(super) struct GeneratorArgs {
     /// Spacings to try, separated by commas: trailing, lab.
     #[arg(long, value_delimiter = ',', value_parser = spacing, default_value = "trailing")]
     spacings: Vec<Spacing>,
-    /// Only this engine: rten, or ort. Without it, all that are found; all but the first on a quarter of the grasps.
-    #[arg(long, value_parser = engine)]
-    engine: Option<EngineKind>,
+    /// Only this engine, by its name for `--runtime`. Without it, all that are found; all but the first on a quarter of the
+    /// grasps.
+    #[arg(long)]
+    engine: Option<EngineChoice>,
     /// The registration of the poses.
     #[arg(long, default_value_t = Registration::default())]
     registration: Registration,
@@ -85,14 +86,6 @@ fn spacing(text: &str) -> Result<Spacing, String> {
         "trailing" => Ok(Spacing::Trailing),
         "lab" => Ok(Spacing::Lab),
         _ => Err("the spacings are trailing and lab".into()),
-    }
-}
-
-fn engine(text: &str) -> Result<EngineKind, String> {
-    match text {
-        "rten" => Ok(EngineKind::Rten),
-        "ort" => Ok(EngineKind::Ort),
-        _ => Err("the engines are rten and ort".into()),
     }
 }
 
@@ -215,10 +208,9 @@ pub(super) fn run(args: &GeneratorArgs) -> VerbResult {
     Ok(true)
 }
 
-fn engines(only: Option<EngineKind>) -> anyhow::Result<Vec<EngineKind>> {
+fn engines(only: Option<EngineChoice>) -> anyhow::Result<Vec<EngineKind>> {
     match only {
-        Some(EngineKind::Rten) => Ok(vec![resolve(EngineChoice::Rten)?]),
-        Some(EngineKind::Ort) => Ok(vec![resolve(EngineChoice::Ort)?]),
+        Some(choice) => Ok(vec![resolve(choice)?]),
         None => {
             // What the studio would take comes first: it is measured on every grasp.
             let mut engines = vec![resolve(EngineChoice::Auto)?];
@@ -257,11 +249,7 @@ fn name(config: &GenerateConfig, engine: EngineKind, several: bool) -> String {
         Sampler::DpmSolver2m => "DPM++2M",
     };
     let lab = if config.spacing == Spacing::Lab { " lab" } else { "" };
-    let engine = match (several, engine) {
-        (true, EngineKind::Rten) => " rten",
-        (true, EngineKind::Ort) => " ort",
-        (false, _) => "",
-    };
+    let engine = if several { format!(" {}", EngineChoice::from(engine).key()) } else { String::new() };
     format!("{sampler} {}{lab}{engine}", config.steps)
 }
 
@@ -394,10 +382,7 @@ fn text(report: &Report) -> String {
         "no pose"
     );
     for row in &report.rows {
-        let engine = match row.engine {
-            EngineKind::Rten => "rten",
-            EngineKind::Ort => "ort",
-        };
+        let engine = EngineChoice::from(row.engine).key();
         let reference = (row.sampler, row.steps) == REFERENCE;
         let default = row.sampler == report.defaults.sampler
             && (row.steps, row.spacing) == (report.defaults.steps, report.defaults.spacing);

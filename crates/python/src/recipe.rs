@@ -23,7 +23,7 @@ use crate::process::{failed, refused};
 /// bundles (default: the shipped ones). `steps`, `seed`, `sampler`: of the generator (default: the bundle's). `shift`: the
 /// mapping to meters, "exact", "paper" or "raw". `mask`: "auto", "unet", "threshold", "top_percent", "cad" or "truth", with
 /// `threshold_mm`. `engine`: the registration, such as "joint" or "gicp:gate=1.5". `hand`: masks drawn by hand win.
-/// `runtime`: "auto", "rten" or "ort".
+/// `runtime`: "auto", "rten", "ort" or a provider of ONNX Runtime, such as "cuda" (`touch2touch runtime` lists them).
 #[pyclass(module = "touch2touch", frozen)]
 pub(crate) struct Recipe {
     pub(crate) whole: Whole,
@@ -115,8 +115,7 @@ impl Recipe {
         let registration = text("engine", &RegistrationChoice::default().to_string())?;
         let registration: RegistrationChoice = registration.parse().map_err(refused)?;
         let hand: Option<bool> = take("hand")?.map(|v| v.extract()).transpose()?;
-        let engines = [("auto", EngineChoice::Auto), ("rten", EngineChoice::Rten), ("ort", EngineChoice::Ort)];
-        let engine = choice("runtime", &text("runtime", "auto")?, engines)?;
+        let engine: EngineChoice = text("runtime", EngineChoice::default().key())?.parse().map_err(refused)?;
         if let Some(unknown) = left.keys().iter().next() {
             return Err(refused(format!("a recipe has no choice {unknown}; see help(touch2touch.Recipe)")));
         }

@@ -14,7 +14,6 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::figure::FigurePane;
-use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
 use touch2touch_work::sweep::Setting;
@@ -159,11 +158,7 @@ fn train_words(state: &State, words: Words) -> Words {
         .word_if(form.choice.test_in_train, "--test-in-train")
         .option_if("--from", (form.choice.from != MasksFrom::default()).then(|| form.choice.from.key()))
         .option_if("--engine", (by != RegistrationChoice::default()).then_some(by));
-    let words = match state.settings.runtime {
-        EngineChoice::Auto => words,
-        EngineChoice::Rten => words.option("--runtime", "rten"),
-        EngineChoice::Ort => words.option("--runtime", "ort"),
-    };
+    let words = words.runtime(state.settings.runtime);
     match (&state.settings.mask.bundle, recipe::bundle(state, BundleKind::Mask)) {
         (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),
         _ => words,

@@ -44,8 +44,7 @@ pub(in super::super) struct QueueArgs {
     registration: RegistrationChoice,
     #[command(flatten)]
     mapping: MappingArgs,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     runtime: RuntimeArg,
     /// Neither look for metrics that were computed before (by the studio, too), nor keep those computed now.
     #[arg(long)]

@@ -57,8 +57,7 @@ pub(in crate::headless) struct TrainArgs {
     /// Says what would be learned from, and trains nothing.
     #[arg(long)]
     dry_run: bool,
-    /// Engine that makes predictions again on which masks were drawn.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     runtime: RuntimeArg,
     /// The registration of the poses that tell what the model is worth, where true ones are known.
     #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]

@@ -4,6 +4,7 @@ use std::cell::OnceCell;
 use std::path::PathBuf;
 use std::rc::Rc;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
 
@@ -48,8 +49,7 @@ pub struct ModelArgs {
     pub(super) sampler: Option<Sampler>,
     #[command(flatten)]
     pub(super) mapping: MappingArgs,
-    /// The engine that runs the models.
-    #[arg(long, value_enum, default_value_t = RuntimeArg::Auto)]
+    #[command(flatten)]
     pub(super) runtime: RuntimeArg,
     /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
@@ -156,23 +156,22 @@ impl MappingArgs {
 }
 
 /// The engine that runs the models, as the command line says it.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-pub enum RuntimeArg {
-    /// ONNX Runtime where its library is found, else the built-in engine.
-    Auto,
-    /// The built-in engine.
-    Rten,
-    /// ONNX Runtime.
-    Ort,
+#[derive(Debug, Clone, Copy, Args)]
+pub struct RuntimeArg {
+    /// What runs the models: ONNX Runtime where its library is found, on a GPU that it can use, else on the processor, else
+    /// the built-in engine (`auto`); the built-in engine (`rten`); ONNX Runtime on the processor (`ort`); or on what a
+    /// provider of it stands for (`touch2touch runtime` lists them).
+    #[arg(long = "runtime", value_name = "RUNTIME", default_value = "auto", value_parser = choices())]
+    choice: EngineChoice,
+}
+
+fn choices() -> impl TypedValueParser<Value = EngineChoice> {
+    PossibleValuesParser::new(EngineChoice::all().map(EngineChoice::key)).try_map(|key| key.parse::<EngineChoice>())
 }
 
 impl RuntimeArg {
     /// The choice for the engines.
     pub fn choice(self) -> EngineChoice {
-        match self {
-            RuntimeArg::Auto => EngineChoice::Auto,
-            RuntimeArg::Rten => EngineChoice::Rten,
-            RuntimeArg::Ort => EngineChoice::Ort,
-        }
+        self.choice
     }
 }

@@ -92,7 +92,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.label(RichText::new("Runtime").color(cx.p.weak));
         let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
         let response = combo.show_ui(ui, |ui| {
-            for runtime in EngineChoice::iter() {
+            for runtime in EngineChoice::possible() {
                 if ui.selectable_label(runtime == settings.runtime, runtime.name()).clicked() {
                     cx.out.push(prefer(move |s| s.runtime = runtime).into());
                 }

@@ -245,7 +245,7 @@ fn change() -> impl Strategy<Value = Change> {
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),
         1 => registration().prop_map(|v| prefer(move |s| s.registration = v)),
-        1 => any_of::<EngineChoice>().prop_map(|v| prefer(move |s| s.runtime = v)),
+        1 => select(EngineChoice::all().collect::<Vec<_>>()).prop_map(|v| prefer(move |s| s.runtime = v)),
         1 => person.prop_map(|v| prefer(move |s| s.person = v.clone())),
         1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
         1 => any::<u32>().prop_map(|v| prefer(move |s| s.cache_mib = v)),

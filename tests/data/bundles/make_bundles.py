@@ -1,4 +1,4 @@
-"""Writes the tiny bundles of the tests: generator/, mask/ and classifier/. Needs onnx and numpy.
+"""Writes the tiny bundles of the tests: generator/, mask/, rounding/ and classifier/. Needs onnx and numpy.
 
 The weights are fixed random numbers; the graphs use the operators of real ones (convolutions, group norm as instance
 norm, a time embedding, nearest resizing, transposed convolution, pooling, softmax attention over pixels).
@@ -105,6 +105,18 @@ def mask_unet(path):
     return g.save(path, [("imprint", T.FLOAT, [1, 14, 18])], [("logits", T.FLOAT, [2, 14, 18])])
 
 
+def rounding(path):
+    # The same product in two orders, subtracted: what is left is how an engine rounds, and no other rounds so.
+    g, rng = Graph(), np.random.default_rng(2)
+    first, second = ((rng.standard_normal((18, 18)) / 4).astype(np.float32) for _ in range(2))
+    stepwise = g.op("MatMul", g.op("Tanh", g.op("MatMul", "imprint", g.const(first))), g.const(second))
+    halves = [g.op("MatMul", g.op("Tanh", g.op("MatMul", "imprint", g.const(first[:, part]))), g.const(second[part]))
+              for part in (slice(0, 9), slice(9, 18))]
+    left = g.op("Mul", g.op("Sub", stepwise, g.op("Add", *halves)), g.const(np.float32(1e7)))
+    g.op("Concat", "imprint", left, axis=1, out="logits")
+    return g.save(path, [("imprint", T.FLOAT, [1, 14, 18])], [("logits", T.FLOAT, [2, 14, 18])])
+
+
 def tool_classifier(path):
     # No trained weights: the features are the means of the four quarters, and the class is the deepest of the first three.
     g = Graph()
@@ -150,11 +162,11 @@ write("generator", {
                "rotation_deg": 180, "imprint_size": [18, 14], "resampling": "bilinear"},
     "shift": {"pred_mean": 0.0126, "pred_std": 0.0015, "gt_mean": 0.0027, "gt_std": 0.0033},
     "defaults": {"steps": 6, "sampler": "ddim", "spacing": "trailing", "eta": 0.0, "seed": 42}})
-write_mask = mask_unet(HERE / "mask" / "mask_unet.onnx")
-write("mask", {
-    "kind": "mask_unet", "name": "Tiny mask UNet of the tests", "files": {"mask_unet": write_mask},
-    "input": {"sensor": "bubble", "size": [18, 14], "range_m": [0.0, 0.01], "cast": "none", "rotation_deg": 180},
-    "output": {"classes": 2, "threshold": 0.5}})
+for folder, name, graph in (("mask", "Tiny mask UNet of the tests", mask_unet), ("rounding", "Rounding of the tests", rounding)):
+    write(folder, {
+        "kind": "mask_unet", "name": name, "files": {"mask_unet": graph(HERE / folder / "mask_unet.onnx")},
+        "input": {"sensor": "bubble", "size": [18, 14], "range_m": [0.0, 0.01], "cast": "none", "rotation_deg": 180},
+        "output": {"classes": 2, "threshold": 0.5}})
 write_classifier = tool_classifier(HERE / "classifier" / "tool_classifier.onnx")
 write("classifier", {
     "kind": "tool_classifier", "name": "Tiny tool classifier of the tests", "files": {"tool_classifier": write_classifier},

@@ -13,7 +13,7 @@ use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::infer::bundle::{Bundle, TimestepType};
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Input};
+use touch2touch_work::infer::engine::{EngineKind, Input};
 use touch2touch_work::infer::generator::{Generator, Item, Observer, prepare};
 
 /// Pairs of runs for the overhead.
@@ -193,12 +193,8 @@ pub(super) fn first(
     case: &Case,
     config: &GenerateConfig,
 ) -> anyhow::Result<(First, Generator)> {
-    let choice = match engine {
-        EngineKind::Rten => EngineChoice::Rten,
-        EngineKind::Ort => EngineChoice::Ort,
-    };
     let begin = Instant::now();
-    let mut generator = Generator::open(bundle, choice)?;
+    let mut generator = Generator::open(bundle, engine.into())?;
     let load_ms = ms_since(begin);
     let (cold_ms, _) = timed_run(&mut generator, &case.sample, config)?;
     let (mut warm, mut seen, mut previews) = (Vec::new(), Vec::new(), Vec::new());

@@ -1,23 +1,28 @@
 //! The engines that run graphs, behind one small trait.
 //!
 //! * **rten** is pure Rust and always there.
-//! * **ONNX Runtime** is about 1.5 times faster and is used when its library is found (see [`super::runtime`]).
+//! * **ONNX Runtime** is about 1.5 times faster and is used when its library is found (see [`super::runtime`]); it runs
+//!   graphs on the processor, or on what one of its [`Provider`]s stands for.
 //!
-//! Both leave one core free for the window. Their outputs agree to about 1e-5 of the values' size; the engine is
-//! therefore part of a result's recipe.
+//! Both leave one core free for the window. Their outputs agree to about 1e-5 of the values' size, those of providers to
+//! [`Provider::tolerance`]; the engine is therefore part of a result's recipe.
 
 #[cfg(feature = "onnx")]
 mod ort_engine;
+mod provider;
 #[cfg(feature = "onnx")]
 mod rten_engine;
 
 use std::borrow::Cow;
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use strum::IntoEnumIterator as _;
 
 use super::bundle::{BundleFile, Role};
 use crate::io::files;
+pub use provider::Provider;
 use touch2touch_core::diffusion::{ModelError, Tensor};
 
 /// An engine.
@@ -26,8 +31,11 @@ use touch2touch_core::diffusion::{ModelError, Tensor};
 pub enum EngineKind {
     /// rten, pure Rust.
     Rten,
-    /// ONNX Runtime.
+    /// ONNX Runtime on the processor.
     Ort,
+    /// ONNX Runtime on an execution provider.
+    #[serde(untagged)]
+    On(Provider),
 }
 
 impl EngineKind {
@@ -36,23 +44,36 @@ impl EngineKind {
         match self {
             EngineKind::Rten => "rten (built in)",
             EngineKind::Ort => "ONNX Runtime",
+            EngineKind::On(provider) => provider.engine_name(),
+        }
+    }
+
+    /// Most items of a batch that it is given at once.
+    ///
+    /// On the processor one: a batch is no faster there, and run alone, an item comes out the same to the last bit, whatever
+    /// is run with it. A device is idle with one.
+    pub(super) fn at_once(self) -> usize {
+        match self {
+            EngineKind::On(provider) if provider.has_own_memory() => 32,
+            _ => 1,
         }
     }
 }
 
 /// The user's choice of engine.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EngineChoice {
-    /// ONNX Runtime if its library is found, else rten.
+    /// ONNX Runtime if its library is found, on the first provider that works here, else on the processor; else rten.
     #[default]
     Auto,
     /// rten.
     Rten,
-    /// ONNX Runtime, or an error.
+    /// ONNX Runtime on the processor, or an error.
     Ort,
+    /// ONNX Runtime on this provider, or an error.
+    #[serde(untagged)]
+    On(Provider),
 }
 
 impl From<EngineKind> for EngineChoice {
@@ -60,18 +81,51 @@ impl From<EngineKind> for EngineChoice {
         match kind {
             EngineKind::Rten => Self::Rten,
             EngineKind::Ort => Self::Ort,
+            EngineKind::On(provider) => Self::On(provider),
         }
     }
 }
 
 impl EngineChoice {
+    /// Every choice there is, in the order of lists.
+    pub fn all() -> impl Iterator<Item = Self> {
+        [Self::Auto, Self::Rten, Self::Ort].into_iter().chain(Provider::iter().map(Self::On))
+    }
+
+    /// Those that the system of this program can have.
+    pub fn possible() -> impl Iterator<Item = Self> {
+        Self::all().filter(|choice| !matches!(choice, Self::On(provider) if !provider.is_possible_here()))
+    }
+
+    /// Key on the command line and in Python.
+    pub fn key(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Rten => "rten",
+            Self::Ort => "ort",
+            Self::On(provider) => provider.key(),
+        }
+    }
+
     /// The name on screen.
     pub fn name(self) -> &'static str {
         match self {
             Self::Auto => "Automatic",
             Self::Rten => "rten",
             Self::Ort => "ONNX Runtime",
+            Self::On(provider) => provider.name(),
         }
+    }
+}
+
+impl FromStr for EngineChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Self::all().find(|choice| choice.key() == text).ok_or_else(|| {
+            let keys: Vec<&str> = Self::all().map(Self::key).collect();
+            format!("no engine is called \"{text}\"; there are {}", keys.join(", "))
+        })
     }
 }
 
@@ -88,6 +142,14 @@ pub enum EngineError {
     NoOnnxRuntime {
         /// The places and what was wrong with each.
         tried: String,
+    },
+    /// A provider was asked for and cannot be had.
+    #[error("{} cannot be used: {reason}; choose another runtime, or `auto`", provider.name())]
+    NoProvider {
+        /// The provider.
+        provider: Provider,
+        /// Reason, with what to do about it.
+        reason: String,
     },
     /// A file of the bundle cannot be read.
     #[error("the graph cannot be read: {source}: {}", path.display())]
@@ -209,7 +271,8 @@ impl LoadFailure {
 fn load_session(engine: EngineKind, bytes: Cow<'static, [u8]>) -> Result<Box<dyn Session>, LoadFailure> {
     let session: Result<Box<dyn Session>, String> = match engine {
         EngineKind::Rten => rten_engine::load(bytes).map(|s| Box::new(s) as Box<dyn Session>),
-        EngineKind::Ort => ort_engine::load(&bytes).map(|s| Box::new(s) as Box<dyn Session>),
+        EngineKind::Ort => ort_engine::load(&bytes, None).map(|s| Box::new(s) as Box<dyn Session>),
+        EngineKind::On(provider) => ort_engine::load(&bytes, Some(provider)).map(|s| Box::new(s) as Box<dyn Session>),
     };
     session.map_err(|reason| LoadFailure(Err(reason)))
 }
@@ -222,19 +285,30 @@ fn load_session(_: EngineKind, _: Cow<'static, [u8]>) -> Result<Box<dyn Session>
 /// Turns the user's choice into an engine; loads ONNX Runtime's library the first time it is wanted.
 ///
 /// # Errors
-/// [`EngineError::NotInThisBuild`], and [`EngineError::NoOnnxRuntime`] if it was asked for by name.
+/// [`EngineError::NotInThisBuild`]; [`EngineError::NoOnnxRuntime`] and [`EngineError::NoProvider`] if they were asked for by
+/// name.
 #[cfg(feature = "onnx")]
 pub fn resolve(choice: EngineChoice) -> Result<EngineKind, EngineError> {
+    let found = || match library() {
+        Ok(_) => Ok(()),
+        Err(searched) => {
+            let tried: Vec<String> = searched.iter().map(|s| format!("{}: {}", s.place, s.outcome)).collect();
+            Err(EngineError::NoOnnxRuntime { tried: tried.join("; ") })
+        }
+    };
     match choice {
         EngineChoice::Rten => Ok(EngineKind::Rten),
-        EngineChoice::Auto => Ok(if library().is_ok() { EngineKind::Ort } else { EngineKind::Rten }),
-        EngineChoice::Ort => match library() {
-            Ok(_) => Ok(EngineKind::Ort),
-            Err(searched) => {
-                let tried: Vec<String> = searched.iter().map(|s| format!("{}: {}", s.place, s.outcome)).collect();
-                Err(EngineError::NoOnnxRuntime { tried: tried.join("; ") })
-            }
-        },
+        EngineChoice::Auto if library().is_err() => Ok(EngineKind::Rten),
+        EngineChoice::Auto => {
+            let works = |provider: &Provider| provider.is_a_default() && try_provider(*provider).is_ok();
+            Ok(Provider::iter().find(works).map_or(EngineKind::Ort, EngineKind::On))
+        }
+        EngineChoice::Ort => found().map(|()| EngineKind::Ort),
+        EngineChoice::On(provider) => {
+            found()?;
+            try_provider(provider).map_err(|why| EngineError::NoProvider { provider, reason: why.to_string() })?;
+            Ok(EngineKind::On(provider))
+        }
     }
 }
 
@@ -260,6 +334,29 @@ pub(super) fn build(engine: EngineKind) -> String {
         EngineKind::Ort => library().map_or_else(|_| engine.label().to_owned(), |library| library.build),
         _ => engine.label().to_owned(),
     }
+}
+
+/// Why a provider cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only ONNX Runtime has providers"))]
+pub(super) enum NoProvider {
+    /// The library was built without it.
+    #[error("the ONNX Runtime in use has none; {}", super::runtime::how_to_get(*.0))]
+    NotInTheLibrary(Provider),
+    /// It is there and does not start.
+    #[error("it does not start ({said}); {}", provider.needs())]
+    DoesNotStart {
+        /// The provider.
+        provider: Provider,
+        /// ONNX Runtime's words.
+        said: String,
+    },
+}
+
+/// Starts a provider with a graph of one operator, once in a program's life.
+#[cfg(feature = "onnx")]
+pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
+    ort_engine::try_provider(provider)
 }
 
 /// Forgets that no library was found, so that a freshly fetched one is.

@@ -2,7 +2,7 @@
 
 mod preview;
 
-use std::ops::ControlFlow;
+use std::ops::{ControlFlow, Range};
 use std::sync::Arc;
 
 pub use preview::Observer;
@@ -76,6 +76,8 @@ pub struct Generator {
     fit: Option<Arc<Fitted>>,
     hash: String,
     engine: EngineKind,
+    /// Most items run at once: what the engine takes, and less once it had no room for that.
+    at_once: usize,
     encoder: Graph,
     denoiser: Graph,
     decoder: Graph,
@@ -115,6 +117,7 @@ impl Generator {
             fit: bundle.fit().cloned(),
             spec,
             engine,
+            at_once: engine.at_once(),
         })
     }
 
@@ -207,7 +210,7 @@ impl Generator {
     }
 
     /// Any images from any seeds: each image is encoded once, however many seeds it has, and each item comes out as it
-    /// would alone, to the last bit. `config.seed` is not used. Answers in the order of `items`.
+    /// would alone, on the processor to the last bit. `config.seed` is not used. Answers in the order of `items`.
     ///
     /// # Errors
     /// See [`GenerateError`]; an item of an image that is not there is a [`GenerateError::NoImage`].
@@ -241,7 +244,7 @@ impl Generator {
 
         let seeds: Vec<u64> = items.iter().map(|item| item.seed).collect();
         let spec = &self.spec;
-        let mut plain = BundleDenoiser { graph: &mut self.denoiser, spec };
+        let mut plain = BundleDenoiser { graph: &mut self.denoiser, spec, at_once: &mut self.at_once };
         let mut watch = Watching::new(observer, &mut self.decoder, spec, items.len());
         let latent = match blank {
             None => sample_watched(&mut plain, &spec.schedule, config, &seeds, &condition, &mut watch),
@@ -255,7 +258,7 @@ impl Generator {
             DiffusionError::Model(err) => GenerateError::Model(err),
             err => GenerateError::Diffusion(err),
         })?;
-        Ok(decode(&mut self.decoder, spec, latent)?)
+        Ok(decode(&mut self.decoder, spec, latent, &mut self.at_once)?)
     }
 
     /// The condition of one image, without the batch axis. The last few are kept: another seed of the same image, or
@@ -322,47 +325,79 @@ impl Generator {
 const KEPT_CONDITIONS: usize = 8;
 
 /// The decoder's pictures of clean latents, one per entry of the batch.
-fn decode(decoder: &mut Graph, spec: &GeneratorSpec, mut latent: Tensor) -> Result<Vec<RawPrediction>, ModelError> {
+fn decode(
+    decoder: &mut Graph,
+    spec: &GeneratorSpec,
+    mut latent: Tensor,
+    at_once: &mut usize,
+) -> Result<Vec<RawPrediction>, ModelError> {
     let scale = spec.latent.scale_factor;
     latent.data_mut().iter_mut().for_each(|v| *v = (f64::from(*v) / scale) as f32);
     let [width, height] = spec.output.size;
-    let shape = [1, spec.output.channels, height, width];
     let plane = |values: &[f32]| Grid::from_vec(width, height, values.to_vec()).expect("the chunks have this length");
-    let one = |latent: Tensor| {
-        let picture = decoder.run(&[("latent", Input::F32(&latent))], "image", &shape)?;
-        Ok(RawPrediction { channels: picture.data().chunks_exact(width * height).map(plane).collect() })
-    };
-    one_by_one(&latent).map(one).collect()
+    let pictures = in_parts(latent.batch(), at_once, |part| {
+        let shape = [part.len(), spec.output.channels, height, width];
+        decoder.run(&[("latent", Input::F32(&part_of(&latent, part)))], "image", &shape)
+    })?;
+    let one = |picture: &[f32]| RawPrediction { channels: picture.chunks_exact(width * height).map(plane).collect() };
+    Ok(pictures.data().chunks_exact(spec.output.channels * width * height).map(one).collect())
 }
 
-/// The items of a batch as batches of one. Engines sum in another order for another size of batch: run alone, a prediction
-/// is the same to the last bit, whatever is predicted with it.
-fn one_by_one(batch: &Tensor) -> impl Iterator<Item = Tensor> + '_ {
-    let alone = |at| batch.item(at).and_then(|item| Tensor::stack(&[item])).expect("the batch has this item");
-    (0..batch.batch()).map(alone)
+/// Runs a batch of `count` in parts of at most `at_once`. A part that fails, since the device has no room for it, say, is
+/// tried again by halves, and later parts are no larger.
+///
+/// Engines sum in another order for another size of batch: of parts of one, each is the same to the last bit, whatever is run
+/// with it.
+fn in_parts(
+    count: usize,
+    at_once: &mut usize,
+    mut run: impl FnMut(Range<usize>) -> Result<Tensor, ModelError>,
+) -> Result<Tensor, ModelError> {
+    let (mut done, mut parts) = (0, Vec::new());
+    while done < count {
+        let part = done..count.min(done + *at_once);
+        match run(part.clone()) {
+            Ok(outputs) => {
+                parts.push(outputs);
+                done = part.end;
+            }
+            Err(ModelError::Run { graph, reason }) if part.len() > 1 => {
+                *at_once = part.len() / 2;
+                log::warn!("{} at once are too many for `{graph}` ({reason}); now {at_once}", part.len());
+            }
+            Err(err) => return Err(err),
+        }
+    }
+    Ok(Tensor::concat(&parts.iter().collect::<Vec<_>>()).expect("they have one shape and there is at least one"))
+}
+
+fn part_of(batch: &Tensor, part: Range<usize>) -> Tensor {
+    let items: Vec<Tensor> = part.filter_map(|at| batch.item(at)).collect();
+    Tensor::stack(&items).expect("the batch has these items, all of one shape")
 }
 
 /// The denoiser's graph, as the sampler wants it.
 struct BundleDenoiser<'a> {
     graph: &'a mut Graph,
     spec: &'a GeneratorSpec,
+    at_once: &'a mut usize,
 }
 
 impl Denoiser for BundleDenoiser<'_> {
     fn predict(&mut self, latent: &Tensor, timestep: u32, condition: &Tensor) -> Result<Tensor, ModelError> {
-        let float = Tensor::filled(vec![1], timestep as f32);
-        let whole = [i64::from(timestep)];
-        let timestep = match self.spec.timestep {
-            TimestepType::Int64 => Input::I64(&whole),
-            TimestepType::Float32 => Input::F32(&float),
-        };
-        let one = |(latent, condition): (Tensor, Tensor)| {
+        let Self { graph, spec, at_once } = self;
+        in_parts(latent.batch(), at_once, |part| {
+            let float = Tensor::filled(vec![part.len()], timestep as f32);
+            let whole = vec![i64::from(timestep); part.len()];
+            let timestep = match spec.timestep {
+                TimestepType::Int64 => Input::I64(&whole),
+                TimestepType::Float32 => Input::F32(&float),
+            };
+            let (latent, condition) = (part_of(latent, part.clone()), part_of(condition, part));
             let inputs =
                 [("latent", Input::F32(&latent)), ("timestep", timestep), ("condition", Input::F32(&condition))];
-            self.graph.run(&inputs, "prediction", latent.shape())
-        };
-        let all = one_by_one(latent).zip(one_by_one(condition)).map(one).collect::<Result<Vec<_>, _>>()?;
-        Ok(Tensor::concat(&all.iter().collect::<Vec<_>>()).expect("they have one shape and there is at least one"))
+            graph.run(&inputs, "prediction", latent.shape())
+        })
     }
 
     fn prediction(&self) -> Prediction {
@@ -428,6 +463,24 @@ mod tests {
         assert!((unit.data()[7] - 1.0).abs() < 1e-6 && (unit.data()[8] - 0.05).abs() < 1e-6);
         let byte = prepare(&image, &input(InputScale::Byte, 180)).unwrap();
         assert!((byte.data()[3] - 101.8).abs() < 1e-4 && (byte.data()[4] - 255.0).abs() < 1e-4);
+    }
+
+    #[test]
+    fn a_batch_that_is_too_large_is_run_by_halves() {
+        let (mut at_once, mut sizes) = (32, Vec::new());
+        let outputs = in_parts(11, &mut at_once, |part| {
+            sizes.push(part.len());
+            match part.len() > 3 {
+                true => Err(ModelError::Run { graph: "denoiser".into(), reason: "out of memory".into() }),
+                false => Ok(Tensor::new(vec![part.len(), 1], part.map(|at| at as f32).collect()).unwrap()),
+            }
+        });
+        assert_eq!((outputs.unwrap().data(), at_once), ((0..11).map(|v| v as f32).collect::<Vec<_>>().as_slice(), 2));
+        assert_eq!(sizes, [11, 5, 2, 2, 2, 2, 2, 1]);
+        // One that fails alone fails.
+        let alone =
+            in_parts(1, &mut at_once, |_| Err(ModelError::Run { graph: "denoiser".into(), reason: "no".into() }));
+        assert!(alone.is_err());
     }
 
     #[test]

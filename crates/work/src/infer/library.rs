@@ -5,6 +5,7 @@ use std::process::Command;
 
 use serde::Serialize;
 
+use super::runtime::fetched_folders;
 use crate::io::folders;
 
 /// A place that was searched without success.
@@ -37,7 +38,10 @@ pub(super) fn candidates() -> impl Iterator<Item = (String, Option<PathBuf>)> {
         let dir = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
         place("beside the program", dir)
     });
-    let data = std::iter::once_with(|| place("the application's data folder", runtime_dir()));
+    // The folder itself where nothing was fetched: it is where a library could be.
+    let none_yet = std::iter::once_with(runtime_dir).filter(|dir| dir.as_ref().is_none_or(|dir| !dir.is_dir()));
+    let fetched = fetched_folders().map(Some).chain(none_yet);
+    let data = fetched.map(|dir| place("the application's data folder", dir));
     let packages = std::iter::once_with(|| {
         let library = python_packages().iter().find_map(|dir| library_in(&dir.join("onnxruntime/capi")));
         ("Python's package folders".into(), library)
@@ -59,14 +63,16 @@ fn place(name: &str, dir: Option<PathBuf>) -> (String, Option<PathBuf>) {
 
 /// The library in `dir`; the last by name where there are several.
 pub(super) fn library_in(dir: &Path) -> Option<PathBuf> {
-    let is_library = |name: &str| {
-        let plain = name.strip_prefix("lib").unwrap_or(name);
-        let end = plain.strip_prefix("onnxruntime");
-        end.is_some_and(|end| end.starts_with('.') && [".so", ".dylib", ".dll"].iter().any(|ext| end.contains(ext)))
-    };
     let entries = std::fs::read_dir(dir).ok()?;
     let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
     files.filter(|path| path.file_name().and_then(|n| n.to_str()).is_some_and(is_library)).max()
+}
+
+/// The library's own file, not one that it loads.
+pub(super) fn is_library(file: &str) -> bool {
+    let plain = file.strip_prefix("lib").unwrap_or(file);
+    let end = plain.strip_prefix("onnxruntime");
+    end.is_some_and(|end| end.starts_with('.') && [".so", ".dylib", ".dll"].iter().any(|ext| end.contains(ext)))
 }
 
 /// Package folders of the Pythons that can be found without starting one.

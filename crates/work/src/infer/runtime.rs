@@ -1,17 +1,20 @@
-//! ONNX Runtime on this machine: what was found of it, and how it is fetched.
+//! ONNX Runtime on this machine: what was found of it, what it can run graphs on, and how it is fetched.
 
+mod device;
 mod fetch;
 
 use std::fmt;
 use std::path::PathBuf;
 
 use serde::Serialize;
+use strum::IntoEnumIterator as _;
 
-use super::engine::{self, EngineChoice, EngineKind};
+use super::engine::{self, EngineChoice, EngineKind, Provider};
 
 pub(crate) use super::library::Searched;
-pub(crate) use fetch::VERSION;
 pub use fetch::fetch_runtime;
+#[cfg_attr(not(feature = "onnx"), allow(unused_imports, reason = "only the ONNX engine looks for its library"))]
+pub(crate) use fetch::fetched_folders;
 
 /// Engine that runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -26,10 +29,23 @@ pub struct RuntimeReport {
     pub build: Option<String>,
     /// The places searched in vain, in order.
     pub searched: Vec<Searched>,
-    /// Threads an engine uses.
+    /// Threads an engine uses on the processor.
     pub threads: usize,
-    /// The version [`fetch_runtime`] fetches.
-    pub fetchable: &'static str,
+    /// Providers that this system can have.
+    pub providers: Vec<ProviderReport>,
+}
+
+/// A provider on this machine.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct ProviderReport {
+    /// The provider.
+    pub provider: Provider,
+    /// It ran a graph just now.
+    pub works: bool,
+    /// Its device and the device's memory, where that can be found out.
+    pub device: Option<String>,
+    /// Why it does not work, and what to do about it.
+    pub reason: Option<String>,
 }
 
 impl fmt::Display for RuntimeReport {
@@ -43,6 +59,13 @@ impl fmt::Display for RuntimeReport {
             writeln!(f, "build    {build}")?;
         }
         write!(f, "threads  {}", self.threads)?;
+        for found in &self.providers {
+            let name = found.provider.name();
+            match (&found.reason, &found.device) {
+                (Some(reason), _) => write!(f, "\n{name:<8} no: {reason}")?,
+                (None, device) => write!(f, "\n{name:<8} works: {}", device.as_deref().unwrap_or("its first device"))?,
+            }
+        }
         for searched in &self.searched {
             write!(f, "\nsearched {}: {}", searched.place, searched.outcome)?;
         }
@@ -50,7 +73,7 @@ impl fmt::Display for RuntimeReport {
     }
 }
 
-/// Finds out which engine is in use and why. Loads ONNX Runtime's library if it is found.
+/// Finds out which engine is in use and why. Loads ONNX Runtime's library if it is found, and tries its providers.
 pub fn runtime_report() -> RuntimeReport {
     let report = RuntimeReport {
         engine: engine::resolve(EngineChoice::Auto).ok(),
@@ -59,7 +82,7 @@ pub fn runtime_report() -> RuntimeReport {
         build: None,
         searched: Vec::new(),
         threads: engine::threads(),
-        fetchable: VERSION,
+        providers: Vec::new(),
     };
     #[cfg(feature = "onnx")]
     let report = match engine::library() {
@@ -67,6 +90,7 @@ pub fn runtime_report() -> RuntimeReport {
             reason: format!("an ONNX Runtime library was found: {}", library.found_in),
             library: Some(library.path),
             build: Some(library.build),
+            providers: Provider::iter().filter(|provider| provider.is_possible_here()).map(look_at).collect(),
             ..report
         },
         Err(searched) => RuntimeReport {
@@ -78,6 +102,25 @@ pub fn runtime_report() -> RuntimeReport {
     report
 }
 
+#[cfg(feature = "onnx")]
+fn look_at(provider: Provider) -> ProviderReport {
+    match engine::try_provider(provider) {
+        Ok(()) => ProviderReport { provider, works: true, device: device::describe(provider), reason: None },
+        Err(why) => ProviderReport { provider, works: false, device: None, reason: Some(why.to_string()) },
+    }
+}
+
+/// The way to a library with a provider, in a sentence.
+pub(super) fn how_to_get(provider: Provider) -> String {
+    let needs = provider.needs();
+    let key = provider.key();
+    match (provider.is_possible_here(), fetch::can_be_fetched(provider)) {
+        (false, _) => format!("there is none for this system; {needs}"),
+        (true, true) => format!("fetch one that has it with `touch2touch runtime --fetch --provider {key}`; {needs}"),
+        (true, false) => format!("set ORT_DYLIB_PATH to a library that has it; {needs}"),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -87,7 +130,18 @@ mod tests {
         let report = runtime_report();
         assert!(!report.reason.is_empty() && report.threads >= 1);
         assert_eq!(report.engine.is_some(), cfg!(feature = "onnx"));
-        assert_eq!(report.library.is_some(), report.engine == Some(EngineKind::Ort));
+        let built_in = report.engine.is_none_or(|engine| engine == EngineKind::Rten);
+        assert_eq!(report.library.is_none(), built_in);
+        assert!(report.providers.iter().all(|found| found.works == found.reason.is_none()), "{report:?}");
         assert!(report.to_string().contains(&report.reason));
+    }
+
+    #[test]
+    fn every_provider_has_a_way_to_it() {
+        for provider in Provider::iter() {
+            let way = how_to_get(provider);
+            assert!(way.contains(provider.needs()), "{way}");
+            assert!(provider.is_possible_here() || !fetch::can_be_fetched(provider), "{provider:?}");
+        }
     }
 }

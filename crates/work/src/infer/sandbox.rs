@@ -8,12 +8,17 @@
 //! is kept in the cache folder, by the bundle's hash, the engine's build and the program's version), and those that ship
 //! with the program are not tried at all.
 //!
+//! What an execution provider computes is also compared with the processor's own outputs ([`compare`]), for the bundles that
+//! ship too, and where it differs by more than [`Provider::tolerance`] or fails, the automatic choice goes on with the
+//! processor.
+//!
 //! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
 //! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
-//! the memory, but it is the second process that ends). Not bounded is what a graph asks for on other values than
+//! the memory, but it is the second process that ends; a provider that maps a device's memory has no bound). Not bounded is what a graph asks for on other values than
 //! zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
-//! second process and tries nothing.
+//! second process; it compares, and tries nothing else.
 
+mod compare;
 mod watch;
 
 use std::collections::BTreeMap;
@@ -64,34 +69,46 @@ pub(crate) fn memory_limit(bundle: &Bundle) -> u64 {
 /// # Errors
 /// The errors of [`resolve`], and [`EngineError::Refused`].
 pub(super) fn admit(bundle: &Bundle, choice: EngineChoice) -> Result<EngineKind, EngineError> {
+    let engine = resolve(choice)?;
+    match (known_or_tried(bundle, engine), engine, choice) {
+        (Ok(()), ..) => Ok(engine),
+        (Err(why), EngineKind::On(_), EngineChoice::Auto) => {
+            log::warn!("{why}; it runs on the processor");
+            admit(bundle, EngineChoice::Ort)
+        }
+        (Err(why), ..) => Err(why.into()),
+    }
+}
+
+/// The verdict on a bundle and an engine that [`resolve`] gave: from memory, from the disk, or from a trial.
+fn known_or_tried(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
     /// Verdicts since the program started; only that of a bundle that passed is kept longer.
     static KNOWN: Mutex<BTreeMap<String, Result<(), Refusal>>> = Mutex::new(BTreeMap::new());
-    let engine = resolve(choice)?;
-    let Some(program) = PROGRAM.get() else { return Ok(engine) };
-    // The manifests hold the checksums of the graphs.
-    if Origin::ships(bundle.hash()) {
-        return Ok(engine);
+    // The manifests hold the checksums of the graphs; what a driver makes of them is another matter.
+    let on_the_processor = !matches!(engine, EngineKind::On(_));
+    if on_the_processor && (Origin::ships(bundle.hash()) || PROGRAM.get().is_none()) {
+        return Ok(());
     }
     let key = key(bundle, engine);
     let known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
     let verdict = match known {
         Some(verdict) => verdict,
         None if kept(&key).is_some_and(|file| file.is_file()) => Ok(()),
-        None => match start(program, bundle, engine) {
-            Ok(seen) => judge(bundle, engine, &seen),
+        None => match PROGRAM.get().map(|program| start(program, bundle, engine)) {
+            Some(Ok(seen)) => judge(bundle, engine, &seen),
             // The program was moved, say: no reason to give the bundle up.
-            Err(err) => {
+            Some(Err(err)) => {
                 log::warn!("the model bundle {} could not be tried: {err}", bundle.origin());
-                return Ok(engine);
+                return Ok(());
             }
+            None => compare::with_the_processor(bundle, engine).map_err(|why| refusal(bundle, engine, why)),
         },
     };
     if verdict.is_ok() {
         keep(&key, bundle, engine);
     }
     KNOWN.lock().unwrap_or_else(PoisonError::into_inner).insert(key, verdict.clone());
-    verdict?;
-    Ok(engine)
+    verdict
 }
 
 /// Tries the bundle on an engine that [`resolve`] gave, whatever is known of it.
@@ -114,7 +131,11 @@ pub fn check(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
 /// [`EngineError::NoOnnxRuntime`] and the like; that an engine refuses is said in a line and answered `false`.
 pub fn run(bundle: &Bundle, choice: EngineChoice, line: &mut dyn FnMut(&str)) -> Result<bool, EngineError> {
     let engine = resolve(choice)?;
-    let outcome = on_zeros(bundle, engine, &mut |at| line(&format!("{AT}{at}")));
+    let mut at = |at: &str| line(&format!("{AT}{at}"));
+    let outcome = on_zeros(bundle, engine, &mut at).and_then(|()| {
+        at("comparing the outputs with the processor's");
+        compare::with_the_processor(bundle, engine)
+    });
     match &outcome {
         Ok(()) => line(TAKEN),
         Err(reason) => line(&format!("{REFUSED}{}", reason.replace('\n', "; "))),
@@ -129,20 +150,12 @@ fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Re
         at(&format!("loading the graph `{}`", role.key()));
         graphs.push((role, Graph::load(engine, role, file).map_err(|err| err.to_string())?));
     }
-    let whole_steps = bundle.generator().is_none_or(|spec| spec.timestep == TimestepType::Int64);
     for (role, graph) in &mut graphs {
         at(&format!("running the graph `{}` on zeros", role.key()));
         let Some((inputs, outputs)) = promised(*role, bundle.spec()) else { continue };
-        let batch_of_one = |shape: &[usize]| -> Vec<usize> { [&[1], shape].concat() };
         let zeros: Vec<(&str, Tensor)> =
             inputs.iter().map(|p| (&*p.name, Tensor::filled(batch_of_one(&p.shape), 0.0))).collect();
-        let inputs: Vec<(&str, Input<'_>)> = zeros
-            .iter()
-            .map(|(name, tensor)| match *name == "timestep" && whole_steps {
-                true => (*name, Input::I64(&[0])),
-                false => (*name, Input::F32(tensor)),
-            })
-            .collect();
+        let inputs = as_inputs(bundle, &zeros, &[0]);
         for output in outputs {
             match graph.run(&inputs, &output.name, &batch_of_one(&output.shape)) {
                 // Zeros are no touch: what comes out of them need not be numbers.
@@ -154,18 +167,31 @@ fn on_zeros(bundle: &Bundle, engine: EngineKind, at: &mut dyn FnMut(&str)) -> Re
     Ok(())
 }
 
-fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<ProcessEnd> {
-    let name = match engine {
-        EngineKind::Rten => "rten",
-        EngineKind::Ort => "ort",
+fn batch_of_one(shape: &[usize]) -> Vec<usize> {
+    [&[1], shape].concat()
+}
+
+/// Tensors by name as a graph of the bundle takes them; of the timestep the first number where it wants whole ones.
+fn as_inputs<'a>(bundle: &Bundle, tensors: &'a [(&str, Tensor)], step: &'a [i64]) -> Vec<(&'a str, Input<'a>)> {
+    let whole_steps = bundle.generator().is_none_or(|spec| spec.timestep == TimestepType::Int64);
+    let input = |(name, tensor): &'a (&str, Tensor)| match *name == "timestep" && whole_steps {
+        true => (*name, Input::I64(step)),
+        false => (*name, Input::F32(tensor)),
     };
+    tensors.iter().map(input).collect()
+}
+
+fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<ProcessEnd> {
+    let name = EngineChoice::from(engine).key();
     let place = match bundle.origin() {
         Origin::Folder(folder) => std::path::absolute(folder)?,
         built_in => built_in.path(),
     };
     let [group, verb] = VERB.map(AsRef::as_ref);
     let args = [group, verb, "--engine".as_ref(), name.as_ref(), "--".as_ref(), place.as_os_str()];
-    watch::watch(program, &args, Limits { memory: memory_limit(bundle), time: TIME })
+    // Drivers reserve address space by the terabyte.
+    let bounded = !matches!(engine, EngineKind::On(provider) if provider.has_own_memory());
+    watch::watch(program, &args, Limits { memory: bounded.then(|| memory_limit(bundle)), time: TIME })
 }
 
 fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Refusal {

@@ -1,12 +1,14 @@
 //! ONNX Runtime behind [`Session`], through a library that is loaded when it is first wanted.
 
+use std::collections::BTreeMap;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use ort::environment::Environment;
+use ort::ep::{self, ExecutionProvider as _, ExecutionProviderDispatch};
 use ort::session::{Session as OrtSession, SessionInputValue};
 use ort::value::TensorRef;
 
-use super::{Input, Library, Session, threads};
+use super::{Input, Library, NoProvider, Provider, Session, threads};
 use crate::infer::library::{Searched, candidates};
 use touch2touch_core::diffusion::Tensor;
 
@@ -77,21 +79,84 @@ pub(super) struct OnnxRuntimeSession {
     session: OrtSession,
 }
 
-pub(super) fn load(bytes: &[u8]) -> Result<OnnxRuntimeSession, String> {
+/// A graph in memory, on the processor or on a provider; what the provider does not know stays on the processor.
+pub(super) fn load(bytes: &[u8], provider: Option<Provider>) -> Result<OnnxRuntimeSession, String> {
     let environment = match &*state() {
         State::Loaded { environment, .. } => environment.clone(),
         _ => return Err("its library is not loaded".into()),
     };
     let build = || -> ort::Result<OrtSession> {
         // Spinning threads would burn the cores that the window needs.
-        OrtSession::builder(&environment)?
+        let builder = OrtSession::builder(&environment)?
             .with_intra_threads(threads())?
             .with_intra_op_spinning(false)?
             // Its errors come back as results; standard error is for our own words.
-            .with_log_level(ort::logging::LogLevel::Fatal)?
-            .commit_from_memory(bytes)
+            .with_log_level(ort::logging::LogLevel::Fatal)?;
+        let mut builder = match provider {
+            Some(provider) => builder.with_execution_providers([dispatch(provider).error_on_failure()])?,
+            None => builder,
+        };
+        builder.commit_from_memory(bytes)
     };
     Ok(OnnxRuntimeSession { session: build().map_err(|err| err.to_string())? })
+}
+
+/// The provider as the binding wants it.
+fn dispatch(provider: Provider) -> ExecutionProviderDispatch {
+    match provider {
+        // Not in TF32: 32 bits are 32 bits.
+        Provider::Cuda => ep::CUDA::default().with_tf32(false).build(),
+        Provider::TensorRt => ep::TensorRT::default().build(),
+        Provider::MiGraphX => ep::MIGraphX::default().build(),
+        Provider::DirectMl => ep::DirectML::default().build(),
+        Provider::CoreMl => ep::CoreML::default().build(),
+        Provider::OpenVino => ep::OpenVINO::default().with_device_type("CPU").with_num_threads(threads()).build(),
+        Provider::WebGpu => ep::WebGPU::default().build(),
+    }
+}
+
+/// The library in use was built with the provider.
+fn is_in_the_library(provider: Provider) -> bool {
+    let found = match provider {
+        Provider::Cuda => ep::CUDA::is_available(),
+        Provider::TensorRt => ep::TensorRT::is_available(),
+        Provider::MiGraphX => ep::MIGraphX::is_available(),
+        Provider::DirectMl => ep::DirectML::is_available(),
+        Provider::CoreMl => ep::CoreML::is_available(),
+        Provider::OpenVino => ep::OpenVINO::is_available(),
+        Provider::WebGpu => ep::WebGPU::is_available(),
+    };
+    found.unwrap_or(false)
+}
+
+pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
+    /// One operator, `y = max(x, 0)`: `onnx.helper.make_node("Relu", ["x"], ["y"])` in opset 17.
+    const GRAPH: &[u8] = include_bytes!("probe.onnx");
+    static TRIED: Mutex<BTreeMap<Provider, Result<(), NoProvider>>> = Mutex::new(BTreeMap::new());
+    // A library that is not loaded may yet be: nothing is kept of that.
+    if library().is_err() || !is_in_the_library(provider) {
+        return Err(NoProvider::NotInTheLibrary(provider));
+    }
+    let mut tried = TRIED.lock().unwrap_or_else(PoisonError::into_inner);
+    let attempt = || {
+        let x = Tensor::filled(vec![1, 4], -1.0);
+        let run = load(GRAPH, Some(provider)).and_then(|mut session| session.run(&[("x", Input::F32(&x))], "y"));
+        match run {
+            Ok(y) if y.data() == [0.0; 4] => Ok(()),
+            Ok(_) => Err("it computes wrong numbers".to_owned()),
+            Err(reason) => Err(reason),
+        }
+    };
+    tried
+        .entry(provider)
+        .or_insert_with(|| attempt().map_err(|said| NoProvider::DoesNotStart { provider, said: one_line(&said) }))
+        .clone()
+}
+
+/// Words of the library, which may go over many lines with paths of its own source.
+fn one_line(said: &str) -> String {
+    let words: Vec<&str> = said.split_whitespace().collect();
+    words.join(" ")
 }
 
 impl Session for OnnxRuntimeSession {

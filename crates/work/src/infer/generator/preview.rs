@@ -81,7 +81,7 @@ impl Watch for Watching<'_> {
     fn estimate(&mut self, after: Progress, clean: &Tensor) {
         let begin = Instant::now();
         let latents: Vec<Tensor> = self.wanted.iter().filter_map(|item| clean.item(*item)).collect();
-        let decoded = Tensor::stack(&latents).map(|latents| decode(self.decoder, self.spec, latents));
+        let decoded = Tensor::stack(&latents).map(|latents| decode(self.decoder, self.spec, latents, &mut 1));
         match decoded {
             Some(Ok(pictures)) => {
                 for (item, raw) in self.wanted.drain(..).zip(pictures) {

@@ -7,13 +7,20 @@ use std::io::{Read, Write};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::infer::engine;
-use crate::infer::library::{library_in, runtime_dir};
+use crate::infer::engine::{self, Provider};
+use crate::infer::library::{is_library, library_in, runtime_dir};
 use crate::io::digest::sha256;
 use crate::io::files;
 
-/// The version fetched.
-pub(crate) const VERSION: &str = "1.31.1";
+/// A package of Python's index with a library of ONNX Runtime inside.
+struct Package {
+    /// What the library can do besides the processor; the first names its folder.
+    providers: &'static [Provider],
+    name: &'static str,
+    version: &'static str,
+    /// For Python 3.11; the library inside is the same for every Python.
+    wheels: &'static [Wheel],
+}
 
 /// A platform's wheel.
 struct Wheel {
@@ -22,50 +29,125 @@ struct Wheel {
     /// As pip names the platform.
     platform: &'static str,
     sha256: &'static str,
-    /// The library inside.
-    library: &'static str,
 }
 
-/// The wheels of onnxruntime 1.31.1 for Python 3.11; the library inside is the same for every Python.
-const WHEELS: [Wheel; 4] = [
-    Wheel {
-        os: "linux",
-        arch: "x86_64",
-        platform: "manylinux_2_28_x86_64",
-        sha256: "5752bd508126ae7c49894d3b9d2e83f0c3d487319246d04c444b393308d7ad7f",
-        library: "libonnxruntime.so.1.31.1",
+const fn wheel(os: &'static str, arch: &'static str, platform: &'static str, sha256: &'static str) -> Wheel {
+    Wheel { os, arch, platform, sha256 }
+}
+
+const LINUX: &str = "manylinux_2_28_x86_64";
+const MAC: &str = "macosx_14_0_arm64";
+const WINDOWS: &str = "win_amd64";
+
+/// Every package that can be fetched. On a Mac the first has Core ML.
+const PACKAGES: [Package; 5] = [
+    Package {
+        providers: if cfg!(target_os = "macos") { &[Provider::CoreMl] } else { &[] },
+        name: "onnxruntime",
+        version: "1.31.1",
+        wheels: &[
+            wheel("linux", "x86_64", LINUX, "5752bd508126ae7c49894d3b9d2e83f0c3d487319246d04c444b393308d7ad7f"),
+            wheel(
+                "linux",
+                "aarch64",
+                "manylinux_2_28_aarch64",
+                "da05378364c44d4407e463982d2bf8d5e4cfea873283757e48beeb41df97b7f3",
+            ),
+            wheel("macos", "aarch64", MAC, "60b6b69bfe580eab576cacc5d132a0e9cf2a37fcfd18d46dd191042b1d1ed0d7"),
+            wheel("windows", "x86_64", WINDOWS, "c3d91b5de31e2fc82d71bd65b2b22bddee8b49057a3a36338e9a868e0ea90c05"),
+        ],
     },
-    Wheel {
-        os: "linux",
-        arch: "aarch64",
-        platform: "manylinux_2_28_aarch64",
-        sha256: "da05378364c44d4407e463982d2bf8d5e4cfea873283757e48beeb41df97b7f3",
-        library: "libonnxruntime.so.1.31.1",
+    Package {
+        providers: &[Provider::Cuda, Provider::TensorRt],
+        name: "onnxruntime-gpu",
+        version: "1.31.1",
+        wheels: &[
+            wheel("linux", "x86_64", LINUX, "e26c475fe361b2015f45b4b824bd13f0bb20204e59b62814e6f0acd5f3d491a6"),
+            wheel("windows", "x86_64", WINDOWS, "fd98341ba71c093153f0dcfc53eb69d57f706866fb45e94e5b0cde5d97a50dbf"),
+        ],
     },
-    Wheel {
-        os: "macos",
-        arch: "aarch64",
-        platform: "macosx_14_0_arm64",
-        sha256: "60b6b69bfe580eab576cacc5d132a0e9cf2a37fcfd18d46dd191042b1d1ed0d7",
-        library: "libonnxruntime.1.31.1.dylib",
+    Package {
+        providers: &[Provider::OpenVino],
+        name: "onnxruntime-openvino",
+        version: "1.24.1",
+        wheels: &[
+            wheel("linux", "x86_64", LINUX, "3007c803634cc69c6d52af1dea7ce729d9bb62b9a11070fd2f959119199007a8"),
+            wheel("windows", "x86_64", WINDOWS, "8042698232bf67f1f6b219c2b07728d7ae7ddff17d8524588de3675480609aef"),
+        ],
     },
-    Wheel {
-        os: "windows",
-        arch: "x86_64",
-        platform: "win_amd64",
-        sha256: "c3d91b5de31e2fc82d71bd65b2b22bddee8b49057a3a36338e9a868e0ea90c05",
-        library: "onnxruntime.dll",
+    Package {
+        providers: &[Provider::WebGpu],
+        name: "onnxruntime-webgpu",
+        version: "1.27.0",
+        wheels: &[
+            wheel("linux", "x86_64", LINUX, "142eb8bdb803c58117bf64164d201f43180bc87229cac14b590aa4ea79e0f70b"),
+            wheel("macos", "aarch64", MAC, "f39aec2f3e252dd445759065e1a7cd11f910fc87ce5de6e2edb1846ef7020034"),
+            wheel("windows", "x86_64", WINDOWS, "c2de23fb6bb775f86d2eef57e3cac6f885d16289a84e6232d2e78803f84f38c5"),
+        ],
+    },
+    Package {
+        providers: &[Provider::DirectMl],
+        name: "onnxruntime-directml",
+        version: "1.24.4",
+        wheels: &[wheel(
+            "windows",
+            "x86_64",
+            WINDOWS,
+            "96642a787e5a6f33bf043521c0f06eb1eb663f6b830e5862a2026d03f9c90543",
+        )],
     },
 ];
+
+impl Package {
+    /// The package with a provider, or the plain one.
+    fn of(provider: Option<Provider>) -> Option<&'static Self> {
+        match provider {
+            None => PACKAGES.first(),
+            Some(provider) => PACKAGES.iter().find(|package| package.providers.contains(&provider)),
+        }
+    }
+
+    /// The wheel of the system that this program runs on.
+    fn wheel(&self) -> Option<&'static Wheel> {
+        let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+        self.wheels.iter().find(|wheel| wheel.os == os && wheel.arch == arch)
+    }
+
+    /// Its folder under the one of fetched libraries.
+    fn folder(&self, all: &Path) -> PathBuf {
+        // The plain one was there before there were others.
+        match self.providers {
+            [] | [Provider::CoreMl] => all.to_owned(),
+            [first, ..] => all.join(first.key()),
+        }
+    }
+}
+
+/// A library with the provider can be fetched for this system.
+pub(crate) fn can_be_fetched(provider: Provider) -> bool {
+    Package::of(Some(provider)).is_some_and(|package| package.wheel().is_some())
+}
+
+/// Folders of fetched libraries, those with a provider first.
+#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
+pub(crate) fn fetched_folders() -> impl Iterator<Item = PathBuf> {
+    let all = runtime_dir();
+    let with_provider = PACKAGES.iter().rev();
+    let folders = with_provider.filter_map(move |package| Some(package.folder(all.as_deref()?)));
+    folders.filter(|folder| folder.is_dir())
+}
 
 /// Why the library could not be fetched.
 #[derive(Debug, thiserror::Error)]
 pub enum FetchError {
     /// No wheel is pinned for this platform.
     #[error(
-        "no ONNX Runtime {VERSION} is known for {os} on {arch}; install it yourself and set ORT_DYLIB_PATH, or use the built-in engine"
+        "no ONNX Runtime{} is known for {os} on {arch}; install one yourself and set ORT_DYLIB_PATH, or use the built-in engine",
+        .provider.map(|provider| format!(" with {}", provider.name())).unwrap_or_default()
     )]
     Platform {
+        /// Provider that it should have.
+        provider: Option<Provider>,
         /// Operating system.
         os: &'static str,
         /// Processor.
@@ -85,8 +167,10 @@ pub enum FetchError {
         source: std::io::Error,
     },
     /// Pip said no.
-    #[error("pip could not download onnxruntime {VERSION}: {message}")]
+    #[error("pip could not download {package}: {message}")]
     Pip {
+        /// Name and version of the package.
+        package: String,
         /// The end of what it said.
         message: String,
     },
@@ -116,22 +200,23 @@ pub enum FetchError {
     },
 }
 
-/// Fetches the pinned ONNX Runtime into `dir` (default: the application's data folder) and returns the library's path.
-/// A library that is already there is kept.
+/// Fetches the pinned ONNX Runtime, the plain one or that with a provider, into `dir` (default: the application's data folder)
+/// and returns the library's path. A library that is already there is kept.
 ///
 /// # Errors
-/// See [`FetchError`]; nothing is left behind then.
+/// See [`FetchError`]; no library is left behind then.
 ///
 /// # Cost
-/// A download of about 24 MB; seconds to minutes. Call it off the UI thread.
-pub fn fetch_runtime(dir: Option<&Path>) -> Result<PathBuf, FetchError> {
+/// A download of about 24 MB, 85 MB with OpenVINO, 300 MB with CUDA; seconds to minutes. Call it off the UI thread.
+pub fn fetch_runtime(dir: Option<&Path>, provider: Option<Provider>) -> Result<PathBuf, FetchError> {
+    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
+    let known = Package::of(provider).and_then(|package| Some((package, package.wheel()?)));
+    let (package, wheel) = known.ok_or(FetchError::Platform { provider, os, arch })?;
     let dir = match dir {
         Some(dir) => dir.to_path_buf(),
-        None => runtime_dir().ok_or(FetchError::NoFolder)?,
+        None => package.folder(&runtime_dir().ok_or(FetchError::NoFolder)?),
     };
-    let (os, arch) = (std::env::consts::OS, std::env::consts::ARCH);
-    let wheel = WHEELS.iter().find(|w| w.os == os && w.arch == arch).ok_or(FetchError::Platform { os, arch })?;
-    if let Some(path) = library_in(&dir).filter(|path| path.ends_with(wheel.library)) {
+    if let Some(path) = library_in(&dir).filter(|path| of_version(path, package.version)) {
         return Ok(path);
     }
     let io = |path: &Path| {
@@ -140,30 +225,37 @@ pub fn fetch_runtime(dir: Option<&Path>) -> Result<PathBuf, FetchError> {
     };
     std::fs::create_dir_all(&dir).map_err(io(&dir))?;
     let download = tempfile::tempdir_in(&dir).map_err(io(&dir))?;
-    pip_download(wheel, download.path())?;
+    pip_download(package, wheel, download.path())?;
     let path = std::fs::read_dir(download.path())
         .map_err(io(download.path()))?
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|ext| ext == "whl"))
-        .ok_or_else(|| FetchError::Pip { message: "it left no wheel".into() })?;
+        .ok_or_else(|| FetchError::Pip { package: package.name.into(), message: "it left no wheel".into() })?;
     let bytes = files::read(&path, files::MODEL).map_err(io(&path))?;
     let found = sha256(&bytes);
     if found != wheel.sha256 {
         return Err(FetchError::Checksum { path, found, expected: wheel.sha256 });
     }
-    let target = unpack(&bytes, wheel.library, &dir)?;
+    let target = unpack(&bytes, &dir)?;
     engine::search_again();
     Ok(target)
 }
 
-fn pip_download(wheel: &Wheel, into: &Path) -> Result<(), FetchError> {
+/// The library is of this version; where names have none, of any.
+fn of_version(library: &Path, version: &str) -> bool {
+    let name = library.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    name.contains(version) || !name.contains(|c: char| c.is_ascii_digit())
+}
+
+fn pip_download(package: &Package, wheel: &Wheel, into: &Path) -> Result<(), FetchError> {
     let program = if cfg!(windows) { "python" } else { "python3" };
+    let named = format!("{}=={}", package.name, package.version);
     let output = Command::new(program)
         .args(["-m", "pip", "download", "--no-deps", "--disable-pip-version-check", "--quiet"])
         .args(["--only-binary=:all:", "--implementation", "cp", "--python-version", "3.11", "--abi", "cp311"])
         .args(["--platform", wheel.platform, "--dest"])
         .arg(into)
-        .arg(format!("onnxruntime=={VERSION}"))
+        .arg(&named)
         .output()
         .map_err(|source| FetchError::NoPython { program, source })?;
     if output.status.success() {
@@ -172,27 +264,41 @@ fn pip_download(wheel: &Wheel, into: &Path) -> Result<(), FetchError> {
     let text = String::from_utf8_lossy(&output.stderr);
     let lines: Vec<&str> = text.lines().filter(|line| !line.trim().is_empty()).collect();
     let message = lines[lines.len().saturating_sub(3)..].join(" ");
-    Err(FetchError::Pip { message })
+    Err(FetchError::Pip { package: named, message })
 }
 
-/// Takes the library and its licences out of the wheel.
-fn unpack(wheel: &[u8], library: &str, dir: &Path) -> Result<PathBuf, FetchError> {
+/// Takes the libraries and their licences out of the wheel; that of ONNX Runtime last, so that it is there when all is.
+fn unpack(wheel: &[u8], dir: &Path) -> Result<PathBuf, FetchError> {
     let bad = |err: zip::result::ZipError| FetchError::Wheel { reason: err.to_string() };
     let mut archive = zip::ZipArchive::new(std::io::Cursor::new(wheel)).map_err(bad)?;
-    let mut entry = |name: &str| -> Result<Vec<u8>, FetchError> {
-        let mut file = archive.by_name(name).map_err(bad)?;
+    let names = archive.file_names().map(|name| Ok(name?.into_owned()));
+    let names: Vec<String> = names.collect::<Result<_, _>>().map_err(bad)?;
+    let mut wanted: Vec<(&str, &str)> = names
+        .iter()
+        .filter_map(|name| {
+            let file = name.strip_prefix("onnxruntime/capi/").filter(|file| is_shared_library(file));
+            let file = file.or_else(|| name.strip_prefix("onnxruntime/").filter(|file| LICENCES.contains(file)))?;
+            Some((name.as_str(), file))
+        })
+        .collect();
+    wanted.sort_by_key(|(_, file)| is_library(file));
+    let target = wanted.last().filter(|(_, file)| is_library(file)).map(|(_, file)| dir.join(file));
+    let target = target.ok_or_else(|| FetchError::Wheel { reason: "no library of ONNX Runtime is in it".into() })?;
+    for (name, file) in wanted {
+        let mut entry = archive.by_name(name).map_err(bad)?;
         let mut bytes = Vec::new();
-        file.read_to_end(&mut bytes).map_err(|err| FetchError::Wheel { reason: err.to_string() })?;
-        Ok(bytes)
-    };
-    for (name, target) in
-        [("onnxruntime/LICENSE", "LICENSE"), ("onnxruntime/ThirdPartyNotices.txt", "ThirdPartyNotices.txt")]
-    {
-        write_whole(&dir.join(target), &entry(name)?)?;
+        entry.read_to_end(&mut bytes).map_err(|err| FetchError::Wheel { reason: err.to_string() })?;
+        write_whole(&dir.join(file), &bytes)?;
     }
-    let target = dir.join(library);
-    write_whole(&target, &entry(&format!("onnxruntime/capi/{library}"))?)?;
     Ok(target)
+}
+
+const LICENCES: [&str; 2] = ["LICENSE", "ThirdPartyNotices.txt"];
+
+/// A library of the system, and not the module for Python.
+fn is_shared_library(file: &str) -> bool {
+    let ends = [".so", ".dylib", ".dll"].iter().any(|ext| file.contains(ext));
+    ends && !file.contains('/') && !file.contains("pybind11")
 }
 
 /// Writes a file so that it is there whole or not at all.
@@ -225,44 +331,59 @@ mod tests {
     }
 
     #[test]
-    fn the_library_and_its_licences_are_unpacked() {
+    fn the_libraries_and_their_licences_are_unpacked() {
         let dir = tempfile::tempdir().unwrap();
         let bytes = wheel(&[
+            ("onnxruntime/capi/libonnxruntime.so.1.31.1", b"\x7fELF"),
             ("onnxruntime/LICENSE", b"MIT"),
             ("onnxruntime/ThirdPartyNotices.txt", b"others"),
-            ("onnxruntime/capi/libonnxruntime.so.1.31.1", b"\x7fELF"),
+            ("onnxruntime/capi/libonnxruntime_providers_openvino.so", b"\x7fELF"),
+            ("onnxruntime/capi/onnxruntime_pybind11_state.cpython-311-x86_64-linux-gnu.so", b"\x7fELF"),
+            ("onnxruntime/capi/build.py", b""),
         ]);
-        let path = unpack(&bytes, "libonnxruntime.so.1.31.1", dir.path()).unwrap();
-        assert_eq!(std::fs::read(path).unwrap(), b"\x7fELF");
+        let path = unpack(&bytes, dir.path()).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"\x7fELF");
+        assert_eq!(library_in(dir.path()), Some(path));
         assert_eq!(std::fs::read(dir.path().join("LICENSE")).unwrap(), b"MIT");
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 3, "no temporary file stays");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 4, "no temporary file stays, nothing of Python's");
     }
 
     #[test]
     fn a_wheel_without_the_library_or_a_broken_one_is_an_error() {
         let dir = tempfile::tempdir().unwrap();
         let empty = wheel(&[("onnxruntime/LICENSE", b"MIT"), ("onnxruntime/ThirdPartyNotices.txt", b"")]);
-        assert!(matches!(unpack(&empty, "libonnxruntime.so.1.31.1", dir.path()), Err(FetchError::Wheel { .. })));
-        assert!(matches!(unpack(b"PK", "x", dir.path()), Err(FetchError::Wheel { .. })));
+        assert!(matches!(unpack(&empty, dir.path()), Err(FetchError::Wheel { .. })));
+        assert!(matches!(unpack(b"PK", dir.path()), Err(FetchError::Wheel { .. })));
         assert_eq!(library_in(dir.path()), None);
     }
 
     #[test]
     fn a_library_that_is_there_is_kept() {
         let dir = tempfile::tempdir().unwrap();
-        match WHEELS.iter().find(|w| w.os == std::env::consts::OS && w.arch == std::env::consts::ARCH) {
-            Some(wheel) => {
-                let path = dir.path().join(wheel.library);
+        let plain = Package::of(None).unwrap();
+        match plain.wheel() {
+            Some(_) => {
+                let path = dir.path().join(format!("libonnxruntime.so.{}", plain.version));
                 std::fs::write(&path, b"kept").unwrap();
-                assert_eq!(fetch_runtime(Some(dir.path())).unwrap(), path);
+                assert_eq!(fetch_runtime(Some(dir.path()), None).unwrap(), path);
                 assert_eq!(std::fs::read(path).unwrap(), b"kept");
             }
-            None => assert!(matches!(fetch_runtime(Some(dir.path())), Err(FetchError::Platform { .. }))),
+            None => assert!(matches!(fetch_runtime(Some(dir.path()), None), Err(FetchError::Platform { .. }))),
         }
     }
 
     #[test]
-    fn every_pin_is_a_hash() {
-        assert!(WHEELS.iter().all(|w| w.sha256.len() == 64 && w.sha256.bytes().all(|b| b.is_ascii_hexdigit())));
+    fn every_pin_is_a_hash_and_every_package_has_a_folder_of_its_own() {
+        let wheels = PACKAGES.iter().flat_map(|package| package.wheels);
+        assert!(wheels.into_iter().all(|w| w.sha256.len() == 64 && w.sha256.bytes().all(|b| b.is_ascii_hexdigit())));
+        let folders: std::collections::BTreeSet<_> = PACKAGES.iter().map(|p| p.folder(Path::new("all"))).collect();
+        assert_eq!(folders.len(), PACKAGES.len());
+    }
+
+    #[test]
+    fn what_no_index_has_for_this_system_is_said() {
+        let absent = if cfg!(windows) { Provider::CoreMl } else { Provider::DirectMl };
+        let said = fetch_runtime(None, Some(absent)).unwrap_err().to_string();
+        assert!(said.contains(absent.name()) && said.contains("ORT_DYLIB_PATH"), "{said}");
     }
 }

@@ -15,8 +15,8 @@ const MAX_TEXT: u64 = 1 << 16;
 
 /// Limits of the process.
 pub(super) struct Limits {
-    /// Bytes.
-    pub(super) memory: u64,
+    /// Bytes; `None` for no bound.
+    pub(super) memory: Option<u64>,
     pub(super) time: Duration,
 }
 
@@ -66,10 +66,8 @@ pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Resu
 }
 
 /// The program, with a bound on its memory where the system has one for processes.
-fn command(program: &Path, memory: u64) -> Command {
-    if !cfg!(unix) {
-        return Command::new(program);
-    }
+fn command(program: &Path, memory: Option<u64>) -> Command {
+    let Some(memory) = memory.filter(|_| cfg!(unix)) else { return Command::new(program) };
     // Only the shell can set a limit without unsafe code. It is tried out first: where the system has no such limit, or a
     // lower one is in force, the program is started all the same.
     const LIMITED: &str = r#"(ulimit -v "$1") 2>/dev/null && ulimit -v "$1"; shift; exec "$@""#;
@@ -87,9 +85,10 @@ fn wait(child: &mut Child, limits: &Limits) -> io::Result<End> {
         }
         let mut end = (begin.elapsed() > limits.time).then_some(End::TooLong);
         // Linux keeps to the limit by itself.
-        if cfg!(unix) && !cfg!(target_os = "linux") && asked.elapsed() > POLL_MEMORY {
+        let looked_at = cfg!(unix) && !cfg!(target_os = "linux");
+        if let Some(memory) = limits.memory.filter(|_| looked_at && asked.elapsed() > POLL_MEMORY) {
             asked = Instant::now();
-            if resident(child.id()).is_some_and(|bytes| bytes > limits.memory) {
+            if resident(child.id()).is_some_and(|bytes| bytes > memory) {
                 end = Some(End::TooMuch);
             }
         }
@@ -131,7 +130,7 @@ mod tests {
     #[test]
     fn what_takes_too_long_is_ended_and_what_it_said_is_known() {
         let begin = Instant::now();
-        let limits = Limits { memory: 1 << 30, time: Duration::from_millis(300) };
+        let limits = Limits { memory: Some(1 << 30), time: Duration::from_millis(300) };
         let seen = shell("echo begun; exec sleep 100", limits);
         assert!(matches!(seen.end, End::TooLong), "{seen:?}");
         assert_eq!(seen.output, "begun\n");
@@ -140,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_flood_of_words_is_cut_and_waits_for_nobody() {
-        let limits = Limits { memory: 1 << 30, time: Duration::from_secs(60) };
+        let limits = Limits { memory: Some(1 << 30), time: Duration::from_secs(60) };
         let seen = shell("head -c 1000000 /dev/zero; echo last >&2; exit 3", limits);
         assert!(matches!(seen.end, End::Ended(status) if status.code() == Some(3)), "{seen:?}");
         assert_eq!((seen.output.len() as u64, seen.errors.as_str()), (MAX_TEXT, "last\n"));
@@ -149,7 +148,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn the_memory_is_bounded() {
-        let limits = |memory| Limits { memory, time: Duration::from_secs(60) };
+        let limits = |memory| Limits { memory: Some(memory), time: Duration::from_secs(60) };
         // One line of 300 MB, which the shell holds as a whole.
         let script = "x=$(head -c 300000000 /dev/zero | tr '\\0' x); echo ${#x}";
         let tight = shell(script, limits(100 << 20));
@@ -159,7 +158,7 @@ mod tests {
 
     #[test]
     fn a_program_that_is_not_there_is_an_end_with_words() {
-        let limits = Limits { memory: 1 << 30, time: Duration::from_secs(60) };
+        let limits = Limits { memory: Some(1 << 30), time: Duration::from_secs(60) };
         let seen = watch(Path::new("/nowhere/at/all"), &[], limits).unwrap();
         assert!(matches!(seen.end, End::Ended(status) if !status.success()) && !seen.errors.is_empty(), "{seen:?}");
     }

@@ -41,6 +41,12 @@ impl Words {
         }
     }
 
+    /// The engine that runs the models, unless it is the automatic choice.
+    #[must_use]
+    pub fn runtime(self, engine: EngineChoice) -> Self {
+        self.option_if("--runtime", (engine != EngineChoice::Auto).then(|| engine.key()))
+    }
+
     /// The words of another after its own.
     #[must_use]
     pub fn then(mut self, mut other: Self) -> Self {
@@ -93,11 +99,7 @@ impl Recipe {
         if stage >= Stage::Pose {
             words = words.option("--engine", self.registration);
         }
-        match self.engine {
-            EngineChoice::Auto => words,
-            EngineChoice::Rten => words.option("--runtime", "rten"),
-            EngineChoice::Ort => words.option("--runtime", "ort"),
-        }
+        words.runtime(self.engine)
     }
 
     fn mask_words(&self) -> Words {
