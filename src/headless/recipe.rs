@@ -11,7 +11,7 @@ use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
+use touch2touch_work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint;
 use touch2touch_work::infer::bundle::Bundle;
@@ -47,8 +47,8 @@ impl ModelArgs {
         if self.no_cache { None } else { unfinished_folder() }
     }
 
-    fn take(&self, kind: BundleKind, named: Option<&Path>, rig: &Rig) -> Result<BundleInfo, TaskError> {
-        self.found.get_or_init(|| bundles::find(&[])).take(kind, named, rig)
+    fn found(&self) -> &FoundBundles {
+        self.found.get_or_init(|| bundles::find(&[]))
     }
 
     /// The recipe of imprints. A generator is looked for where they are predicted.
@@ -58,7 +58,7 @@ impl ModelArgs {
             // Without a generator nothing is read by it; what was asked for is still said.
             return Ok(Recipe { shift: self.mapping.mode(None).unwrap_or_default(), ..recipe });
         }
-        let bundle = self.take(BundleKind::Generator, self.bundle.as_deref(), rig)?;
+        let bundle = self.found().take(BundleKind::Generator, self.bundle.as_deref(), rig)?;
         bundle.ends(rig).transpose()?;
         let shift = self.mapping.mode(Some((&bundle.name, &bundle.id)))?;
         let config = self.config(&bundle)?;
@@ -74,18 +74,14 @@ impl ModelArgs {
         registration: RegistrationChoice,
     ) -> anyhow::Result<Recipe> {
         let choice = mask.choice();
-        let takes = matches!(choice.source, MaskSource::Auto | MaskSource::Unet);
-        let mask_model = if takes { self.mask_model(choice.source == MaskSource::Auto, rig)? } else { None };
+        let mask_model = self.mask_model(choice.source, rig)?;
         let recipe = self.recipe(imprint, rig)?;
         Ok(Recipe { mask: choice, mask_model, hand: !mask.no_hand, registration, ..recipe })
     }
 
-    /// The mask model; with `may_lack`, none where none is found and none was named.
-    pub fn mask_model(&self, may_lack: bool, rig: &Rig) -> Result<Option<Model>, TaskError> {
-        match self.take(BundleKind::Mask, self.mask_bundle.as_deref(), rig) {
-            Err(_) if may_lack && self.mask_bundle.is_none() => Ok(None),
-            found => Ok(Some(found?.into())),
-        }
+    /// The mask model that masks of this source take.
+    pub fn mask_model(&self, of: MaskSource, rig: &Rig) -> Result<Option<Model>, TaskError> {
+        self.found().mask_model(of, self.mask_bundle.as_deref(), rig)
     }
 
     /// The bundle's defaults with what the command line says instead.

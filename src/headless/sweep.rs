@@ -9,6 +9,7 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::labels::ImprintSource;
+use touch2touch_work::mask::MaskSource;
 use touch2touch_work::pairs;
 use touch2touch_work::recipe::Recipe;
 use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
@@ -61,7 +62,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
     let recipe = args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?.of(ImprintSource::Measured);
     // The dial may ask for the mask model where the choice does not.
-    let model = || args.model.mask_model(false, &dataset.rig);
+    let model = || args.model.mask_model(MaskSource::Unet, &dataset.rig);
     let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };
     let setup = SweepSetup { values, pairs, recipe: Recipe { mask_model, ..recipe } };
     let found = sweep(&dataset, &setup, &models, &output.job())?;

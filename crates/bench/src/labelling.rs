@@ -158,7 +158,7 @@ pub(super) fn run(args: &LabellingArgs) -> VerbResult {
     let (mut rows, mut persons) = (Vec::new(), Persons::default());
     for &imprint in imprints {
         let recipe = args.model.recipe(imprint, &rig)?;
-        let recipe = Recipe { mask_model: args.model.mask_model(false, &rig)?, ..recipe };
+        let recipe = Recipe { mask_model: args.model.mask_model(MaskSource::Unet, &rig)?, ..recipe };
         let mut sources: Vec<Proposals> = Vec::new();
         for (index, case) in cases.iter().enumerate() {
             output.step(&case.name);

@@ -30,6 +30,7 @@ use touch2touch_work::canvas;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::atomic;
 use touch2touch_work::io::cases::{Case, CaseSet};
+use touch2touch_work::mask::MaskSource;
 use touch2touch_work::pairs;
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
@@ -115,7 +116,7 @@ impl From<Masks> for String {
 pub(super) fn masks(set: &CaseSet, kind: Masks, args: &ModelArgs) -> anyhow::Result<Vec<[Mask; 2]>> {
     let (rig, models) = (Rig::lab(), args.models());
     let model = match kind {
-        Masks::Unet => args.mask_model(false, &rig)?,
+        Masks::Unet => args.mask_model(MaskSource::Unet, &rig)?,
         _ => None,
     };
     let of = |case: &Case| -> anyhow::Result<[Mask; 2]> {

@@ -131,14 +131,7 @@ impl Recipe {
                     config.map(|config| (bundle.into(), config))
                 }
             };
-            let takes = matches!(mask.source, MaskSource::Auto | MaskSource::Unet);
-            let model = takes.then(|| found.take(BundleKind::Mask, mask_bundle.as_deref(), &rig));
-            // Without a model, `auto` takes the threshold.
-            let may_lack = mask.source == MaskSource::Auto && mask_bundle.is_none();
-            let mask_model = match model {
-                Some(Err(_)) if may_lack => None,
-                model => model.transpose()?.map(Into::into),
-            };
+            let mask_model = found.mask_model(mask.source, mask_bundle.as_deref(), &rig)?;
             let hand = hand.unwrap_or(true);
             Ok(Whole { imprint, generator, shift, mask, mask_model, hand, registration, engine })
         });
