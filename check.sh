@@ -49,7 +49,7 @@ cargo test --locked -p touch2touch -p touch2touch-work -p touch2touch-bench --fe
 step "the Python package: its wheel in a fresh environment, types, tests"
 python3 -m venv --clear target/python-venv
 python=target/python-venv/bin/python
-"$python" -m pip install --quiet maturin numpy pytest mypy
+"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars
 "$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
 "$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
 TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider

@@ -4,14 +4,9 @@ use std::path::Path;
 use std::process::Output;
 
 use serde_json::Value;
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind};
 
-use crate::support::{command, left_out};
-
-/// Folder of an ONNX Runtime with OpenVINO, as the check script has fetched it.
-fn library() -> Option<String> {
-    let named = std::env::var("TOUCH2TOUCH_OPENVINO").ok().filter(|dir| Path::new(dir).is_dir());
-    named.or_else(|| left_out("TOUCH2TOUCH_OPENVINO names no folder with OpenVINO", "REQUIRE_ORT"))
-}
+use crate::support::{self, command};
 
 fn bundle(name: &str) -> String {
     format!("{}/tests/data/bundles/{name}", env!("CARGO_MANIFEST_DIR"))
@@ -28,7 +23,7 @@ fn json(output: &Output) -> Value {
 
 #[test]
 fn a_provider_that_works_is_the_automatic_choice_and_the_others_say_what_to_install() {
-    let Some(library) = library() else { return };
+    let Some(library) = support::openvino() else { return };
     let home = tempfile::tempdir().unwrap();
     let report = json(&run(&["runtime", "--json"], &library, home.path()));
     assert_eq!(report["engine"], "openvino", "{report}");
@@ -52,7 +47,7 @@ fn a_provider_that_works_is_the_automatic_choice_and_the_others_say_what_to_inst
 
 #[test]
 fn a_provider_predicts_and_masks_and_poses_as_the_processor_does() {
-    let Some(library) = library() else { return };
+    let Some(library) = support::openvino() else { return };
     let home = tempfile::tempdir().unwrap();
     let posed = |runtime: &str| {
         let words =
@@ -73,7 +68,7 @@ fn a_provider_predicts_and_masks_and_poses_as_the_processor_does() {
 
 #[test]
 fn where_a_provider_computes_otherwise_the_processor_goes_on_and_says_so() {
-    let Some(library) = library() else { return };
+    let Some(library) = support::openvino() else { return };
     let home = tempfile::tempdir().unwrap();
     let rounding = bundle("rounding");
     let masked = |runtime: &str| {
@@ -92,4 +87,19 @@ fn where_a_provider_computes_otherwise_the_processor_goes_on_and_says_so() {
     assert_eq!(json(&checked)["engines"], serde_json::json!(["rten", "ort", "openvino"]));
     let refused = run(&["bundle", "check", &rounding, "--json"], &library, home.path());
     assert_eq!(json(&refused)["engines"], serde_json::json!(["rten", "ort"]));
+}
+
+#[test]
+fn an_engine_has_one_name_in_files_words_and_reports() {
+    for choice in EngineChoice::all() {
+        assert_eq!(serde_json::to_value(choice).unwrap(), choice.key());
+        assert_eq!(serde_json::from_value::<EngineChoice>(choice.key().into()).unwrap(), choice);
+        assert_eq!(choice.key().parse(), Ok(choice));
+        if let Ok(kind) = serde_json::from_value::<EngineKind>(choice.key().into()) {
+            assert_eq!((EngineChoice::from(kind), serde_json::to_value(kind).unwrap()), (choice, choice.key().into()));
+        } else {
+            assert_eq!(choice, EngineChoice::Auto, "all else is an engine");
+        }
+    }
+    assert!("gpu".parse::<EngineChoice>().unwrap_err().contains("openvino"));
 }

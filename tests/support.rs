@@ -31,6 +31,13 @@ pub(crate) fn torch() -> Option<OsString> {
     python.or_else(|| left_out("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked", "REQUIRE_TORCH"))
 }
 
+/// The folder of an ONNX Runtime with OpenVINO, as the check script has fetched it.
+#[cfg(feature = "onnx")]
+pub(crate) fn openvino() -> Option<String> {
+    let named = std::env::var("TOUCH2TOUCH_OPENVINO").ok().filter(|dir| Path::new(dir).is_dir());
+    named.or_else(|| left_out("TOUCH2TOUCH_OPENVINO names no folder with OpenVINO", "REQUIRE_ORT"))
+}
+
 /// Says that this machine lacks something that the running test needs, which is then not tried: a failure where
 /// `variable` demands it. Every test that leaves something out does it through here.
 pub(crate) fn left_out<T>(why: impl Display, variable: &str) -> Option<T> {

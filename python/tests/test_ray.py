@@ -1,9 +1,8 @@
-"""Rows of many touches: by two workers, one of them killed, and by two processes of a job array."""
+"""Rows of many touches by two workers of Ray, one of them killed."""
 
 import os
 import signal
 import subprocess
-import sys
 import threading
 import time
 
@@ -70,26 +69,3 @@ def test_two_workers_one_killed_make_the_rows_of_one_process(data, alone, tmp_pa
     assert many.evaluate(data[:2], t2t.Recipe("predicted", seed=5), tmp_path, workers=1)[1] == 2
     assert len(rows(out)) == len(data) + 2
     ray.shutdown()
-
-
-def test_a_job_array_makes_the_same_rows(tmp_path):
-    """As a cluster's scheduler starts it: a process for each share."""
-    run = [sys.executable, "-m", "touch2touch.ray", "demo", str(tmp_path), "--batch", "4"]
-    processes = [subprocess.Popen([*run, "--shard", f"{n}/40"], stdout=subprocess.PIPE, text=True) for n in (1, 40)]
-    said = [process.communicate()[0] for process in processes]
-    names = t2t.open("demo").names
-    batches = [names[n:n + 4] for n in range(0, len(names), 4)]
-    expected = [name for share in (0, 39) for batch in batches[share::40] for name in batch]
-    made = pq.read_table(tmp_path)
-    assert sorted(made["pair"].to_pylist()) == sorted(expected) and all("rows in" in text for text in said)
-    assert set(made["verdict"].to_pylist()) <= {"good", "check", "wrong", None}
-    assert subprocess.run([*run, "--shard", "41/40"], capture_output=True, check=False).returncode == 2
-
-
-def test_a_touch_that_fails_is_a_row_too():
-    pair = t2t.open("demo")[0]
-    recipe = t2t.Recipe(mask="threshold", threshold_mm=40.0, engine="distance_field")
-    row = many.row(pair, recipe, recipe.id())
-    assert row["verdict"] is None and row["angle_rad"] != row["angle_rad"] and len(row["why"]) > 10
-    row = many.row(pair, t2t.Recipe(mask="unet", mask_bundle=None), "x")
-    assert row["verdict"] == "good" or row["verdict"] in ("check", "wrong")

@@ -20,6 +20,8 @@ pub mod kept_key;
 mod library;
 pub mod mask;
 mod onnx_header;
+mod packages;
+mod provider;
 pub(crate) mod recipe_id;
 pub mod runtime;
 pub mod sandbox;

@@ -9,7 +9,6 @@
 
 #[cfg(feature = "onnx")]
 mod ort_engine;
-mod provider;
 #[cfg(feature = "onnx")]
 mod rten_engine;
 
@@ -21,8 +20,9 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::bundle::{BundleFile, Role};
+use super::packages::way_to;
+pub use super::provider::Provider;
 use crate::io::files;
-pub use provider::Provider;
 use touch2touch_core::diffusion::{ModelError, Tensor};
 
 /// An engine.
@@ -332,6 +332,11 @@ pub(super) fn build(engine: EngineKind) -> String {
     match engine {
         #[cfg(feature = "onnx")]
         EngineKind::Ort => library().map_or_else(|_| engine.label().to_owned(), |library| library.build),
+        #[cfg(feature = "onnx")]
+        EngineKind::On(provider) => {
+            let build = library().map_or_else(|_| String::new(), |library| library.build);
+            format!("{} {build}", provider.key())
+        }
         _ => engine.label().to_owned(),
     }
 }
@@ -341,7 +346,7 @@ pub(super) fn build(engine: EngineKind) -> String {
 #[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only ONNX Runtime has providers"))]
 pub(super) enum NoProvider {
     /// The library was built without it.
-    #[error("the ONNX Runtime in use has none; {}", super::runtime::how_to_get(*.0))]
+    #[error("the ONNX Runtime in use has none; {}", way_to(*.0))]
     NotInTheLibrary(Provider),
     /// It is there and does not start.
     #[error("it does not start ({said}); {}", provider.needs())]

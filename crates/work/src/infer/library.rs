@@ -5,8 +5,7 @@ use std::process::Command;
 
 use serde::Serialize;
 
-use super::runtime::fetched_folders;
-use crate::io::folders;
+use super::packages::{fetched_folders, runtime_dir};
 
 /// A place that was searched without success.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -15,11 +14,6 @@ pub struct Searched {
     pub place: String,
     /// Fault that was met there.
     pub outcome: String,
-}
-
-/// Folder of fetched libraries, unless another is named.
-pub(super) fn runtime_dir() -> Option<PathBuf> {
-    folders::program_data().map(|dir| dir.join("runtime"))
 }
 
 /// All places to look at, in order, each with the library that lies there.

@@ -13,8 +13,6 @@ use super::engine::{self, EngineChoice, EngineKind, Provider};
 
 pub(crate) use super::library::Searched;
 pub use fetch::fetch_runtime;
-#[cfg_attr(not(feature = "onnx"), allow(unused_imports, reason = "only the ONNX engine looks for its library"))]
-pub(crate) use fetch::fetched_folders;
 
 /// Engine that runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -110,17 +108,6 @@ fn look_at(provider: Provider) -> ProviderReport {
     }
 }
 
-/// The way to a library with a provider, in a sentence.
-pub(super) fn how_to_get(provider: Provider) -> String {
-    let needs = provider.needs();
-    let key = provider.key();
-    match (provider.is_possible_here(), fetch::can_be_fetched(provider)) {
-        (false, _) => format!("there is none for this system; {needs}"),
-        (true, true) => format!("fetch one that has it with `touch2touch runtime --fetch --provider {key}`; {needs}"),
-        (true, false) => format!("set ORT_DYLIB_PATH to a library that has it; {needs}"),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -134,14 +121,5 @@ mod tests {
         assert_eq!(report.library.is_none(), built_in);
         assert!(report.providers.iter().all(|found| found.works == found.reason.is_none()), "{report:?}");
         assert!(report.to_string().contains(&report.reason));
-    }
-
-    #[test]
-    fn every_provider_has_a_way_to_it() {
-        for provider in Provider::iter() {
-            let way = how_to_get(provider);
-            assert!(way.contains(provider.needs()), "{way}");
-            assert!(provider.is_possible_here() || !fetch::can_be_fetched(provider), "{provider:?}");
-        }
     }
 }
