@@ -81,7 +81,7 @@ impl ModelArgs {
 
     /// The mask model that masks of this source take.
     pub fn mask_model(&self, of: MaskSource, rig: &Rig) -> Result<Option<Model>, TaskError> {
-        self.found().mask_model(of, self.mask_bundle.as_deref(), rig)
+        Model::of_masks(of, self.found(), self.mask_bundle.as_deref(), rig)
     }
 
     /// The bundle's defaults with what the command line says instead.

@@ -54,6 +54,8 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch masks export", How::Run(&[], "", &[0])),
     ("touch2touch masks import", How::Run(&[], "", &[0])),
     ("touch2touch masks train", How::Run(&[("10", "0.01")], "--test-in-train", &[0])),
+    ("touch2touch masks train PATH --from cad", How::Run(&[], "--minutes 0.01 --test-in-train", &[0])),
+    ("touch2touch masks train PATH --from cad --minutes", How::Run(&[("3", "0.01")], "--test-in-train", &[0])),
     ("touch2touch masks compare", How::Run(&[], "", &[0])),
     ("touch2touch masks propose", How::Run(&[("24", "1"), ("is:todo", "tool:pattern")], "", &[0])),
     ("touch2touch masks queue", How::Run(&[], "", &[0])),
@@ -66,7 +68,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
     // Without an engine on the machine it says so by its exit code.
     ("touch2touch runtime", How::Run(&[], "", &[0, 1])),
-    ("touch2touch runtime --fetch", How::Parse),
 ];
 
 fn how(command: &str) -> &'static How {

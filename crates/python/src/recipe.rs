@@ -13,7 +13,7 @@ use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::recipe::{Recipe as Whole, Stage, meters};
+use touch2touch_work::recipe::{Model, Recipe as Whole, Stage, meters};
 
 use crate::process::{failed, refused};
 
@@ -131,7 +131,7 @@ impl Recipe {
                     config.map(|config| (bundle.into(), config))
                 }
             };
-            let mask_model = found.mask_model(mask.source, mask_bundle.as_deref(), &rig)?;
+            let mask_model = Model::of_masks(mask.source, &found, mask_bundle.as_deref(), &rig)?;
             let hand = hand.unwrap_or(true);
             Ok(Whole { imprint, generator, shift, mask, mask_model, hand, registration, engine })
         });

@@ -7,8 +7,6 @@ use crate::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
 use crate::io::model_id::current;
-use crate::mask::MaskSource;
-use crate::recipe::Model;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::fit::FitSource;
@@ -240,20 +238,5 @@ impl FoundBundles {
             };
             TaskError::new(what, why).with_hint("Name one with an option, or put it into a folder of bundles.")
         })
-    }
-
-    /// The model that masks of this source take, the named one or the first found; `None` where they take none. The automatic
-    /// source does without one where none is named and none was found.
-    ///
-    /// # Errors
-    /// Those of [`FoundBundles::take`].
-    pub fn mask_model(&self, of: MaskSource, named: Option<&Path>, rig: &Rig) -> Result<Option<Model>, TaskError> {
-        if !matches!(of, MaskSource::Auto | MaskSource::Unet) {
-            return Ok(None);
-        }
-        match self.take(BundleKind::Mask, named, rig) {
-            Err(_) if of == MaskSource::Auto && named.is_none() => Ok(None),
-            found => Ok(Some(found?.into())),
-        }
     }
 }

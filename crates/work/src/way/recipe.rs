@@ -3,11 +3,12 @@
 mod words;
 
 use std::ops::Deref;
+use std::path::Path;
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
 
-use super::bundles::BundleInfo;
+use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::mask::{MaskChoice, MaskRecipe, MaskSource};
 use super::predict::Generating;
 use crate::error::TaskError;
@@ -18,6 +19,7 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::ensemble::seeds;
 use touch2touch_core::pose::{Registration, RegistrationChoice};
 use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::rig::Rig;
 
 pub use crate::infer::recipe_id::RecipeId;
 pub use words::{Words, meters, millimeters, quoted};
@@ -93,6 +95,28 @@ impl Deref for Model {
 
     fn deref(&self) -> &BundleInfo {
         &self.0
+    }
+}
+
+impl Model {
+    /// The model that masks of this source take, the named one or the first found; `None` where they take none. The automatic
+    /// source does without one where none is named and none was found.
+    ///
+    /// # Errors
+    /// Those of [`FoundBundles::take`].
+    pub fn of_masks(
+        of: MaskSource,
+        found: &FoundBundles,
+        named: Option<&Path>,
+        rig: &Rig,
+    ) -> Result<Option<Self>, TaskError> {
+        if !matches!(of, MaskSource::Auto | MaskSource::Unet) {
+            return Ok(None);
+        }
+        match found.take(BundleKind::Mask, named, rig) {
+            Err(_) if of == MaskSource::Auto && named.is_none() => Ok(None),
+            model => Ok(Some(model?.into())),
+        }
     }
 }
 
