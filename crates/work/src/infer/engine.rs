@@ -300,7 +300,8 @@ pub fn resolve(choice: EngineChoice) -> Result<EngineKind, EngineError> {
         EngineChoice::Rten => Ok(EngineKind::Rten),
         EngineChoice::Auto if library().is_err() => Ok(EngineKind::Rten),
         EngineChoice::Auto => {
-            let works = |provider: &Provider| provider.is_a_default() && try_provider(*provider).is_ok();
+            // What compiles for minutes is no default.
+            let works = |provider: &Provider| *provider != Provider::TensorRt && try_provider(*provider).is_ok();
             Ok(Provider::iter().find(works).map_or(EngineKind::Ort, EngineKind::On))
         }
         EngineChoice::Ort => found().map(|()| EngineKind::Ort),

@@ -70,11 +70,6 @@ impl Provider {
         }
     }
 
-    /// `false` where it has to be asked for by name: what compiles for minutes is no default.
-    pub(super) fn is_a_default(self) -> bool {
-        self != Self::TensorRt
-    }
-
     /// Memory of its own: batches are run at once there, and no limit of the process counts it.
     pub(crate) fn has_own_memory(self) -> bool {
         // OpenVINO's device is the processor unless a GPU is named, which nothing here does.

@@ -1,5 +1,6 @@
 //! ONNX Runtime on this machine: what was found of it, what it can run graphs on, and how it is fetched.
 
+#[cfg(feature = "onnx")]
 mod device;
 mod fetch;
 
@@ -7,6 +8,7 @@ use std::fmt;
 use std::path::PathBuf;
 
 use serde::Serialize;
+#[cfg(feature = "onnx")]
 use strum::IntoEnumIterator as _;
 
 use super::engine::{self, EngineChoice, EngineKind, Provider};

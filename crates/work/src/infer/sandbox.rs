@@ -9,7 +9,7 @@
 //! with the program are not tried at all.
 //!
 //! What an execution provider computes is also compared with the processor's own outputs ([`compare`]), for the bundles that
-//! ship too, and where it differs by more than [`Provider::tolerance`] or fails, the automatic choice goes on with the
+//! ship too, and where it differs by more than [`super::engine::Provider::tolerance`] or fails, the automatic choice goes on with the
 //! processor.
 //!
 //! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
