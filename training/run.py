@@ -177,7 +177,7 @@ class Parts(torch.utils.data.Dataset):
         batch = np.sort(numbers(seed, index * size, size, len(shards)))
         rng = np.random.default_rng((seed, step, size, part) if part else (seed, step, size))
         # What the network itself draws begins at the same place too.
-        return seed * 1_000_003 + step + part * 500_009, self.prepare(shards, batch, self.args, rng)
+        return index, seed * 1_000_003 + step + part * 500_009, self.prepare(shards, batch, self.args, rng)
 
     def ends_a_pass(self, index):
         return (index + 1) * self.size % len(self.shards) < self.size
@@ -192,12 +192,9 @@ def batches(shards, run, size, prepare):
         ready = iter(torch.utils.data.DataLoader(parts, batch_size=None, sampler=order_of_parts, num_workers=run.args.workers,
                                                  collate_fn=lambda part: part, pin_memory=run.place.device.type == "cuda"))
     else:
-        ready = ((index, parts[index]) for index in order_of_parts)
+        ready = (parts[index] for index in order_of_parts)
     while not run.over():
-        if run.args.workers:
-            seed, batch = next(ready)
-        else:
-            index, (seed, batch) = next(ready)
+        index, seed, batch = next(ready)
         torch.manual_seed(seed)
         yield run.place.moved(batch)
         if not run.args.workers and parts.ends_a_pass(index):

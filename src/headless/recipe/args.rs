@@ -158,7 +158,7 @@ impl MappingArgs {
 /// The engine that runs the models, as the command line says it.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct RuntimeArg {
-    /// What runs the models: ONNX Runtime where its library is found, on a GPU that it can use, else on the processor, else
+    /// Engine that runs the models: ONNX Runtime where its library is found, on a GPU that it can use, else on the processor, else
     /// the built-in engine (`auto`); the built-in engine (`rten`); ONNX Runtime on the processor (`ort`); or on what a
     /// provider of it stands for (`touch2touch runtime` lists them).
     #[arg(long = "runtime", value_name = "RUNTIME", default_value = "auto", value_parser = choices())]

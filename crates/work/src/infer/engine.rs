@@ -92,7 +92,7 @@ impl EngineChoice {
         [Self::Auto, Self::Rten, Self::Ort].into_iter().chain(Provider::iter().map(Self::On))
     }
 
-    /// Those that the system of this program can have.
+    /// Choices that the system of this program can have.
     pub fn possible() -> impl Iterator<Item = Self> {
         Self::all().filter(|choice| !matches!(choice, Self::On(provider) if !provider.is_possible_here()))
     }

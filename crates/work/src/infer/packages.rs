@@ -7,7 +7,7 @@ use crate::io::folders;
 
 /// A package of Python's index with a library of ONNX Runtime inside.
 pub(super) struct Package {
-    /// What the library can do besides the processor; the first names its folder.
+    /// Providers that the library has; the first names its folder.
     providers: &'static [Provider],
     pub(super) name: &'static str,
     pub(super) version: &'static str,
@@ -106,7 +106,7 @@ impl Package {
         self.wheels.iter().find(|wheel| wheel.os == os && wheel.arch == arch)
     }
 
-    /// Its folder under the one of fetched libraries.
+    /// Folder of the library, under the one of fetched libraries.
     pub(super) fn folder(&self, all: &Path) -> PathBuf {
         // The plain one was there before there were others.
         match self.providers {

@@ -42,9 +42,9 @@ pub struct ProviderReport {
     pub provider: Provider,
     /// It ran a graph just now.
     pub works: bool,
-    /// Its device and the device's memory, where that can be found out.
+    /// Device with its memory, where that can be found out.
     pub device: Option<String>,
-    /// Why it does not work, and what to do about it.
+    /// Reason that it does not work, and what to do about it.
     pub reason: Option<String>,
 }
 

@@ -9,13 +9,13 @@
 //! with the program are not tried at all.
 //!
 //! What an execution provider computes is also compared with the processor's own outputs ([`compare`]), for the bundles that
-//! ship too, and where it differs by more than [`super::engine::Provider::tolerance`] or fails, the automatic choice goes on with the
-//! processor.
+//! ship too, and where it differs by more than [`super::engine::Provider::tolerance`] or fails, the automatic choice goes on
+//! with the processor.
 //!
 //! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
 //! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
-//! the memory, but it is the second process that ends; a provider that maps a device's memory has no bound). Not bounded is what a graph asks for on other values than
-//! zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
+//! the memory, but it is the second process that ends; a provider that maps a device's memory has no bound). Not bounded is
+//! what a graph asks for on other values than zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
 //! second process; it compares, and tries nothing else.
 
 mod compare;

@@ -103,7 +103,7 @@ impl Model {
     /// source does without one where none is named and none was found.
     ///
     /// # Errors
-    /// Those of [`FoundBundles::take`].
+    /// Errors of [`FoundBundles::take`].
     pub fn of_masks(
         of: MaskSource,
         found: &FoundBundles,
