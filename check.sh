@@ -37,8 +37,15 @@ if [ "$(uname -sm)" = "Linux x86_64" ]; then
   cargo run --locked --quiet --features ui-test -- runtime --fetch --provider openvino --dir "$TOUCH2TOUCH_OPENVINO"
 fi
 
+step "the Python package: its wheel in a fresh environment"
+python3 -m venv --clear target/python-venv
+python=target/python-venv/bin/python
+"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars
+"$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
+"$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
+
 step "tests: files, models on both engines, GPU on a software driver, the studio by clicks and keys"
-export REQUIRE_GPU=1 REQUIRE_ORT=1
+export REQUIRE_GPU=1 REQUIRE_ORT=1 REQUIRE_PYTHON=1 TOUCH2TOUCH_PYTHON="$PWD/$python"
 if [ -z "${VK_DRIVER_FILES:-}" ]; then
   # One named driver for every machine: pictures and timings of the tests then mean the same everywhere.
   driver=$(find /usr/share/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1)
@@ -46,12 +53,7 @@ if [ -z "${VK_DRIVER_FILES:-}" ]; then
 fi
 cargo test --locked -p touch2touch -p touch2touch-work -p touch2touch-bench --features ui-test
 
-step "the Python package: its wheel in a fresh environment, types, tests"
-python3 -m venv --clear target/python-venv
-python=target/python-venv/bin/python
-"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars
-"$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
-"$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
+step "the Python package: tests, types"
 TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
 "$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 

@@ -19,6 +19,7 @@ mod guard;
 mod label;
 mod ledger;
 mod masks;
+mod merge;
 mod models;
 mod notes;
 mod output;
@@ -27,6 +28,7 @@ mod read_as;
 mod recipe;
 mod report;
 mod seeds;
+mod shards;
 mod simulate;
 mod stats;
 mod still;
@@ -130,6 +132,9 @@ enum Verb {
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
+    /// Put the parts of a run together that `--shard I/N` made of `generate`, `pose`, `sweep` or `masks propose`: what one run prints.
+    /// (`evaluate` keeps its parts beside the predictions: run it without --shard.)
+    Merge(merge::MergeArgs),
     /// Predictions kept on the disk: how many, where, and a way to remove them.
     Cache(cache::CacheArgs),
     /// Say which model runtime is used and why, or fetch the faster one.
@@ -292,6 +297,7 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::ReadAs(args)) => read_as::run(&args),
         Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
+        Some(Verb::Merge(args)) => merge::run(&args),
         Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),
     }

@@ -5,8 +5,10 @@ mod exchange;
 mod in_3d;
 mod influence;
 mod proposals;
+mod python;
 mod random;
 mod recipes;
+mod shards;
 mod stills;
 mod verbs;
 mod verdicts;
@@ -96,6 +98,8 @@ fn how(action: Action) -> How {
         A::PredictAll => Verb(&["evaluate", "demo"]),
         A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),
         A::TurnDial => Verb(&["sweep", "demo", "--dial", "threshold", "--values", "3,4,5", "--pairs", "8"]),
+        // They were computed by the Python package; the studio only lists them.
+        A::OpenScores => Window,
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),

@@ -31,6 +31,13 @@ pub(crate) fn torch() -> Option<OsString> {
     python.or_else(|| left_out("TOUCH2TOUCH_TORCH_PYTHON is not set: PyTorch itself is not asked", "REQUIRE_TORCH"))
 }
 
+/// A Python with the package installed, named by `TOUCH2TOUCH_PYTHON`, as the check script has made it. `REQUIRE_PYTHON=1`
+/// demands it.
+pub(crate) fn python() -> Option<PathBuf> {
+    let python = std::env::var_os("TOUCH2TOUCH_PYTHON").map(PathBuf::from);
+    python.or_else(|| left_out("TOUCH2TOUCH_PYTHON names no Python with the package", "REQUIRE_PYTHON"))
+}
+
 /// The folder of an ONNX Runtime with OpenVINO, as the check script has fetched it.
 #[cfg(feature = "onnx")]
 pub(crate) fn openvino() -> Option<String> {

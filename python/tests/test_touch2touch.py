@@ -4,6 +4,7 @@ import json
 import multiprocessing
 import os
 import pickle
+import shutil
 import signal
 import subprocess
 import sys
@@ -281,8 +282,66 @@ def test_scores_are_a_table_and_filter_the_data(demo):
     worse = demo.filter("psnr<99", scores)
     assert 0 < len(worse) < len(demo), "only what was scored"
     assert len(demo.filter("measured:angle>90", scores)) == 0
-    with pytest.raises(t2t.Refused, match="scored whole"):
-        t2t.evaluate(demo[:4])
+    part = t2t.evaluate(demo[:4], resamples=0).json()
+    assert [grasp["pair"] for grasp in part["pairs"][0]["grasps"]] == demo.names[:4]
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A data set of one's own, that labels can be stored beside."""
+    folder = tmp_path / "lab"
+    verb("simulate", "--tools", "pattern_36", "--grasps", "2", "--out", str(folder))
+    return t2t.open(folder)
+
+
+def test_masks_are_drawn_by_gestures_and_exported(written, tmp_path):
+    pair = written[0]
+    automatic = t2t.feel(pair, stage="mask").mask
+    assert pair.drawn_mask is None and pair.review == "todo" and pair.note == ""
+    square = {"tool": "rectangle", "paint": "contact", "points": [[10, 20], [29, 39]]}
+    t2t.label(pair, draw=[square], finger="right", note="a corner", person="Ada")
+    right, left = pair.drawn_mask
+    assert right[20:40, 10:30].all() and not left.any() and pair.review == "in_progress" and pair.note == "a corner"
+    outside = np.ones_like(right)
+    outside[20:40, 10:30] = False
+    assert np.array_equal(right[outside], automatic[0][outside])
+    # A mask that was drawn is what is felt from then on, unless it is not to be.
+    assert np.array_equal(t2t.feel(pair, stage="mask").mask[0], right)
+    assert np.array_equal(t2t.feel(pair, t2t.Recipe(hand=False), stage="mask").mask, automatic)
+    t2t.label(pair, clean=["fill_holes", "grow=1.5"], finger="right")
+    assert pair.drawn_mask[0].sum() > right.sum()
+    t2t.label(pair, begin="cad_truth", over_drawn=True, accept=True, review="done")
+    assert pair.review == "done" and pair.drawn_mask[1].any()
+    counts = t2t.export_masks(written, tmp_path / "masks")
+    assert counts["train"] + counts["val"] + counts["test"] == counts["by_hand"] == 2
+    every = t2t.export_masks(written, tmp_path / "all", pairs="all", recipe=t2t.Recipe(mask="threshold"))
+    assert every["train"] + every["val"] + every["test"] == 4 and every["by_hand"] == 2
+    t2t.label(pair, begin="remove")
+    assert pair.drawn_mask is None
+    for call, words in [
+        (lambda: t2t.label(pair, draw=[{"tool": "brush", "radius_px": -1, "points": [[1, 1]]}]), "radius"),
+        (lambda: t2t.label(pair, draw=[square | {"points": [[900, 900], [901, 901]]}]), "touches no pixel"),
+        (lambda: t2t.label(pair, begin="guess"), "cad_truth"),
+        (lambda: t2t.label(pair, clean=["polish"]), "fill_holes"),
+        (lambda: t2t.label(pair, finger="thumb"), "right, left, both"),
+        (lambda: t2t.label(t2t.simulate("pattern_36"), note="x"), "simulate"),
+        (lambda: t2t.export_masks(written, tmp_path / "none", pairs="some"), "begun"),
+    ]:
+        with pytest.raises(t2t.Refused, match=words):
+            call()
+    assert pair.drawn_mask is None, "nothing is stored of what cannot be done"
+
+
+def test_labels_are_the_verbs(written, tmp_path):
+    """The same words to the package and to the verb leave the same files."""
+    other = tmp_path / "other"
+    shutil.copytree(tmp_path / "lab", other)
+    drawing = {"tool": "lasso", "paint": "free", "points": [[60, 40], [110, 45], [100, 90], [55, 80]]}
+    t2t.label(written[1], draw=[drawing], clean=["grow=1"], review="done", note="looked at", person="Ada")
+    verb("label", str(other), "--pair", written.names[1], "--draw", json.dumps(drawing), "--clean", "grow=1", "--review", "done",
+         "--note", "looked at", "--person", "Ada")
+    there = t2t.open(other)[1]
+    assert np.array_equal(there.drawn_mask, written[1].drawn_mask) and (there.review, there.note) == ("done", "looked at")
 
 
 def test_pictures_draw_themselves(pair):

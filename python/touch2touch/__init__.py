@@ -25,10 +25,12 @@ from ._native import (
     adapt,
     bundles,
     evaluate,
+    export_masks,
     feel,
     feel_many,
     figure,
     frechet,
+    label,
     open,
     psnr,
     register,
@@ -40,8 +42,8 @@ from ._many import predict, predict_many, table
 
 __all__ = [
     "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
-    "evaluate", "feel", "feel_many", "figure", "frechet", "open", "predict", "predict_many", "psnr", "register",
-    "register_many", "simulate", "ssim", "table",
+    "evaluate", "export_masks", "feel", "feel_many", "figure", "frechet", "label", "open", "predict", "predict_many", "psnr",
+    "register", "register_many", "simulate", "ssim", "table",
 ]
 
 

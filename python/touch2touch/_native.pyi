@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
-    "bundles", "evaluate", "feel", "feel_many", "figure", "frechet", "open", "psnr", "register", "register_many",
-    "simulate", "ssim",
+    "bundles", "evaluate", "export_masks", "feel", "feel_many", "figure", "frechet", "label", "open", "psnr", "register",
+    "register_many", "simulate", "ssim",
 ]
 __version__: str
 
@@ -70,6 +70,10 @@ class Pair:
     def tool(self) -> Tool: ...
     @property
     def drawn_mask(self) -> NDArray[np.bool_] | None: ...
+    @property
+    def review(self) -> str: ...
+    @property
+    def note(self) -> str: ...
     @property
     def notes(self) -> list[str]: ...
     def _repr_svg_(self) -> str | None: ...
@@ -173,6 +177,34 @@ def register_many(
     progress: _Progress = None,
 ) -> list[Pose | None]: ...
 def figure(pair: Pair, recipe: Recipe | None = None, *, columns: Sequence[str] | None = None) -> str: ...
+def label(
+    pair: Pair,
+    *,
+    draw: Sequence[dict[str, Any]] | None = None,
+    clean: Sequence[str] | None = None,
+    begin: str | None = None,
+    over_drawn: bool = False,
+    finger: str = "both",
+    recipe: Recipe | None = None,
+    accept: bool = False,
+    pose: tuple[float, float, float] | None = None,
+    review: str | None = None,
+    note: str | None = None,
+    person: str | None = None,
+) -> None: ...
+def export_masks(
+    data: Dataset | str | PathLike[str],
+    out: str | PathLike[str],
+    *,
+    format: str | None = None,
+    pairs: str = "done",
+    test_in_train: bool = False,
+    by_tool: bool = False,
+    manual_checked: bool = False,
+    seed: int = 0,
+    recipe: Recipe | None = None,
+    progress: _Progress = None,
+) -> dict[str, int]: ...
 def psnr(prediction: NDArray[np.float32], truth: NDArray[np.float32], *, peak: float | None = None) -> float: ...
 def ssim(
     prediction: NDArray[np.float32],

@@ -129,6 +129,8 @@ macro_rules! actions {
             state => when(state.tasks.of_kind(TaskKind::Dial).is_none() && dial::setup(state).is_ok(), DialCommand::Start);
         RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
+        OpenScores, Generate, "Open scores…", "Shows the rows of touches that were felt elsewhere (Parquet, from Python) as scores of the open data set, the worst first", [],
+            state => opened(state, ViewCommand::Ui(UiRequest::PickScores));
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
         CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke, rejects a proposal", [plain(K::Escape)],

@@ -385,6 +385,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.results = Results::default();
     state.table.result = None;
     state.table.scores = Arc::default();
+    state.table.rows = None;
     state.library.brush = None;
     state.library.ticked.clear();
     state.dial = DialState { result: None, ..state.dial.clone() };

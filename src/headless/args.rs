@@ -50,11 +50,8 @@ pub(super) struct SensorsArgs {
 impl SensorsArgs {
     /// The sensors that were named.
     pub(super) fn sensors(self) -> Sensors {
-        match (self.sensors, self.gelslims) {
-            (Some(seed), _) => Sensors::Drawn(seed),
-            (None, Some(seed)) => Sensors::OtherGelslims(seed),
-            (None, None) => Sensors::Nominal,
-        }
+        // The parser has refused both.
+        Sensors::named(self.sensors, self.gelslims).unwrap_or_default()
     }
 }
 

@@ -7,6 +7,7 @@ mod queue;
 mod stats;
 mod train;
 
+pub(super) use propose::merge as merge_proposals;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -19,17 +20,11 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
 use touch2touch_work::agreement::{Agreements, compare_labels};
-use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
-use touch2touch_work::feel::{Felt, Touch};
 use touch2touch_work::io::exchange::{ExportReport, Format};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, Labels, PairLabels};
-use touch2touch_work::recipe::{Recipe, Stage};
-use touch2touch_work::tool::Tools;
+use touch2touch_work::labels::{ImprintSource, Labels};
+use touch2touch_work::recipe::Recipe;
 
 /// Verbs of masks.
 #[derive(Debug, Subcommand)]
@@ -211,30 +206,13 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let registration = RegistrationChoice::default();
     let recipe = args.model.posed(ImprintSource::Measured, &dataset.rig, &args.mask, registration);
     let recipe = if automatic_too { recipe? } else { Recipe::default() };
-    let mut tools = Tools::new(&dataset);
-    let mut automatic = |pair: PairId, sample: &Sample, finger: PadId, tool: Option<&str>| {
-        const WHAT: &str = "Contact mask";
-        let tool = tool.and_then(|name| tools.get(name));
-        let there = sample.pad(finger).ok_or_else(|| TaskError::new(WHAT, "it has no such finger"))?;
-        let bubble = there.depth().ok_or_else(|| TaskError::new(WHAT, "it has no such imprint"))?;
-        let lacks = TaskError::new(WHAT, "the tool's CAD model is not there");
-        let labels = PairLabels::default();
-        let touch = Touch { dataset: &dataset, pair, sample, tool: tool.ok_or(&lacks), labels: &labels };
-        let mut only = PerPad::default();
-        only[finger] = Some(bubble.imprint.clone());
-        let felt = Felt::of_imprints(&recipe, only).reach(touch, Stage::Mask, &models, &JobCx::unwatched())?;
-        let found = felt.contact().masks[finger].as_ref().ok_or_else(|| TaskError::new(WHAT, "there is no mask"))?;
-        if let Some(note) = found.basis.note() {
-            output.note(&format!("note: {} finger: {note}", sample.rig.pad_key(finger)));
-        }
-        Ok(found.mask.clone())
-    };
     let labels = Labels::of(&dataset);
     let masks = DrawnMasks { labels: &labels, changed: &BTreeMap::new() };
     let (plan, written) = if args.dry_run {
         (plan(&dataset, &masks, &setup)?, None)
     } else {
-        let automatic: Option<Automatic<'_>> = automatic_too.then_some(&mut automatic);
+        let note = |note: &str| output.note(note);
+        let automatic = automatic_too.then(|| Automatic::new(&dataset, &recipe, &models, &note));
         let (plan, report) = export_masks(&dataset, &masks, &setup, &args.out, automatic, &output.job())?;
         let ExportReport { out_of_range_px, unmeasured_px, .. } = report;
         (plan, Some(Written { out_of_range_px, unmeasured_px }))

@@ -13,6 +13,7 @@ use super::notes::Notes;
 use super::output::says;
 use super::recipe::misgiving;
 use super::report::output_stems;
+use super::shards::{Parts, Sharded};
 use super::{Output, VerbResult, seeds};
 use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::ambiguity::ambiguity;
@@ -32,7 +33,7 @@ use touch2touch_work::trials::of_pair;
 
 use args::{Imprints, registration};
 pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
-use report::{Accepted, PoseRow, RankedTool, Report, summary, text};
+use report::{Accepted, Figures, First, PoseParts, PoseRow, RankedTool, Report, summary, summary_text, text};
 
 /// Word of `--tool` for trying all tools.
 const ANY: &str = "any";
@@ -51,8 +52,10 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             None => Ok(vec![None; ids.len()]),
         }
     };
-    let stems = stems(&args.fans.fan_out)?.into_iter().zip(stems(&args.influence)?).collect::<Vec<_>>();
-    let output = Output::new(args.common, "aligning", ids.len());
+    // Names of files are those of one run.
+    let stems = stems(&args.fans.fan_out)?.into_iter().zip(stems(&args.influence)?);
+    let work = args.shard.share(ids.iter().copied().zip(stems).collect());
+    let output = Output::new(args.common, "aligning", work.len());
     let models = args.model.models();
     let recipe = args.recipe(&dataset.rig)?;
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -62,7 +65,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
     let open = TaskError::new("Pose", "the tool is not known yet");
-    for (id, (stem, influence)) in ids.into_iter().zip(stems) {
+    for (id, (stem, influence)) in work {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -136,11 +139,25 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             }
         }
     }
-    complete &= !cases.is_empty();
+    complete &= !cases.is_empty() || args.shard.shard.is_some();
+    let problems = notes.for_part(args.shard);
     let notes = notes.into_list(&output);
-    let report = Report { summary: summary(&cases, imprints[0].key(), args.registration.0[0]), cases, notes };
-    output.finish(&report, || text(&report))?;
-    Ok(complete)
+    let figures: Vec<Figures> = cases.iter().map(Figures::from).collect();
+    let of = First { registration: args.registration.0[0].to_string(), imprint: imprints[0].key().to_owned() };
+    let report = Report { summary: summary(&figures, of), cases, notes };
+    args.shard.finish(output, (Sharded::Pose, complete), problems, &report, || text(&report))
+}
+
+/// The parts of a run as one.
+pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
+    let reports: Vec<PoseParts> = parts.reports()?;
+    let of = reports.iter().map(|report| report.summary.of.clone()).next();
+    let of = of.ok_or_else(|| anyhow::anyhow!("there are no parts to merge"))?;
+    let cases: Vec<_> = reports.into_iter().flat_map(|report| report.cases).collect();
+    let figures = cases.iter().map(|case| serde_json::from_str(case.get())).collect::<Result<Vec<Figures>, _>>()?;
+    let report = Report { summary: summary(&figures, of), cases, notes: parts.notes() };
+    output.finish(&report, || summary_text(&report.summary))?;
+    Ok(parts.complete() && !report.cases.is_empty())
 }
 
 /// A pair as `pose` asks for it.

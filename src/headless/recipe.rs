@@ -6,12 +6,12 @@ use std::path::{Path, PathBuf};
 
 use super::contact_mask::MaskArgs;
 use touch2touch_core::dataset::Problem;
-use touch2touch_core::diffusion::{GenerateConfig, Spacing};
+use touch2touch_core::diffusion::Spacing;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::{self, BundleInfo, BundleKind, FoundBundles};
+use touch2touch_work::bundles::{self, BundleInfo, FoundBundles};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint;
 use touch2touch_work::infer::bundle::Bundle;
@@ -19,7 +19,7 @@ use touch2touch_work::infer::engine::{EngineChoice, resolve};
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::MaskSource;
 use touch2touch_work::models::Models;
-use touch2touch_work::recipe::{Model, Recipe};
+use touch2touch_work::recipe::{GeneratorChoice, Model, Recipe};
 use touch2touch_work::tuning::unfinished_folder;
 
 pub(super) use args::MappingArgs;
@@ -58,11 +58,26 @@ impl ModelArgs {
             // Without a generator nothing is read by it; what was asked for is still said.
             return Ok(Recipe { shift: self.mapping.mode(None).unwrap_or_default(), ..recipe });
         }
-        let bundle = self.found().take(BundleKind::Generator, self.bundle.as_deref(), rig)?;
-        bundle.ends(rig).transpose()?;
-        let shift = self.mapping.mode(Some((&bundle.name, &bundle.id)))?;
-        let config = self.config(&bundle)?;
-        Ok(Recipe { generator: Some((bundle.into(), config)), shift, ..recipe })
+        let (generator, shift) = self.generator_choice()?.of(self.found(), rig)?;
+        Ok(Recipe { generator: Some(generator), shift, ..recipe })
+    }
+
+    /// The generator as the command line says it.
+    fn generator_choice(&self) -> anyhow::Result<GeneratorChoice> {
+        Ok(GeneratorChoice {
+            bundle: self.bundle.clone(),
+            preset: self.preset,
+            steps: self.steps,
+            seed: self.seed,
+            eta: self.eta,
+            sampler: self.sampler,
+            spacing: self.spacing.map(|spacing| match spacing {
+                SpacingArg::Trailing => Spacing::Trailing,
+                SpacingArg::Lab => Spacing::Lab,
+            }),
+            guidance: self.guidance,
+            shift: self.mapping.choice()?,
+        })
     }
 
     /// Recipe with masks and a registration. A mask model is looked for where one is taken.
@@ -82,27 +97,6 @@ impl ModelArgs {
     /// The mask model that masks of this source take.
     pub fn mask_model(&self, of: MaskSource, rig: &Rig) -> Result<Option<Model>, TaskError> {
         Model::of_masks(of, self.found(), self.mask_bundle.as_deref(), rig)
-    }
-
-    /// The bundle's defaults with what the command line says instead.
-    fn config(&self, bundle: &BundleInfo) -> anyhow::Result<GenerateConfig> {
-        let Some(info) = &bundle.generator else { anyhow::bail!("the bundle {} is no generator", bundle.name) };
-        let preset = self.preset.config(info.defaults, info.training_steps);
-        let spacing = self.spacing.map(|spacing| match spacing {
-            SpacingArg::Trailing => Spacing::Trailing,
-            SpacingArg::Lab => Spacing::Lab,
-        });
-        let config = GenerateConfig {
-            steps: self.steps.unwrap_or(preset.steps),
-            seed: self.seed.unwrap_or(preset.seed),
-            eta: self.eta.unwrap_or(preset.eta),
-            sampler: self.sampler.unwrap_or(preset.sampler),
-            spacing: spacing.unwrap_or(preset.spacing),
-            guidance: self.guidance.unwrap_or(preset.guidance),
-        };
-        // Said once, before the first pair, rather than for every pair.
-        bundle.check_guidance(config.guidance)?;
-        Ok(config)
     }
 }
 

@@ -5,6 +5,7 @@ use clap::Args;
 use super::args::{DatasetArgs, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
+use super::shards::{Parts, ShardArg, Sharded};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
@@ -40,6 +41,8 @@ pub(super) struct SweepArgs {
     #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
     registration: RegistrationChoice,
     #[command(flatten)]
+    shard: ShardArg,
+    #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
     tool: ToolArgs,
@@ -57,6 +60,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     } else {
         args.only.iter().map(|name| super::find_pair(&dataset, name)).collect::<anyhow::Result<_>>()?
     };
+    let pairs = args.shard.share(pairs);
     let output = Output::new(args.common, "turning the dial", pairs.len());
     let models = args.model.models();
     let imprint = if args.measured_only { ImprintSource::Measured } else { ImprintSource::Predicted };
@@ -70,8 +74,14 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }
     let complete = found.complete && found.left_out.is_empty();
+    args.shard.finish(output, (Sharded::Sweep, complete), Vec::new(), &found, || text(&found))
+}
+
+/// The parts of a run as one.
+pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
+    let found = Sweep::joined(parts.reports()?)?;
     output.finish(&found, || text(&found))?;
-    Ok(complete)
+    Ok(parts.complete())
 }
 
 /// Settings that the dial is turned to.
@@ -87,7 +97,7 @@ fn values(args: &SweepArgs) -> Result<Vec<Setting>, String> {
     args.values.iter().map(parse).collect()
 }
 
-fn text(found: &Sweep) -> String {
+fn text<M>(found: &Sweep<M>) -> String {
     let mut text = format!("{}: {}, {} pairs\n", found.dataset, found.dial.name().to_lowercase(), found.pairs);
     for series in &found.series {
         text += &format!("\n{}", table(found.dial, series));

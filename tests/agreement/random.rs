@@ -35,11 +35,11 @@ use super::{Studio, lab_folder, pictures_folder};
 use crate::support::run;
 
 /// Draws at random, and the same in each run of the tests.
-struct Draws(TestRunner);
+pub(super) struct Draws(TestRunner);
 
 impl Draws {
     /// The draws of a test, by a number of its own.
-    fn new(test: u8) -> Self {
+    pub(super) fn new(test: u8) -> Self {
         let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &[test; 32]);
         Self(TestRunner::new_with_rng(Config::default(), rng))
     }
@@ -64,7 +64,7 @@ impl Draws {
     }
 
     /// The same with masks and a registration that give a pose soon.
-    fn posed(&mut self) -> Recipe {
+    pub(super) fn posed(&mut self) -> Recipe {
         let recipe = self.recipe();
         let mut mask = recipe.mask;
         (mask.threshold_m, mask.top_percent) = (self.one(0.002..0.007f32), self.one(4.0..20.0f32));

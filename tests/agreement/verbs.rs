@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{chain, compared, files, labels, posed, tables, watched};
-use super::{exchange, influence, proposals, recipes, stills};
+use super::{exchange, influence, proposals, python, recipes, shards, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -38,6 +38,7 @@ fn held(verb: &str) -> Option<Held> {
             posed::what_a_random_angle_hangs_on_is_the_same_over_the_imprint_and_by_the_verb,
             chain::the_seeds_of_a_random_recipe_have_one_mean_spread_and_fan_in_the_pane_and_by_the_verbs,
             influence::what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb,
+            python::a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb,
         ]),
         "compare" => By(&[
             compared::any_two_imprints_differ_by_the_same_in_the_pane_and_by_the_verb,
@@ -85,6 +86,11 @@ fn held(verb: &str) -> Option<Held> {
         "case make" | "case check" => {
             By(&[files::a_case_of_a_random_recipe_is_the_same_by_button_and_verb_and_the_verb_finds_it_so])
         }
+        "merge" => By(&[
+            shards::parts_of_a_run_are_merged_to_what_one_run_prints,
+            shards::masks_are_proposed_in_parts_as_at_once,
+            shards::an_evaluation_finds_what_its_parts_have_kept,
+        ]),
         "masks compare" => Not("the studio compares one person with oneself only (masks stats)"),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "trials" => Not("it simulates its grasps; the studio plays the trial of a pair, as `pose --trial`"),

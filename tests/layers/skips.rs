@@ -8,8 +8,16 @@ use std::path::Path;
 use crate::support::rust_files;
 
 /// What may stand to the right of `let Some(..) =` in a test that returns without it.
-const ASKS: &[&str] =
-    &["shared(", "support::shared(", "support::gpu(", "support::openvino(", "support::torch(", "View::new(", "Rig::"];
+const ASKS: &[&str] = &[
+    "shared(",
+    "support::shared(",
+    "support::gpu(",
+    "support::openvino(",
+    "support::python(",
+    "support::torch(",
+    "View::new(",
+    "Rig::",
+];
 
 /// The body of each test of a file, with its name.
 fn tests(text: &str) -> Vec<(&str, &str)> {

@@ -6,7 +6,7 @@
 //! there is, the touch is ambiguous. An end of the shaft, a bend, a crossing or a second contact within the window
 //! changes the picture in every direction.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::grid::RgbGrid;
 use super::resample::area;
@@ -24,7 +24,7 @@ const UNCHANGED: f64 = 0.3;
 const TOUCHED: f64 = 1.5;
 
 /// Ambiguity of a difference image: what it leaves open.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ambiguity {
     /// Kind of touch.
     pub kind: TouchKind,
@@ -37,7 +37,7 @@ pub struct Ambiguity {
 }
 
 /// Kinds of touches by what they tell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, strum::EnumIter)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum TouchKind {
     /// The picture tells where on the tool it is.

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::dataset::Problem;
 
@@ -11,7 +11,7 @@ use super::dataset::Problem;
 const EXAMPLES: usize = 5;
 
 /// One kind of problem, found `count` times. `file`, `what` and `hint` are those of the first, as in a [`Problem`].
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
     /// The file or folder.
     pub file: PathBuf,

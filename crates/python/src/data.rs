@@ -10,7 +10,6 @@ use pyo3::types::{PySlice, PyTuple};
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem};
 use touch2touch_core::evaluation::GraspScore;
-use touch2touch_core::grid::Grid;
 use touch2touch_core::read_as::parse_list;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -32,7 +31,7 @@ use crate::tool::Tool;
 /// A data set that is open, with what was read of it.
 pub(crate) struct Opened {
     pub(crate) source: Source,
-    labels: Labels,
+    pub(crate) labels: Labels,
     /// Path and choices that it was opened with, by which it pickles.
     path: PathBuf,
     read_as: Option<String>,
@@ -281,6 +280,20 @@ impl Pair {
         self.pads(|touch| touch.camera().map(&of)).collect()
     }
 
+    /// Labels that people gave it, as they are on the disk now.
+    fn labels(&self, py: Python<'_>) -> PyResult<PairLabels> {
+        let Of::Data(opened, _) = &self.of else { return Ok(PairLabels::default()) };
+        py.detach(|| opened.labels.load(&self.name)).map_err(|err| failed(&err))
+    }
+
+    /// The labels of its data set; `None` of one that was simulated here.
+    pub(crate) fn all_labels(&self) -> Option<&Labels> {
+        match &self.of {
+            Of::Data(opened, _) => Some(&opened.labels),
+            Of::Simulated(..) => None,
+        }
+    }
+
     /// The data set that it lies in, and where; `None` of one that was simulated here.
     pub(crate) fn place(&self) -> Option<(&Source, PairId)> {
         match &self.of {
@@ -414,15 +427,20 @@ impl Pair {
     /// Contact masks that people drew on the measured imprints: (2, 140, 175) bool; `None` where nobody did.
     #[getter]
     fn drawn_mask<'py>(&self, py: Python<'py>) -> PyResult<Option<Array<'py, bool>>> {
-        let Of::Data(opened, _) = &self.of else { return Ok(None) };
-        let labels = py.detach(|| opened.labels.load(&self.name)).map_err(|err| failed(&err))?;
-        let masks: Vec<Option<Grid<bool>>> = self
-            .sample
-            .rig
-            .pads()
-            .map(|pad| labels.masks.get(&touch2touch_work::labels::MaskPlace::measured(pad)).map(|d| (*d.mask).clone()))
-            .collect();
-        stack(py, masks.iter().map(Option::as_ref), false)
+        let labels = self.labels(py)?;
+        stack(py, self.sample.rig.pads().map(|pad| Some(&*labels.measured(pad)?.mask)), false)
+    }
+
+    /// Review state that people gave it: "todo", "in_progress", "done", "flagged" or "skip".
+    #[getter]
+    fn review(&self, py: Python<'_>) -> PyResult<&'static str> {
+        Ok(self.labels(py)?.review.stored())
+    }
+
+    /// Note that a person wrote about it; empty for none.
+    #[getter]
+    fn note(&self, py: Python<'_>) -> PyResult<String> {
+        Ok(self.labels(py)?.note)
     }
 
     /// Oddities of its files and numbers, a line each.
@@ -477,12 +495,7 @@ pub(crate) fn simulate(
     if ![angle, x, y].iter().all(|v| v.is_finite()) {
         return Err(refused("a grasp must be of finite numbers"));
     }
-    let chosen = match (sensors, gelslims) {
-        (Some(_), Some(_)) => return Err(refused("name other sensors or other GelSlims, not both")),
-        (Some(seed), None) => Sensors::Drawn(seed),
-        (None, Some(seed)) => Sensors::OtherGelslims(seed),
-        (None, None) => Sensors::Nominal,
-    };
+    let chosen = Sensors::named(sensors, gelslims).map_err(refused)?;
     let spec = catalog::tools().iter().find(|spec| spec.name == tool).ok_or_else(|| {
         let names: Vec<&str> = catalog::tools().iter().map(|spec| spec.name.as_str()).collect();
         refused(format!("no tool is named {tool:?}; there are: {}", names.join(", ")))

@@ -7,6 +7,7 @@
 mod arrays;
 mod data;
 mod felt;
+mod masks;
 mod measures;
 mod picture;
 mod process;
@@ -22,6 +23,8 @@ mod _native {
     use crate::data::{Dataset, Pair, open, simulate};
     #[pymodule_export]
     use crate::felt::{Felt, Pose, feel, feel_many, register, register_many};
+    #[pymodule_export]
+    use crate::masks::{export_masks, label};
     #[pymodule_export]
     use crate::measures::{frechet, psnr, ssim};
     #[pymodule_export]

@@ -1,28 +1,29 @@
 //! `Recipe`: everything that decides the result of a touch, as one value.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
 use strum::IntoEnumIterator as _;
-use touch2touch_core::diffusion::Sampler;
-use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_work::bundles;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::recipe::{Model, Recipe as Whole, Stage, meters};
+use touch2touch_work::recipe::{GeneratorChoice, Model, Recipe as Whole, ShiftChoice, Stage, meters};
 
 use crate::process::{failed, refused};
 
 /// Everything that decides the result of a touch: the imprint, the models with their choices, the mask, the registration.
 ///
 /// Choices that are not said are as the verbs have them. `imprint`: "measured" or "predicted". `bundle`, `mask_bundle`: folders of model
-/// bundles (default: the shipped ones). `steps`, `seed`, `sampler`: of the generator (default: the bundle's). `shift`: the
-/// mapping to meters, "exact", "paper" or "raw". `mask`: "auto", "unet", "threshold", "top_percent", "cad" or "truth", with
-/// `threshold_mm`. `engine`: the registration, such as "joint" or "gicp:gate=1.5". `hand`: masks drawn by hand win.
+/// bundles (default: the shipped ones). `preset`: "fast", "default" or "sharp", of which `steps`, `seed`, `eta`, `sampler`,
+/// `spacing`, `guidance` change single numbers. `shift`: the mapping to meters, "exact" with `fit_parts` (a list of "offset",
+/// "field", "gain", "response"), "paper", "raw", or "refit" with `stats`, a file of `touch2touch stats`. `mask`: "auto", "unet",
+/// "threshold", "top_percent", "cad" or "truth", with `threshold_mm`, `probability`, `top_percent`, `cad_mm`. `engine`: the
+/// registration, such as "joint" or "gicp:gate=1.5". `hand`: masks drawn by hand win.
 /// `runtime`: "auto", "rten", "ort" or a provider of ONNX Runtime, such as "cuda" (`touch2touch runtime` lists them).
 #[pyclass(module = "touch2touch", frozen)]
 pub(crate) struct Recipe {
@@ -31,11 +32,69 @@ pub(crate) struct Recipe {
     named: Py<PyDict>,
 }
 
+/// Choices that were named and are not read yet.
+struct Left<'py>(Bound<'py, PyDict>);
+
+impl Left<'_> {
+    /// A choice, if it was named.
+    ///
+    /// # Errors
+    /// If it is of another type.
+    fn take<T: for<'a> FromPyObject<'a, 'a, Error: Into<PyErr>>>(&mut self, key: &str) -> PyResult<Option<T>> {
+        let value = self.0.get_item(key)?;
+        if value.is_some() {
+            self.0.del_item(key)?;
+        }
+        value.filter(|value| !value.is_none()).map(|value| value.extract().map_err(Into::into)).transpose()
+    }
+
+    /// One of a few things by its name.
+    ///
+    /// # Errors
+    /// If there is none of that name; those that there are are said.
+    fn one_of<T>(&mut self, key: &str, all: impl IntoIterator<Item = (&'static str, T)>) -> PyResult<Option<T>> {
+        self.take::<String>(key)?.map(|name| choice(key, &name, all)).transpose()
+    }
+
+    /// What a text stands for.
+    ///
+    /// # Errors
+    /// Of the parser.
+    fn parsed<T: FromStr<Err: std::fmt::Display>>(&mut self, key: &str) -> PyResult<Option<T>> {
+        self.take::<String>(key)?.map(|text| text.parse().map_err(refused)).transpose()
+    }
+
+    fn shift(&mut self) -> PyResult<ShiftChoice> {
+        let parts: Option<Vec<String>> = self.take("fit_parts")?;
+        let part = |name: &String| choice("fit_parts", name, CorrectionPart::iter().map(|part| (part.into(), part)));
+        let parts = parts.map(|names| names.iter().map(part).collect::<PyResult<Vec<_>>>()).transpose()?;
+        let exact = ShiftChoice::Exact(parts.map_or(CorrectionParts::ALL, CorrectionParts::from));
+        let mut all = vec![("exact", exact.clone()), ("paper", ShiftChoice::Paper), ("raw", ShiftChoice::Raw)];
+        all.extend(self.take("stats")?.map(|file| ("refit", ShiftChoice::Refit(file))));
+        Ok(self.one_of("shift", all)?.unwrap_or(exact))
+    }
+
+    fn mask(&mut self) -> PyResult<MaskChoice> {
+        let usual = MaskChoice::default();
+        let mask = MaskChoice {
+            source: self.one_of("mask", MaskSource::iter().map(|source| (source.key(), source)))?.unwrap_or_default(),
+            threshold_m: self.take("threshold_mm")?.map_or(usual.threshold_m, meters),
+            probability: self.take("probability")?,
+            top_percent: self.take("top_percent")?.unwrap_or(usual.top_percent),
+            cad_distance_m: self.take("cad_mm")?.map_or(usual.cad_distance_m, meters),
+        };
+        match mask.probability {
+            Some(p) if !(0.0..=1.0).contains(&p) => Err(refused("probability: a number of 0 to 1 is needed")),
+            _ => Ok(mask),
+        }
+    }
+}
+
 /// The choice of this name.
 ///
 /// # Errors
 /// If there is none; those that there are are said.
-fn choice<T>(what: &str, name: &str, all: impl IntoIterator<Item = (&'static str, T)>) -> PyResult<T> {
+pub(crate) fn choice<T>(what: &str, name: &str, all: impl IntoIterator<Item = (&'static str, T)>) -> PyResult<T> {
     let mut names = Vec::new();
     for (known, value) in all {
         if known == name {
@@ -86,54 +145,41 @@ impl Recipe {
         if let Some(choices) = choices {
             named.update(choices.as_mapping())?;
         }
-        let left = named.copy()?;
-        let take = |key: &str| -> PyResult<Option<Bound<'_, PyAny>>> {
-            let value = left.get_item(key)?.filter(|value| !value.is_none());
-            if left.contains(key)? {
-                left.del_item(key)?;
-            }
-            Ok(value)
-        };
-        let text = |key: &str, default: &str| -> PyResult<String> {
-            Ok(take(key)?.map(|value| value.extract()).transpose()?.unwrap_or_else(|| default.to_owned()))
-        };
+        let mut left = Left(named.copy()?);
         let imprint = [ImprintSource::Measured, ImprintSource::Predicted].map(|source| (source.key(), source));
-        let imprint = choice("imprint", &text("imprint", "measured")?, imprint)?;
-        let bundle: Option<PathBuf> = take("bundle")?.map(|v| v.extract()).transpose()?;
-        let mask_bundle: Option<PathBuf> = take("mask_bundle")?.map(|v| v.extract()).transpose()?;
-        let steps: Option<u32> = take("steps")?.map(|v| v.extract()).transpose()?;
-        let seed: Option<u64> = take("seed")?.map(|v| v.extract()).transpose()?;
-        let sampler = take("sampler")?.map(|v| v.extract::<String>()).transpose()?;
-        let samplers = Sampler::iter().map(|sampler| (sampler.into(), sampler));
-        let sampler = sampler.map(|name| choice("sampler", &name, samplers));
-        let sampler = sampler.transpose()?;
-        let shifts = [("exact", ShiftMode::ExactInverse), ("paper", ShiftMode::PaperShift), ("raw", ShiftMode::Raw)];
-        let shift = choice("shift", &text("shift", "exact")?, shifts)?;
-        let masks = MaskSource::iter().map(|source| (source.key(), source));
-        let mask = choice("mask", &text("mask", MaskSource::default().key())?, masks)?;
-        let threshold_mm: Option<f64> = take("threshold_mm")?.map(|v| v.extract()).transpose()?;
-        let registration = text("engine", &RegistrationChoice::default().to_string())?;
-        let registration: RegistrationChoice = registration.parse().map_err(refused)?;
-        let hand: Option<bool> = take("hand")?.map(|v| v.extract()).transpose()?;
-        let engine: EngineChoice = text("runtime", EngineChoice::default().key())?.parse().map_err(refused)?;
-        if let Some(unknown) = left.keys().iter().next() {
+        let imprint = left.one_of("imprint", imprint)?.unwrap_or_default();
+        let spacings = [("trailing", Spacing::Trailing), ("lab", Spacing::Lab)];
+        let generator = GeneratorChoice {
+            bundle: left.take("bundle")?,
+            preset: left.one_of("preset", Preset::iter().map(|preset| (preset.key(), preset)))?.unwrap_or_default(),
+            steps: left.take("steps")?,
+            seed: left.take("seed")?,
+            eta: left.take("eta")?,
+            sampler: left.one_of("sampler", Sampler::iter().map(|sampler| (sampler.into(), sampler)))?,
+            spacing: left.one_of("spacing", spacings)?,
+            guidance: left.take("guidance")?,
+            shift: left.shift()?,
+        };
+        let mask_bundle: Option<PathBuf> = left.take("mask_bundle")?;
+        let mask = left.mask()?;
+        let registration = left.parsed("engine")?.unwrap_or_default();
+        let hand = left.take("hand")?.unwrap_or(true);
+        let engine = left.parsed("runtime")?.unwrap_or_default();
+        if let Some(unknown) = left.0.keys().iter().next() {
             return Err(refused(format!("a recipe has no choice {unknown}; see help(touch2touch.Recipe)")));
         }
-        let usual = MaskChoice::default();
-        let mask = MaskChoice { source: mask, threshold_m: threshold_mm.map_or(usual.threshold_m, meters), ..usual };
         let whole = py.detach(|| {
             let (found, rig) = (bundles::find(&[]), Rig::lab());
-            let generator = match imprint {
-                ImprintSource::Measured => None,
+            let usual = Whole { imprint, mask, hand, registration, engine, ..Whole::default() };
+            let (generator, shift) = match imprint {
+                ImprintSource::Measured => (None, usual.shift),
                 ImprintSource::Predicted => {
-                    let bundle = found.take(BundleKind::Generator, bundle.as_deref(), &rig)?;
-                    let config = bundle.generator.as_ref().map(|info| info.config(steps, seed, sampler));
-                    config.map(|config| (bundle.into(), config))
+                    let (generator, shift) = generator.of(&found, &rig)?;
+                    (Some(generator), shift)
                 }
             };
             let mask_model = Model::of_masks(mask.source, &found, mask_bundle.as_deref(), &rig)?;
-            let hand = hand.unwrap_or(true);
-            Ok(Whole { imprint, generator, shift, mask, mask_model, hand, registration, engine })
+            Ok(Whole { generator, shift, mask_model, ..usual })
         });
         Ok(Self { whole: whole.map_err(|err| failed(&err))?, named: named.unbind() })
     }

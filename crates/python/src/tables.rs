@@ -79,7 +79,7 @@ fn take(kind: BundleKind, all: &[touch2touch_work::bundles::BundleInfo]) -> Opti
     all.iter().find(|bundle| bundle.kind == kind && !bundle.is_own()).map(|bundle| bundle.origin.clone())
 }
 
-/// Scores every grasp of a data set by each generator, beside the measured imprints: the function behind
+/// Scores every grasp of a data set, or of a part of one, by each generator, beside the measured imprints: the function behind
 /// `touch2touch evaluate`.
 ///
 /// `bundles`: folders of generators (default: the shipped one). `recipe`: mask, registration, mapping and runtime that they
@@ -100,11 +100,6 @@ pub(crate) fn evaluate(
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Scores> {
     let data = dataset_of(py, data)?;
-    if data.get().ids.len() != data.get().opened.source.index.pairs.len() {
-        return Err(refused(
-            "a data set is scored whole: open it without a filter, and name grasps= for fewer of each tool",
-        ));
-    }
     let whole = given_or(py, recipe, "measured")?;
     let evaluation = watched(py, progress, |process, cx| {
         let all = found::find(&[]).bundles;
@@ -116,6 +111,7 @@ pub(crate) fn evaluate(
             recipe: Whole { generator: None, ..whole },
             steps,
             seed,
+            pairs: Some(data.get().ids.iter().map(|id| PairId(*id as u32)).collect()),
             grasps_per_tool: grasps,
             resamples,
             ..Setup::default()

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::sync::Arc;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::io::dataset::ToolUnit;
 
@@ -34,7 +34,7 @@ pub struct UnitOffer {
 }
 
 /// A pair that was left out of a pass over a data set, or that is worth a look.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Remark {
     /// The pair.
     pub name: String,

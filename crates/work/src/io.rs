@@ -29,3 +29,4 @@ pub mod simulated;
 pub(crate) mod staging;
 pub mod statistics;
 pub mod stl;
+pub mod touch_rows;

@@ -11,7 +11,7 @@
 //! * `labeling` ([`labels`]): what people said about pairs. [`follow`]: a folder that is still being recorded.
 //! * `way` ([`recipe`], [`feel`]): the steps from a touch to its pose.
 //! * `study` ([`evaluate`], [`compare`], [`figure`]): results looked into.
-//! * `assist` ([`propose`], [`label_edit`]): help for those who draw masks.
+//! * `assist` ([`propose`], [`label_edit`], [`mod@label_pair`]): help for those who draw masks.
 //! * `exchange` ([`case`], [`mod@export`]): results and labels as files.
 //! * `learn` ([`adapt`], [`train`]): networks fitted to the data at hand.
 //! * [`about`]: what a data set is, and what would better it.
@@ -30,12 +30,12 @@ pub mod pairs;
 mod study;
 mod way;
 
-pub use assist::{label_edit, propose, queue};
+pub use assist::{label_edit, label_pair, propose, queue};
 pub use exchange::{case, export, import, pair_files};
 pub use labeling::{agreement, filter, label_stats, labels, repeats};
 pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{
     canvas, compare, depict, deviation, doubts, ensemble, evaluate, fan, figure, fonts, influence, layers, ledger,
-    space, statistics, still, subject, sweep, trials,
+    rows, space, statistics, still, subject, sweep, trials,
 };
 pub use way::{bundles, cloud, feel, imprint, mask, models, on_pad, pose, predict, prediction, recipe, tool};

@@ -21,7 +21,10 @@ impl Action {
                     || matches!(self, Self::NextUnfinished | Self::NextUncertain | Self::RankMasks)
             }
             Workspace::Evaluate => {
-                matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
+                matches!(
+                    self,
+                    Self::EvaluateDataset | Self::PredictAll | Self::OpenScores | Self::ExportTable | Self::NextWorst
+                )
             }
             Workspace::Adapt => {
                 matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)

@@ -105,7 +105,7 @@ pub struct ScoresKey {
     pub(crate) pairs: usize,
     /// The setup of the scoring, as text.
     pub(crate) setup: String,
-    /// The number of times that scores were computed.
+    /// The number of times that scores were computed or opened.
     pub(crate) round: u64,
 }
 

@@ -67,6 +67,9 @@ kinds! {
     /// A data set is scored.
     Evaluate, "Evaluate", Batch,
         "Stop, and show what was scored until then";
+    /// Scores of touches that were felt elsewhere are read.
+    ReadScores, "Open scores", Files,
+        "Stop; the scores stay as they are";
     /// A dial is turned over many pairs.
     Dial, "Dial", Batch,
         "Stop, and show the pairs that were done until then";

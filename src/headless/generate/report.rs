@@ -1,6 +1,6 @@
 //! Answer of `generate`: the metrics of each prediction, their means, and the table.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use super::super::seeds::SeedFigures;
 use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
@@ -24,7 +24,7 @@ pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor 
     by footprint, contact and pose need depth and are left out";
 
 /// Metrics of one prediction. PSNR and SSIM are those of `convention`.
-#[derive(Debug, Default, Clone, Serialize)]
+#[derive(Debug, Default, Clone, Serialize, Deserialize)]
 pub(super) struct Pair {
     pub(super) name: String,
     pub(super) finger: Text,
@@ -52,11 +52,11 @@ pub(super) struct Pair {
     /// True where it was made before and only read now.
     pub(super) kept: bool,
     /// With `--seeds`.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none", skip_deserializing)]
     pub(super) ensemble: Option<SeedFigures>,
 }
 
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct Mean {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
@@ -79,12 +79,12 @@ pub(super) struct Mean {
 }
 
 /// [`Unstretched`] metrics of the prediction that lay by.
-#[derive(Debug, Clone, Copy, Serialize)]
-#[serde(into = "StoredKeys")]
+#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
+#[serde(into = "StoredKeys", from = "StoredKeys")]
 pub(super) struct Stored(pub(super) Unstretched);
 
 /// [`Stored`] under its keys.
-#[derive(Serialize)]
+#[derive(Serialize, Deserialize)]
 struct StoredKeys {
     vqvae_psnr_raw_db: Option<f64>,
     vqvae_ssim_raw: Option<f64>,
@@ -97,9 +97,17 @@ impl From<Stored> for StoredKeys {
     }
 }
 
+impl From<StoredKeys> for Stored {
+    fn from(of: StoredKeys) -> Self {
+        let StoredKeys { vqvae_psnr_raw_db, vqvae_ssim_raw, vqvae_psnr_line_db } = of;
+        Self(Unstretched { psnr_raw_db: vqvae_psnr_raw_db, ssim_raw: vqvae_ssim_raw, psnr_line_db: vqvae_psnr_line_db })
+    }
+}
+
 /// Means over the pictures that have them.
 fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretched> {
-    let all: Vec<Unstretched> = all.collect();
+    // Of a row that was read again, nothing is a figure like any other.
+    let all: Vec<Unstretched> = all.filter(|one| *one != Unstretched::default()).collect();
     (!all.is_empty()).then(|| Unstretched {
         psnr_raw_db: evaluation::mean(all.iter().filter_map(|u| u.psnr_raw_db)),
         ssim_raw: evaluation::mean(all.iter().filter_map(|u| u.ssim_raw)),
@@ -108,7 +116,7 @@ fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretche
 }
 
 /// Means of the figures of one part.
-#[derive(Debug, Serialize)]
+#[derive(Debug, Serialize, Deserialize)]
 pub(super) struct PartMean {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
@@ -129,14 +137,15 @@ impl PartMean {
     }
 }
 
-#[derive(Debug, Serialize)]
-pub(super) struct Report {
-    pub(super) pairs: Vec<Pair>,
+/// The answer; of rows that were read again, their text.
+#[derive(Debug, Serialize, Deserialize)]
+pub(super) struct Report<Row = Pair> {
+    pub(super) pairs: Vec<Row>,
     pub(super) mean: Mean,
-    pub(super) convention: &'static str,
+    pub(super) convention: String,
     pub(super) bundle: String,
-    pub(super) runtime: &'static str,
-    pub(super) sampler: &'static str,
+    pub(super) runtime: String,
+    pub(super) sampler: String,
     pub(super) steps: u32,
     pub(super) seed: u64,
     pub(super) guidance: f64,
@@ -177,7 +186,8 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
     }
 }
 
-pub(super) fn text(report: &Report) -> String {
+/// The report as a table of its pairs.
+pub(super) fn text<Row>(report: &Report<Row>, pairs: &[Pair]) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
         "{:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}\n",
@@ -196,7 +206,7 @@ pub(super) fn text(report: &Report) -> String {
             number(p.seconds, 2)
         );
     };
-    for p in &report.pairs {
+    for p in pairs {
         let name = format!("{} {}", p.name, p.finger);
         let note = p.ambiguity.and_then(|a| a.caption()).map_or(String::new(), |c| format!("  {c}"));
         line(&name, &mean(std::slice::from_ref(p)), &note);
@@ -208,7 +218,7 @@ pub(super) fn text(report: &Report) -> String {
         unstretched_text(&report.mean),
         report.convention,
         report.mean.ambiguous,
-        report.pairs.len(),
+        pairs.len(),
         report.steps,
         report.seed,
         report.bundle,

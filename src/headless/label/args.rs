@@ -3,7 +3,6 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use strum::IntoEnumIterator as _;
 
 use super::super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
@@ -11,32 +10,10 @@ use super::super::pose::parse_start;
 use super::super::recipe::ModelArgs;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::label::{CleanKind, CleanUp, Drawing};
+use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::labels::{ImprintSource, Review};
 use touch2touch_work::propose::ProposalSource;
-
-fn parse_clean_up(text: &str) -> Result<CleanUp, String> {
-    let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));
-    let kinds = || CleanKind::iter().map(CleanKind::key).collect::<Vec<_>>().join(", ");
-    let kind: CleanKind =
-        kind.parse().map_err(|_| format!("there is no clean-up \"{kind}\"; there are {}", kinds()))?;
-    let size_mm = match (kind.is_sized(), size) {
-        (false, None) => 0.0,
-        (false, Some(_)) => return Err(format!("{} has no size", kind.key())),
-        (true, None) => return Err(format!("{} takes a size in millimeters, such as {0}=1.5", kind.key())),
-        (true, Some(size)) => match size.parse() {
-            Ok(mm) if (0.0..=1e3).contains(&mm) => mm,
-            _ => return Err(format!("\"{size}\" is no size in millimeters (0 to 1000)")),
-        },
-    };
-    Ok(CleanUp { kind, size_mm })
-}
-
-fn parse_drawing(text: &str) -> Result<Drawing, String> {
-    let drawing: Drawing = serde_json::from_str(text).map_err(|err| err.to_string())?;
-    drawing.check().map(|()| drawing)
-}
 
 /// Arguments of `label`.
 #[derive(Debug, Args)]
@@ -80,13 +57,13 @@ pub(in super::super) struct LabelArgs {
     pub(super) carry_from: Option<String>,
     /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, `clear`, or with a size in millimeters
     /// `drop_small=MM`, `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
-    #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_clean_up)]
+    #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask")]
     pub(super) clean: Vec<CleanUp>,
     /// Draw on the mask: `{"tool": "lasso", "paint": "contact", "points": [[X, Y], ...]}` in image pixels; tools are
     /// `brush` (`radius_px`), `lasso`, `polygon`, `rectangle` and `wand` (`tolerance_m`), they paint `contact`, `free` or
     /// `ignore`. Several are done in turn, before clean-ups. With a `sight` (`clip_from_grasp`, `size_px`, `layers`: `front`
     /// or `all`), points are pixels of that picture of the points in space, as a drawing in 3D has it in the journal.
-    #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask", value_parser = parse_drawing)]
+    #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask")]
     pub(super) draw: Vec<Drawing>,
     /// Remove the corrected mask: the automatic source is in force again.
     #[arg(long, requires = "pair")]

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
+use serde_json::value::RawValue;
 
 use super::super::seeds::PoseFan;
 use super::influence::Influences;
@@ -11,7 +12,6 @@ use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::{angle_error, text_mm};
 use touch2touch_core::verdict::{Grade, Verdict};
@@ -126,24 +126,63 @@ pub(super) struct AngleMetrics {
 
 #[derive(Debug, Serialize)]
 pub(super) struct Summary {
-    /// The figures of the first registration on the first kind of imprint.
+    /// The figures of the first registration on the first kind of imprint, which [`Self::of`] names.
     #[serde(flatten)]
     pub(super) first: AngleMetrics,
+    pub(super) of: First,
     /// `registration` (first kind of imprint) and `registration/imprint` (all): the figures of each.
     #[serde(rename = "engines")]
     pub(super) registrations: BTreeMap<String, AngleMetrics>,
 }
 
+/// The registration and the kind of imprint that a summary begins with.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(super) struct First {
+    #[serde(rename = "engine")]
+    pub(super) registration: String,
+    pub(super) imprint: String,
+}
+
+/// The answer; of rows that were read again, their text.
 #[derive(Debug, Serialize)]
-pub(super) struct Report {
-    pub(super) cases: Vec<PoseRow>,
+pub(super) struct Report<Row = PoseRow> {
+    pub(super) cases: Vec<Row>,
     pub(super) summary: Summary,
     /// Oddities of the files and of the numbers in them, by kind.
     pub(super) notes: Vec<Finding>,
 }
 
-pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a PoseRow>) -> AngleMetrics {
-    let cases: Vec<&PoseRow> = cases.collect();
+/// A part of a run, as far as `merge` needs it.
+#[derive(Deserialize)]
+pub(super) struct PoseParts {
+    pub(super) cases: Vec<Box<RawValue>>,
+    pub(super) summary: PartSummary,
+}
+
+#[derive(Deserialize)]
+pub(super) struct PartSummary {
+    pub(super) of: First,
+}
+
+/// The figures of a row that go into a summary.
+#[derive(Debug, Deserialize)]
+pub(super) struct Figures {
+    #[serde(flatten)]
+    of: First,
+    truth_deg: Option<f64>,
+    error_deg: Option<f64>,
+    ms: f64,
+}
+
+impl From<&PoseRow> for Figures {
+    fn from(row: &PoseRow) -> Self {
+        let of = First { registration: row.registration.clone(), imprint: row.imprint.to_owned() };
+        Self { of, truth_deg: row.truth_deg, error_deg: row.error_deg, ms: row.ms }
+    }
+}
+
+fn metrics<'a>(cases: impl Iterator<Item = &'a Figures>) -> AngleMetrics {
+    let cases: Vec<&Figures> = cases.collect();
     // A case without truth has no error; one without a pose is a failure.
     let errors: Vec<f64> =
         cases.iter().filter(|c| c.truth_deg.is_some()).map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians)).collect();
@@ -153,21 +192,22 @@ pub(super) fn figures<'a>(cases: impl Iterator<Item = &'a PoseRow>) -> AngleMetr
     AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-pub(super) fn summary(cases: &[PoseRow], first_imprint: &str, first: RegistrationChoice) -> Summary {
-    let is_of = |case: &PoseRow, by: &str, imprint: &str| case.registration == by && case.imprint == imprint;
-    let of = |by: &str, imprint: &str| figures(cases.iter().filter(|case| is_of(case, by, imprint)));
+pub(super) fn summary(cases: &[Figures], first: First) -> Summary {
+    let of = |by: &str, imprint: &str| {
+        metrics(cases.iter().filter(|case| case.of.registration == by && case.of.imprint == imprint))
+    };
     let mut registrations = BTreeMap::new();
-    for case in cases {
-        let key = format!("{}/{}", case.registration, case.imprint);
+    for Figures { of: First { registration, imprint }, .. } in cases {
+        let key = format!("{registration}/{imprint}");
         if !registrations.contains_key(&key) {
-            let figures = of(&case.registration, case.imprint);
-            if case.imprint == first_imprint {
-                registrations.insert(case.registration.clone(), figures.clone());
+            let figures = of(registration, imprint);
+            if *imprint == first.imprint {
+                registrations.insert(registration.clone(), figures.clone());
             }
             registrations.insert(key, figures);
         }
     }
-    Summary { first: of(&first.to_string(), first_imprint), registrations }
+    Summary { first: of(&first.registration, &first.imprint), of: first, registrations }
 }
 
 pub(super) fn text(report: &Report) -> String {
@@ -211,11 +251,17 @@ pub(super) fn text(report: &Report) -> String {
             text += &format!("\n{name} ({imprint} imprint): {why}\n");
         }
     }
-    text += &format!(
-        "\n{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
+    text + "\n" + &summary_text(&report.summary)
+}
+
+/// The table of the summary.
+pub(super) fn summary_text(summary: &Summary) -> String {
+    let number = |v: Option<f64>| v.map_or("      -".to_owned(), |v| format!("{v:7.2}"));
+    let mut text = format!(
+        "{:<28} {:>5} {:>9} {:>9} {:>7} {:>7} {:>10}\n",
         "registration/imprint", "n", "mean °", "median °", "<=5° %", "<=10° %", "median ms"
     );
-    for (key, f) in report.summary.registrations.iter().filter(|(k, _)| k.contains('/')) {
+    for (key, f) in summary.registrations.iter().filter(|(k, _)| k.contains('/')) {
         let a = f.angles;
         text += &format!(
             "{key:<28} {:>5} {:>9} {:>9} {:>7.1} {:>7.1} {:>10}\n",

@@ -13,7 +13,7 @@ use touch2touch_core::diffusion::{GUIDANCE, Preset, Sampler};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
 use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::statistics::ShiftStatistics;
+use touch2touch_work::recipe::ShiftChoice;
 
 /// Models, and how they are run.
 #[derive(Debug, Clone, Args)]
@@ -132,26 +132,25 @@ enum ShiftArg {
 }
 
 impl MappingArgs {
-    /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
-    pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
+    /// The shift that is asked for.
+    pub(super) fn choice(&self) -> anyhow::Result<ShiftChoice> {
         if self.shift != ShiftArg::Refit && self.stats.is_some() {
             anyhow::bail!("--stats is for --shift refit; add that, or leave the statistics out");
         }
-        Ok(match self.shift {
-            ShiftArg::Raw => ShiftMode::Raw,
-            ShiftArg::Paper => ShiftMode::PaperShift,
-            ShiftArg::Exact if self.fit_parts == CorrectionParts::ALL => ShiftMode::ExactInverse,
-            ShiftArg::Exact => ShiftMode::Parts(self.fit_parts),
-            ShiftArg::Refit => {
-                let Some(file) = &self.stats else {
-                    anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`");
-                };
-                let Some((name, id)) = bundle else {
-                    anyhow::bail!("statistics are of one generator; name it with --bundle");
-                };
-                ShiftMode::Refit(ShiftStatistics::read(file)?.shift_for(name, id)?)
+        Ok(match (self.shift, &self.stats) {
+            (ShiftArg::Raw, _) => ShiftChoice::Raw,
+            (ShiftArg::Paper, _) => ShiftChoice::Paper,
+            (ShiftArg::Exact, _) => ShiftChoice::Exact(self.fit_parts),
+            (ShiftArg::Refit, Some(file)) => ShiftChoice::Refit(file.clone()),
+            (ShiftArg::Refit, None) => {
+                anyhow::bail!("--shift refit needs --stats FILE; make the file with `touch2touch stats`")
             }
         })
+    }
+
+    /// The shift; `bundle` is the generator's name and identity, or `None` where there are several.
+    pub(in crate::headless) fn mode(&self, bundle: Option<(&str, &str)>) -> anyhow::Result<ShiftMode> {
+        Ok(self.choice()?.mode(bundle)?)
     }
 }
 

@@ -18,7 +18,7 @@ use touch2touch::app::command::{
 };
 use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
-use touch2touch::app::evaluate::{Score, ScoreChoice};
+use touch2touch::app::evaluate::{ReadScores, Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
@@ -62,6 +62,7 @@ use touch2touch_work::job::{PreviewPicture, Progress};
 use touch2touch_work::labels::Operation;
 use touch2touch_work::propose::Batch;
 use touch2touch_work::queue::QueueBy;
+use touch2touch_work::rows::RowScores;
 use touch2touch_work::space::{Ground, ViewAngles};
 use touch2touch_work::subject::Subject;
 use touch2touch_work::sweep::{Dial, Setting};
@@ -383,6 +384,10 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Propose => {
                 Ended::of::<ProposeAll>(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
             }
+            TaskKind::ReadScores => {
+                let rows = RowScores { scores: Vec::new(), pairs: 0, elsewhere: 1 };
+                Ended::of::<ReadScores>((seq, Arc::new(rows)))
+            }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
             TaskKind::Dial => Ended::of::<Turn>(Arc::new(swept())),
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
@@ -556,6 +561,7 @@ draws! {
         1 Start,
         1 All,
         1 Rank,
+        1 OpenRows(Just(PathBuf::from("rows"))),
         1 Export(Just(PathBuf::from("table"))),
     }
     dial: DialCommand {

@@ -1,7 +1,9 @@
 //! [`CleanUp`]: what can be done to a whole mask, as a value with its size in millimeters.
 
+use std::str::FromStr;
+
 use serde::{Deserialize, Serialize};
-use strum::{EnumIter, EnumString, IntoStaticStr};
+use strum::{EnumIter, EnumString, IntoEnumIterator as _, IntoStaticStr};
 
 use super::morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
 use crate::grid::Mask;
@@ -88,6 +90,28 @@ impl From<CleanKind> for CleanUp {
     /// With a size of one millimeter.
     fn from(kind: CleanKind) -> Self {
         Self { kind, size_mm: 1.0 }
+    }
+}
+
+impl FromStr for CleanUp {
+    type Err = String;
+
+    /// `fill_holes`, or with a size in millimeters `grow=1.5`.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (kind, size) = text.split_once('=').map_or((text, None), |(kind, size)| (kind, Some(size)));
+        let kinds = || CleanKind::iter().map(CleanKind::key).collect::<Vec<_>>().join(", ");
+        let kind: CleanKind =
+            kind.parse().map_err(|_| format!("there is no clean-up \"{kind}\"; there are {}", kinds()))?;
+        let size_mm = match (kind.is_sized(), size) {
+            (false, None) => 0.0,
+            (false, Some(_)) => return Err(format!("{} has no size", kind.key())),
+            (true, None) => return Err(format!("{} takes a size in millimeters, such as {0}=1.5", kind.key())),
+            (true, Some(size)) => match size.parse() {
+                Ok(mm) if (0.0..=1e3).contains(&mm) => mm,
+                _ => return Err(format!("\"{size}\" is no size in millimeters (0 to 1000)")),
+            },
+        };
+        Ok(Self { kind, size_mm })
     }
 }
 

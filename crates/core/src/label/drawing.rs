@@ -1,6 +1,8 @@
 //! [`Drawing`]: what a hand does on a mask, as a value. The studio previews it, a journal can store it, a verb can
 //! repeat it; here it becomes pixels.
 
+use std::str::FromStr;
+
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
@@ -81,6 +83,16 @@ impl<'a> Ground<'a> {
     /// An imprint that may be drawn on everywhere.
     pub fn new(imprint: &'a DepthMap) -> Self {
         Self { imprint, allowed: None, proposed: None, seen: None }
+    }
+}
+
+impl FromStr for Drawing {
+    type Err = String;
+
+    /// The JSON object of a drawing that can touch something.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let drawing: Self = serde_json::from_str(text).map_err(|err| err.to_string())?;
+        drawing.check().map(|()| drawing)
     }
 }
 

@@ -1,6 +1,6 @@
 //! Metrics of a prediction apart for what the GelSlim saw and for what the model made up.
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 use crate::grid::{Grid, Mask};
 
@@ -8,7 +8,7 @@ use super::image::{check_size, psnr_of_mse};
 use super::{MetricError, SsimRange, ssim};
 
 /// Metrics over some of an image's pixels; those that are not finite in both images are left out.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PixelMetrics {
     /// Pixels compared.
     pub pixels: usize,

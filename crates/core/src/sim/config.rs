@@ -177,6 +177,19 @@ pub enum Sensors {
 }
 
 impl Sensors {
+    /// Another pair by its seed, or other GelSlims by theirs; the nominal ones without either.
+    ///
+    /// # Errors
+    /// If both are named.
+    pub fn named(drawn: Option<u64>, gelslims: Option<u64>) -> Result<Self, &'static str> {
+        match (drawn, gelslims) {
+            (Some(_), Some(_)) => Err("name other sensors or other GelSlims, not both"),
+            (Some(seed), None) => Ok(Self::Drawn(seed)),
+            (None, Some(seed)) => Ok(Self::OtherGelslims(seed)),
+            (None, None) => Ok(Self::Nominal),
+        }
+    }
+
     /// Settings of these sensors.
     pub fn config(self) -> SimConfig {
         match self {

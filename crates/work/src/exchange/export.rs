@@ -1,6 +1,8 @@
 //! Masks for training, in a form of one's choice: [`plan`] says what goes where, [`export_masks`] writes it. The studio and
 //! `touch2touch masks export` both end here.
 
+mod automatic;
+
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
@@ -13,10 +15,10 @@ use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport
 use crate::job::JobCx;
 use crate::labels::{DrawnMask, Labels, PairLabels, Review};
 use touch2touch_core::dataset::{PairId, Split};
-use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_core::sample::Sample;
 use touch2touch_core::units::counted;
+
+pub use automatic::Automatic;
 
 /// Name of the task in errors.
 const WHAT: &str = "Export masks";
@@ -232,9 +234,6 @@ pub fn plan(dataset: &Dataset, masks: &DrawnMasks<'_>, setup: &ExportSetup) -> R
     Ok(plan)
 }
 
-/// Makes the mask of a finger that has none by hand.
-pub type Automatic<'a> = &'a mut dyn FnMut(PairId, &Sample, PadId, Option<&str>) -> Result<Mask, TaskError>;
-
 /// Writes masks as [`plan`] says, and reads them back by the rules of their form. Without `automatic`, only masks
 /// drawn by hand can be written.
 ///
@@ -283,7 +282,7 @@ pub fn export_masks(
         let (mask, ignored) = match (by_hand, automatic.as_mut()) {
             (Some(hand), _) => ((*hand.mask).clone(), hand.unsaid(setup.choice.manual_checked)),
             (None, Some(automatic)) => {
-                let mask = automatic(plan.ids[at], &sample, entry.finger, entry.tool.as_deref())?;
+                let mask = automatic.mask(plan.ids[at], &sample, entry.finger, entry.tool.as_deref())?;
                 let unsaid = setup.choice.manual_checked.then(|| mask.map(|_| true));
                 (mask, unsaid)
             }

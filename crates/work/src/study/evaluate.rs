@@ -57,6 +57,9 @@ pub struct Setup {
     pub seed: Option<u64>,
     /// Sampler instead of each bundle's own.
     pub sampler: Option<Sampler>,
+    /// Only these pairs; `None` takes all.
+    #[serde(skip)]
+    pub pairs: Option<BTreeSet<PairId>>,
     /// At most so many grasps of each tool, spread evenly.
     pub grasps_per_tool: Option<usize>,
     /// The only finger whose images are compared, or all. Poses always come from all.
@@ -77,6 +80,7 @@ impl Default for Setup {
             steps: None,
             seed: None,
             sampler: None,
+            pairs: None,
             grasps_per_tool: None,
             finger: None,
             batch: 8,

@@ -6,6 +6,7 @@
 //! settings.
 
 mod dial;
+mod joined;
 mod outcome;
 
 use std::collections::BTreeMap;
@@ -26,7 +27,7 @@ use crate::mask::MaskRecipe;
 use crate::models::Models;
 use crate::predict::Predicted;
 use crate::prediction::Prediction;
-use crate::recipe::{Recipe, Stage};
+use crate::recipe::{Model, Recipe, Stage};
 use crate::tool::load_tool;
 use touch2touch_core::align::Ask;
 use touch2touch_core::contact::MaskBasis;
@@ -54,9 +55,10 @@ pub struct SweepSetup {
     pub recipe: Recipe,
 }
 
-/// Effect of every value on every pair.
+/// Effect of every value on every pair. Models are `M`: names where it was read from a file.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Sweep {
+#[serde(bound(serialize = "M: Clone + Serialize"))]
+pub struct Sweep<M = Model> {
     /// The data set's title.
     pub dataset: String,
     /// The dial.
@@ -67,7 +69,7 @@ pub struct Sweep {
     pub at: Option<Setting>,
     /// The recipe besides.
     #[serde(serialize_with = "what_decides")]
-    pub in_force: Recipe,
+    pub in_force: Recipe<M>,
     /// The measured imprints and the predicted ones, as far as they are there.
     pub series: Vec<Series>,
     /// Pairs that have no pose whatever the dial says, and why.
@@ -83,9 +85,20 @@ pub struct Sweep {
 }
 
 /// A recipe of both imprints without what decides nothing.
-fn what_decides<S: Serializer>(recipe: &Recipe, to: S) -> Result<S::Ok, S::Error> {
+fn what_decides<M: Clone + Serialize, S: Serializer>(recipe: &Recipe<M>, to: S) -> Result<S::Ok, S::Error> {
     let imprint = recipe.generator.as_ref().map_or(ImprintSource::Measured, |_| ImprintSource::Predicted);
     recipe.of(imprint).until(Stage::Pose).serialize(to)
+}
+
+/// End of the note on masks that were drawn by hand.
+const NOT_MOVED: &str = "have a mask that was drawn by hand, which this dial does not move";
+/// The note where nothing is predicted.
+const NO_GENERATOR: &str = "no generator: the predictions are not in it";
+
+/// The note on masks that were drawn by hand, of so many imprints.
+fn hand_note(dial: Dial, imprints: usize) -> Option<String> {
+    let masks = matches!(dial, Dial::Threshold | Dial::Probability);
+    (imprints > 0 && masks).then(|| format!("{imprints} imprints {NOT_MOVED}"))
 }
 
 /// A pair that is read.
@@ -203,13 +216,11 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
     let hand = rows.values().flatten().filter(|row| row.iter().any(|outcome| outcome.hand)).count();
     let line = |p: &Problem| format!("{}: {} ({})", p.file.display(), p.what, p.hint);
     let mut notes: Vec<String> = dataset.problems.iter().map(line).collect();
-    if hand > 0 && setup.recipe.hand && matches!(job.dial, Dial::Threshold | Dial::Probability) {
-        notes.push(format!("{hand} imprints have a mask that was drawn by hand, which this dial does not move"));
-    }
+    notes.extend(hand_note(job.dial, hand));
     if setup.recipe.generator.is_none() {
-        notes.push("no generator: the predictions are not in it".into());
+        notes.push(NO_GENERATOR.into());
     }
-    let series = rows.into_iter().map(|(source, rows)| Series::new(source, rows, setup, job.at)).collect();
+    let series = rows.into_iter().map(|(source, rows)| Series::new(source, rows, &setup.values, job.at)).collect();
     Ok(Sweep {
         dataset: dataset.title.clone(),
         dial: job.dial,

@@ -1,5 +1,6 @@
 //! [`Recipe`]: everything that decides the result of a touch, as one value.
 
+mod choices;
 mod words;
 
 use std::ops::Deref;
@@ -22,6 +23,7 @@ use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 
 pub use crate::infer::recipe_id::RecipeId;
+pub use choices::{GeneratorChoice, ShiftChoice};
 pub use words::{Words, meters, millimeters, quoted};
 
 /// The steps from a touch to a pose, in order; the result of each is made from the one before.
@@ -217,16 +219,12 @@ impl<M> Recipe<M> {
         own.map_or_else(Vec::new, |own| seeds(own, count).into_iter().map(|seed| self.with_seed(seed)).collect())
     }
 
-    /// True where the mask model is run.
-    fn takes_mask_model(&self) -> bool {
-        matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
-    }
-}
-
-impl Recipe {
     /// Only what decides the result of a stage: what comes later, and what is not used, is as it goes without saying.
     #[must_use]
-    pub fn until(&self, stage: Stage) -> Self {
+    pub fn until(&self, stage: Stage) -> Self
+    where
+        M: Clone,
+    {
         let predicted = self.imprint == ImprintSource::Predicted;
         let masked = stage >= Stage::Mask;
         let unet = masked && self.takes_mask_model() && self.mask_model.is_some();
@@ -243,6 +241,13 @@ impl Recipe {
         }
     }
 
+    /// True where the mask model is run.
+    fn takes_mask_model(&self) -> bool {
+        matches!(self.mask.source, MaskSource::Auto | MaskSource::Unet)
+    }
+}
+
+impl Recipe {
     /// The identity of the result of a stage, of any touch.
     pub fn id(&self, stage: Stage) -> RecipeId {
         let of = self.until(stage);

@@ -3,9 +3,9 @@
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
-use super::{ProposeSetup, WHAT, accepted, propose};
+use super::{ProposalSource, ProposeSetup, WHAT, accepted, propose};
 use crate::error::{Remark, TaskError};
 use crate::feel::{Touch, feel};
 use crate::io::caught::caught;
@@ -34,10 +34,10 @@ pub struct BatchSetup {
 }
 
 /// Outcome of proposals for many pairs.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Batch {
     /// Source of the proposals.
-    pub source: &'static str,
+    pub source: ProposalSource,
     /// Pairs that have new masks, by name.
     pub changed: Vec<String>,
     /// New masks.
@@ -55,6 +55,20 @@ pub struct Batch {
 }
 
 impl Batch {
+    /// Batches of other pairs of one setup, as one.
+    pub fn joined(batches: impl IntoIterator<Item = Self>) -> Option<Self> {
+        batches.into_iter().reduce(|mut all, one| {
+            all.changed.extend(one.changed);
+            all.left_out.extend(one.left_out);
+            all.masks += one.masks;
+            all.same += one.same;
+            all.judged += one.judged;
+            all.complete &= one.complete;
+            all.seconds += one.seconds;
+            all
+        })
+    }
+
     /// Summary in words.
     pub fn text(&self) -> String {
         let mut text = format!("{} proposed in {}", counted(self.masks, "mask"), counted(self.changed.len(), "pair"));
@@ -87,7 +101,7 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
     let labels = Labels::of(dataset);
     labels.folder()?;
     let (mut tools, total) = (BTreeMap::new(), setup.pairs.len());
-    let mut batch = Batch { source: setup.propose.source.key(), complete: true, ..Batch::default() };
+    let mut batch = Batch { source: setup.propose.source, complete: true, ..Batch::default() };
     for (done, &pair) in setup.pairs.iter().enumerate() {
         if cx.cancel.is_cancelled() {
             batch.complete = false;

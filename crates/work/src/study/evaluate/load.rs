@@ -64,7 +64,10 @@ impl Labeled {
 pub(super) fn plan(dataset: &Dataset, setup: &Setup) -> Vec<ToolWork> {
     by_tool(dataset)
         .into_iter()
-        .map(|(tool, ids)| {
+        .map(|(tool, mut ids)| {
+            if let Some(only) = &setup.pairs {
+                ids.retain(|id| only.contains(id));
+            }
             let taken = pairs::spread(ids.len(), setup.grasps_per_tool);
             ToolWork { tool, ids: taken.map(|at| ids[at]).collect() }
         })

@@ -1,6 +1,6 @@
 //! The dials, and the settings that they stand for.
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 use strum::{EnumIter, EnumString, IntoEnumIterator as _, IntoStaticStr};
 
 use crate::mask::{MaskChoice, MaskRecipe, MaskSource};
@@ -15,7 +15,7 @@ pub const MOST_VALUES: usize = 40;
 const THRESHOLD_M: f32 = 0.1;
 
 /// Dial that can be turned.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, EnumIter, EnumString, IntoStaticStr, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Dial {

@@ -2,35 +2,32 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Serialize, Serializer};
 
-use super::{Setting, SweepSetup};
+use super::Setting;
 use crate::labels::ImprintSource;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::units::angle_error;
 
-/// A pair with one value.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// A pair with one value. In files lengths and angles are also in the units of the screen.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(into = "WrittenOutcome")]
 pub struct Outcome {
-    /// The pair.
-    #[serde(skip)]
+    /// The pair; no file says it.
+    #[serde(skip, default = "nowhere")]
     pub pair: PairId,
     /// Name of the pair.
     pub name: String,
     /// True where the true pose is known.
     pub truth: bool,
     /// The angle that the lab reports, radians.
-    #[serde(rename = "angle_deg", serialize_with = "degrees")]
     pub angle_rad: Option<f64>,
     /// Size of its error, radians, where the truth is known.
-    #[serde(rename = "error_deg", serialize_with = "degrees")]
     pub error_rad: Option<f64>,
     /// Size of the change of the angle against what is in force, radians.
-    #[serde(rename = "change_deg", serialize_with = "degrees")]
     pub change_rad: Option<f64>,
     /// Root mean square of the residuals, meters.
-    #[serde(rename = "rms_mm", serialize_with = "millimeters")]
     pub rms_m: Option<f64>,
     /// Contact points.
     pub points: usize,
@@ -38,6 +35,53 @@ pub struct Outcome {
     pub hand: bool,
     /// Why there is no pose.
     pub failure: Option<String>,
+}
+
+/// The place of a pair that is known by its name alone.
+fn nowhere() -> PairId {
+    PairId(u32::MAX)
+}
+
+/// [`Outcome`] in a file.
+#[derive(Serialize)]
+struct WrittenOutcome {
+    name: String,
+    truth: bool,
+    angle_rad: Option<f64>,
+    angle_deg: Option<f64>,
+    error_rad: Option<f64>,
+    error_deg: Option<f64>,
+    change_rad: Option<f64>,
+    change_deg: Option<f64>,
+    rms_m: Option<f64>,
+    rms_mm: Option<f64>,
+    points: usize,
+    hand: bool,
+    failure: Option<String>,
+}
+
+impl From<Outcome> for WrittenOutcome {
+    fn from(of: Outcome) -> Self {
+        let Outcome { name, truth, angle_rad, error_rad, change_rad, rms_m, points, hand, failure, .. } = of;
+        let degrees = |radians: Option<f64>| radians.map(f64::to_degrees);
+        let [angle_deg, error_deg, change_deg] = [angle_rad, error_rad, change_rad].map(degrees);
+        let rms_mm = rms_m.map(|m| m * 1e3);
+        Self {
+            name,
+            truth,
+            angle_rad,
+            angle_deg,
+            error_rad,
+            error_deg,
+            change_rad,
+            change_deg,
+            rms_m,
+            rms_mm,
+            points,
+            hand,
+            failure,
+        }
+    }
 }
 
 fn degrees<S: Serializer>(radians: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
@@ -161,12 +205,22 @@ pub struct Series {
 
 impl Series {
     /// From the outcomes of each pair: as in force, then with each value.
-    pub(super) fn new(source: ImprintSource, rows: Vec<Vec<Outcome>>, setup: &SweepSetup, at: Option<Setting>) -> Self {
-        let mut columns: Vec<Vec<Outcome>> = vec![Vec::new(); setup.values.len() + 1];
+    pub(super) fn new(source: ImprintSource, rows: Vec<Vec<Outcome>>, values: &[Setting], at: Option<Setting>) -> Self {
+        let mut columns: Vec<Vec<Outcome>> = vec![Vec::new(); values.len() + 1];
         for row in rows {
             columns.iter_mut().zip(row).for_each(|(column, outcome)| column.push(outcome));
         }
-        let values = std::iter::once(None).chain(setup.values.iter().copied().map(Some));
+        Self::of_columns(source, columns, values, at)
+    }
+
+    /// From the outcomes of all pairs: as in force, then with each value.
+    pub(super) fn of_columns(
+        source: ImprintSource,
+        columns: Vec<Vec<Outcome>>,
+        values: &[Setting],
+        at: Option<Setting>,
+    ) -> Self {
+        let values = std::iter::once(None).chain(values.iter().copied().map(Some));
         let point = |(value, cases): (Option<Setting>, Vec<Outcome>)| {
             let in_force = value.is_none() || value == at;
             Point { value, in_force, summary: Summary::of(&cases), cases }
@@ -182,6 +236,28 @@ impl Series {
         Self { source, base, points, best: best.map(|(i, _)| i) }
     }
 
+    /// Adds other pairs with the same values.
+    ///
+    /// # Errors
+    /// If the values are others.
+    pub(super) fn append(&mut self, more: Self) -> Result<(), String> {
+        let value = |point: &Point| point.value;
+        if !self.points.iter().map(value).eq(more.points.iter().map(value)) {
+            return Err("the parts are of different values".into());
+        }
+        let values: Vec<Setting> = self.points.iter().filter_map(value).collect();
+        let at = self.points.iter().find(|point| point.in_force).and_then(value);
+        let columns = |of: &mut Self| {
+            let points = std::iter::once(&mut of.base).chain(&mut of.points);
+            points.map(|point| std::mem::take(&mut point.cases)).collect::<Vec<_>>()
+        };
+        let mut more = more;
+        let mut all = columns(self);
+        all.iter_mut().zip(columns(&mut more)).for_each(|(all, more)| all.extend(more));
+        *self = Self::of_columns(self.source, all, &values, at);
+        Ok(())
+    }
+
     /// True where the truth of some pair is known.
     pub fn has_truth(&self) -> bool {
         self.base.summary.angle.is_some()
@@ -191,7 +267,6 @@ impl Series {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recipe::Recipe;
     use crate::sweep::Dial;
 
     fn outcome(truth: bool, error_deg: Option<f64>, points: usize) -> Outcome {
@@ -208,17 +283,13 @@ mod tests {
     }
 
     fn series(rows: Vec<Vec<Outcome>>) -> Series {
-        let setup = SweepSetup {
-            values: Dial::Threshold.spread(2.0, 4.0, 3).unwrap(),
-            pairs: Vec::new(),
-            recipe: Recipe { hand: false, ..Recipe::default() },
-        };
+        let values = Dial::Threshold.spread(2.0, 4.0, 3).unwrap();
         let rows = rows.into_iter().map(|mut row| {
             let base = row[0].angle_rad;
             row.iter_mut().for_each(|one| one.set_change(base));
             row
         });
-        Series::new(ImprintSource::Measured, rows.collect(), &setup, Some(setup.values[1]))
+        Series::new(ImprintSource::Measured, rows.collect(), &values, Some(values[1]))
     }
 
     #[test]

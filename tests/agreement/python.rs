@@ -1,0 +1,101 @@
+//! Random recipes from Python: the package gives the numbers of the verbs, to the last bit.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use serde_json::{Value, json};
+use touch2touch_core::diffusion::Spacing;
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
+use touch2touch_work::recipe::{Recipe, Stage, millimeters};
+
+use super::random::Draws;
+use super::{json, lab_folder};
+use crate::support;
+
+/// Feels pairs as told on standard input, and prints what the verb `pose` says of them.
+const FEEL: &str = r#"
+import json, sys
+import numpy as np
+import touch2touch as t2t
+
+rows = []
+for path, name, choices in json.load(sys.stdin):
+    felt = t2t.feel(t2t.open(path)[name], t2t.Recipe(**choices))
+    pose = felt.pose
+    rows.append(pose and {
+        "angle_deg": float(np.degrees(pose.angle)), "error_deg": pose.error and float(np.degrees(pose.error)),
+        "angle_sd_deg": None if pose.sigma is None else float(np.degrees(pose.sigma[0])), "verdict": pose.verdict,
+    })
+json.dump(rows, sys.stdout)
+"#;
+
+/// A recipe as the keywords of `touch2touch.Recipe`.
+fn keywords(recipe: &Recipe) -> Value {
+    let (model, config) = recipe.generator.as_ref().unwrap();
+    let path = |model: &touch2touch_work::recipe::Model| model.origin.path().display().to_string();
+    let number = |meters: f32| millimeters(meters).parse::<f64>().unwrap();
+    let mask = recipe.mask;
+    let mut all = json!({
+        "imprint": recipe.imprint.key(), "bundle": path(model), "steps": config.steps, "seed": config.seed, "eta": config.eta,
+        "sampler": config.sampler.key(), "guidance": config.guidance, "mask": mask.source.key(),
+        "threshold_mm": number(mask.threshold_m), "probability": mask.probability, "top_percent": mask.top_percent,
+        "cad_mm": number(mask.cad_distance_m), "hand": recipe.hand, "engine": recipe.registration.to_string(),
+        "runtime": "rten", "mask_bundle": recipe.mask_model.as_ref().map(path),
+    });
+    all["spacing"] = if config.spacing == Spacing::Lab { "lab" } else { "trailing" }.into();
+    let (shift, parts) = match recipe.shift {
+        ShiftMode::Raw => ("raw", CorrectionParts::ALL),
+        ShiftMode::PaperShift => ("paper", CorrectionParts::ALL),
+        ShiftMode::Parts(parts) => ("exact", parts),
+        _ => ("exact", CorrectionParts::ALL),
+    };
+    all["shift"] = shift.into();
+    let names = <CorrectionPart as strum::IntoEnumIterator>::iter().filter(|part| parts.has(*part)).map(<&str>::from);
+    all["fit_parts"] = names.collect::<Vec<_>>().into();
+    all
+}
+
+/// Rows of the package, in order.
+fn felt(python: &Path, asked: &[(String, String, Value)]) -> Vec<Value> {
+    let mut child =
+        Command::new(python).args(["-c", FEEL]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    child.stdin.take().unwrap().write_all(&serde_json::to_vec(asked).unwrap()).unwrap();
+    let done = child.wait_with_output().unwrap();
+    assert!(done.status.success());
+    serde_json::from_slice(&done.stdout).unwrap()
+}
+
+#[test]
+pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb() {
+    let Some(python) = support::python() else { return };
+    let home = tempfile::tempdir().unwrap();
+    let lab = lab_folder(home.path()).display().to_string();
+    let mut draws = Draws::new(29);
+    let (mut asked, mut said) = (Vec::new(), Vec::new());
+    for at in 0..6 {
+        let path = if at % 2 == 0 { "demo" } else { &lab };
+        let recipe = draws.posed();
+        let recipe = Recipe { engine: touch2touch_work::infer::engine::EngineChoice::Rten, ..recipe };
+        let words = recipe.words(Stage::Pose).list();
+        let begin = ["pose", path, "--imprint", "predicted", "--limit", "2", "--no-cache"];
+        let words: Vec<&str> = begin.into_iter().chain(words.iter().map(String::as_str)).collect();
+        for case in json(&words, home.path())["cases"].as_array().unwrap() {
+            asked.push((path.to_owned(), case["name"].as_str().unwrap().to_owned(), keywords(&recipe)));
+            said.push(case.clone());
+        }
+    }
+    let mut poses = 0;
+    for ((row, case), asked) in felt(&python, &asked).iter().zip(&said).zip(&asked) {
+        assert_eq!(row.is_null(), case["angle_deg"].is_null(), "{asked:?}: {case}");
+        if row.is_null() {
+            continue;
+        }
+        for number in ["angle_deg", "error_deg", "angle_sd_deg"] {
+            assert_eq!(row[number], case[number], "{number}, {asked:?}");
+        }
+        assert_eq!(row["verdict"], case["verdict"]["grade"], "{asked:?}");
+        poses += 1;
+    }
+    assert!(poses >= 4, "{poses} poses of {}", said.len());
+}
