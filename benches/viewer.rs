@@ -3,7 +3,7 @@
 //!
 //! The whole studio, painted whole and where something changed (`viewer/window.rs`); its memory after paging; and one
 //! picture of a 3D view by number of points, still and moving, and of a pair as a pane shows it (`viewer/pair.rs`); strokes from the pointer to the screen, and a thousand pairs
-//! paged through (`viewer/labeling.rs`). `-- frames`, `-- memory`, `-- points`, `-- pair`, `-- strokes`, `-- paging` runs one of them.
+//! paged through (`viewer/labeling.rs`); scores of 32,256 pairs (`viewer/rows.rs`). `-- frames`, `-- memory`, `-- points`, `-- pair`, `-- strokes`, `-- paging`, `-- rows` runs one of them.
 //!
 //! Still = all points, moving = as many as the renderer allows while the camera moves, unchanged = the same call
 //! again: nothing may be drawn. Times include waiting for the device.
@@ -12,6 +12,8 @@
 mod labeling;
 #[path = "viewer/pair.rs"]
 mod pair;
+#[path = "viewer/rows.rs"]
+mod rows;
 #[path = "viewer/window.rs"]
 mod window;
 
@@ -66,7 +68,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let words: Vec<String> = std::env::args().skip(1).filter(|word| word != "--bench").collect();
     let json = words.iter().position(|word| word == "--json").and_then(|at| words.get(at + 1));
-    let parts = ["memory", "frames", "strokes", "paging", "pair", "points"];
+    let parts = ["memory", "frames", "strokes", "paging", "rows", "pair", "points"];
     let asked: Vec<&str> = parts.into_iter().filter(|part| words.iter().any(|word| word == part)).collect();
     let mut report = serde_json::Map::new();
     report.insert("adapter".into(), gpu.adapter.clone().into());
@@ -77,6 +79,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             "frames" => window::frames()?,
             "strokes" => labeling::strokes()?,
             "paging" => labeling::paging()?,
+            "rows" => rows::rows()?,
             "pair" => pair::pair(&gpu)?,
             _ => points(&gpu)?,
         };

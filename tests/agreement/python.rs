@@ -5,12 +5,17 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
+use touch2touch::app::evaluate::EvaluateCommand;
+use touch2touch::app::library::Place;
+use touch2touch::app::settings::{Workspace, prefer};
+use touch2touch::app::tasks::Level;
 use touch2touch_core::diffusion::Spacing;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_work::recipe::{Recipe, Stage, millimeters};
 
 use super::random::Draws;
-use super::{json, lab_folder};
+use super::{Studio, json, lab_folder};
 use crate::support;
 
 /// Feels pairs as told on standard input, and prints what the verb `pose` says of them.
@@ -98,4 +103,62 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
         poses += 1;
     }
     assert!(poses >= 4, "{poses} poses of {}", said.len());
+}
+
+/// Writes rows of the first pairs of the demo into a folder.
+const ROWS: &str = r#"
+import sys
+import touch2touch as t2t
+import touch2touch.ray
+
+out, bundle = sys.argv[1:]
+data = t2t.open("demo")[:6]
+recipe = t2t.Recipe("predicted", bundle=bundle, mask="threshold", runtime="rten", steps=1)
+touch2touch.ray.Worker(data, recipe, out)({"pair": data.names})
+"#;
+
+#[test]
+fn rows_from_python_are_scores_in_the_studio() {
+    let Some(python) = support::python() else { return };
+    let home = tempfile::tempdir().unwrap();
+    let rows = home.path().join("felt");
+    let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
+    assert!(Command::new(python).args(["-c", ROWS]).arg(&rows).arg(&bundle).status().unwrap().success());
+    let mut studio = Studio::open(Place::Demo, home.path());
+    studio.send(prefer(|s| s.workspace = Workspace::Evaluate).into());
+    studio.send(EvaluateCommand::OpenRows(rows.join("nothing")).into());
+    assert!(
+        studio.state.table.rows.is_none() && studio.state.log.entries.iter().any(|entry| entry.level == Level::Error),
+        "it is said"
+    );
+    studio.send(EvaluateCommand::OpenRows(rows).into());
+    let table = &studio.state.table;
+    let source = table.scores.source("felt").expect("the rows are a source of scores");
+    assert_eq!(source.scored, 6);
+    let bundle = bundle.display().to_string();
+    let model = ["--bundle", bundle.as_str(), "--runtime", "rten", "--steps", "1", "--no-cache"];
+    let pose = ["pose", "demo", "--imprint", "predicted", "--mask", "threshold"];
+    let poses = json(&[&pose[..], &model].concat(), home.path());
+    let out = home.path().join("out").display().to_string();
+    let generated = json(&[&["generate", "demo", "--finger", "both", "--out", &out][..], &model].concat(), home.path());
+    let of = |answer: &Value, list: &str, name: &str| -> Vec<Value> {
+        answer[list].as_array().unwrap().iter().filter(|row| row["name"] == name).cloned().collect()
+    };
+    let mut worst = f64::INFINITY;
+    for &pair in studio.state.library.order.iter().take(6) {
+        let name = &studio.state.library.pairs()[pair.0 as usize].name;
+        let angle = source.value(pair, Metric::Angle).unwrap();
+        let case = of(&poses, "cases", name).remove(0);
+        assert_eq!(case["error_deg"].as_f64(), (!angle.is_nan()).then(|| angle.to_degrees()), "{name}");
+        // Pooled over the fingers, as the squared errors are.
+        let powers = of(&generated, "pairs", name)
+            .iter()
+            .map(|row| 10f64.powf(-row["psnr_db"].as_f64().unwrap() / 10.0))
+            .collect::<Vec<_>>();
+        let pooled = -10.0 * (powers.iter().sum::<f64>() / powers.len() as f64).log10();
+        assert!((source.value(pair, Metric::Psnr).unwrap() - pooled).abs() < 1e-9, "{name}");
+        let badness = Metric::Angle.badness(angle);
+        assert!(badness <= worst, "the worst come first");
+        worst = badness;
+    }
 }

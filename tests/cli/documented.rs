@@ -66,6 +66,8 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch unit", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
+    // Its files are what jobs have printed.
+    ("touch2touch merge", How::Parse),
     // Without an engine on the machine it says so by its exit code.
     ("touch2touch runtime", How::Run(&[], "", &[0, 1])),
 ];

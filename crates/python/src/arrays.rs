@@ -1,5 +1,7 @@
 //! Grids, points and transforms as numpy's arrays, and back.
 
+use std::borrow::Cow;
+
 use glam::{DAffine3, DVec3};
 use numpy::{
     Element, PyArray, PyArray1, PyArrayDyn, PyArrayMethods as _, PyReadonlyArray2, PyUntypedArrayMethods as _,
@@ -78,18 +80,18 @@ pub(crate) fn points<'py>(py: Python<'py>, points: &[DVec3]) -> PyResult<Array<'
     array(py, points.iter().flat_map(|p| p.to_array()).collect(), &[points.len(), 3])
 }
 
-/// Points of an array (N, 3).
+/// Points of an array (N, 3): the array itself where it lies row by row, else a copy.
 ///
 /// # Errors
 /// If it has another shape.
-pub(crate) fn points_of(array: &PyReadonlyArray2<'_, f64>, what: &str) -> PyResult<Vec<DVec3>> {
+pub(crate) fn points_of<'a>(array: &'a PyReadonlyArray2<'_, f64>, what: &str) -> PyResult<Cow<'a, [DVec3]>> {
     let shape = array.shape();
     if shape[1] != 3 {
         return Err(refused(format!("{what} must be an array of N x 3 coordinates, not {} x {}", shape[0], shape[1])));
     }
     // A slice of an array in Fortran's order runs down its columns.
     Ok(match array.as_slice() {
-        Ok(values) if array.is_c_contiguous() => values.chunks_exact(3).map(DVec3::from_slice).collect(),
+        Ok(values) if array.is_c_contiguous() => Cow::Borrowed(bytemuck::cast_slice(values)),
         _ => array.as_array().rows().into_iter().map(|row| DVec3::new(row[0], row[1], row[2])).collect(),
     })
 }

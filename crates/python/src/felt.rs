@@ -1,5 +1,6 @@
 //! From a touch to its pose, and from points to a pose.
 
+use std::borrow::Cow;
 use std::sync::Arc;
 
 use glam::DVec3;
@@ -292,7 +293,8 @@ fn choice(engine: &str) -> PyResult<RegistrationChoice> {
     engine.parse().map_err(refused)
 }
 
-/// The pose of a tool from contact points (N, 3), float64, meters, grasp frame: for any grasp, not only ours.
+/// The pose of a tool from contact points (N, 3), float64, meters, grasp frame: for any grasp, not only ours. An array that lies
+/// row by row is read where it is: another thread must not write to it meanwhile.
 ///
 /// `engine`: the registration; points alone have no membrane, so "joint" goes by them as "distance_field" does. `evidence`:
 /// with standard deviations and verdict, which cost about as much as the pose.
@@ -324,7 +326,7 @@ pub(crate) fn register_many(
     let by = choice(engine)?;
     let clouds = clouds.iter().map(|points| points_of(points, "points")).collect::<PyResult<Vec<_>>>()?;
     let found = watched(py, progress, |_, cx| {
-        let one = |points: &Vec<DVec3>| {
+        let one = |points: &Cow<'_, [DVec3]>| {
             cx.check("Register")?;
             Ok(registered(points, tool, by, evidence).ok())
         };

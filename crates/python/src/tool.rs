@@ -53,7 +53,7 @@ impl Tool {
                 (mesh, file.file_stem().unwrap_or_default().to_string_lossy().into_owned())
             }
             Some(faces) => {
-                let vertices = points_of(&source.extract()?, "vertices")?;
+                let vertices = points_of(&source.extract()?, "vertices")?.into_owned();
                 (TriMesh { triangles: triangles(&faces, vertices.len())?, vertices }, "tool".to_owned())
             }
         };

@@ -38,6 +38,9 @@ pub enum Provider {
     WebGpu,
 }
 
+/// Beginning of the engines' names.
+const ON: &str = "ONNX Runtime on ";
+
 impl Provider {
     /// Key in files, on the command line and in Python.
     pub fn key(self) -> &'static str {
@@ -46,15 +49,7 @@ impl Provider {
 
     /// Name for people.
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Cuda => "CUDA",
-            Self::TensorRt => "TensorRT",
-            Self::MiGraphX => "MIGraphX",
-            Self::DirectMl => "DirectML",
-            Self::CoreMl => "Core ML",
-            Self::OpenVino => "OpenVINO",
-            Self::WebGpu => "WebGPU",
-        }
+        self.engine_name().trim_start_matches(ON)
     }
 
     /// Name of the engine that it makes of ONNX Runtime.
@@ -123,7 +118,7 @@ mod tests {
         for provider in Provider::iter() {
             assert_eq!(serde_json::to_value(provider).unwrap(), provider.key());
             assert_eq!(provider.key().parse(), Ok(provider));
-            assert!(provider.engine_name().ends_with(provider.name()));
+            assert!(!provider.name().is_empty() && provider.name().len() < provider.engine_name().len());
         }
     }
 }
