@@ -173,9 +173,9 @@ def tried(method):
 
 
 def trials(bench):
-    found = {}
+    found, vqvae = {}, bench.places["vqvae"]
     for name, words in SENSORS.items():
-        answer = bench.verb("trials", *SHIPPED, *words)
+        answer = bench.verb("trials", *SHIPPED, *(("--bundle", vqvae) if vqvae else ()), *words)
         found[name] = {tool["tool"]: [tried(method) for method in tool["methods"]] for tool in answer["tools"]}
         found["published"] = answer["published"]
     return found

@@ -134,23 +134,24 @@ pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
     const GRAPH: &[u8] = include_bytes!("probe.onnx");
     static TRIED: Mutex<BTreeMap<Provider, Result<(), NoProvider>>> = Mutex::new(BTreeMap::new());
     // A library that is not loaded may yet be: nothing is kept of that.
-    if library().is_err() || !is_in_the_library(provider) {
+    if library().is_err() {
         return Err(NoProvider::NotInTheLibrary(provider));
     }
     let mut tried = TRIED.lock().unwrap_or_else(PoisonError::into_inner);
     let attempt = || {
+        if !is_in_the_library(provider) {
+            return Err(NoProvider::NotInTheLibrary(provider));
+        }
         let x = Tensor::filled(vec![1, 4], -1.0);
         let run = load(GRAPH, Some(provider)).and_then(|mut session| session.run(&[("x", Input::F32(&x))], "y"));
-        match run {
-            Ok(y) if y.data() == [0.0; 4] => Ok(()),
-            Ok(_) => Err("it computes wrong numbers".to_owned()),
-            Err(reason) => Err(reason),
-        }
+        let said = match run {
+            Ok(y) if y.data() == [0.0; 4] => return Ok(()),
+            Ok(_) => "it computes wrong numbers".to_owned(),
+            Err(reason) => one_line(&reason),
+        };
+        Err(NoProvider::DoesNotStart { provider, said })
     };
-    tried
-        .entry(provider)
-        .or_insert_with(|| attempt().map_err(|said| NoProvider::DoesNotStart { provider, said: one_line(&said) }))
-        .clone()
+    tried.entry(provider).or_insert_with(attempt).clone()
 }
 
 /// Words of the library, which may go over many lines with paths of its own source.
