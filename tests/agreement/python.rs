@@ -5,9 +5,9 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use serde_json::{Value, json};
+use touch2touch::app::command::{Pane, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{Workspace, prefer};
 use touch2touch::app::tasks::Level;
 use touch2touch_core::diffusion::Spacing;
 use touch2touch_core::evaluation::Metric;
@@ -125,7 +125,7 @@ fn rows_from_python_are_scores_in_the_studio() {
     let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
     assert!(Command::new(python).args(["-c", ROWS]).arg(&rows).arg(&bundle).status().unwrap().success());
     let mut studio = Studio::open(Place::Demo, home.path());
-    studio.send(prefer(|s| s.workspace = Workspace::Evaluate).into());
+    studio.send(ViewCommand::ShowPanes([Pane::Table].into()).into());
     studio.send(EvaluateCommand::OpenRows(rows.join("nothing")).into());
     assert!(
         studio.state.table.rows.is_none() && studio.state.log.entries.iter().any(|entry| entry.level == Level::Error),
