@@ -18,6 +18,7 @@ use crate::ui::parts::widget::empty;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Metric, mean};
+use touch2touch_core::verdict::Grade;
 
 /// Height of a row, points.
 const ROW: f32 = 24.0;
@@ -183,17 +184,28 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
     ui.painter().text(left, Align2::LEFT_CENTER, what, FontId::proportional(SMALL), cx.p.weak);
     for ((source, metric), cell) in columns.iter().zip(numbers) {
         let values = order.iter().filter_map(|pair| source.value(*pair, *metric)).filter(|v| v.is_finite());
-        let text = mean(values).map_or("–".to_owned(), |mean| number(*metric, mean));
+        let text = match metric {
+            // Of words, the share of the best.
+            Metric::Verdict => mean(values.map(|value| f64::from(u8::from(value == f64::from(Grade::Good as u8)))))
+                .map(|share| format!("{:.0} % {}", 100.0 * share, Grade::Good)),
+            metric => mean(values).map(|mean| number(*metric, mean)),
+        };
+        let text = text.unwrap_or_else(|| "–".to_owned());
         put(ui, cell, &text, cx.p.strong);
     }
     response.on_hover_text(
-        "Means over the pairs of the list that were scored; grasps without a pose are left out of those of the angle",
+        "Means over the pairs of the list that were scored, of verdicts the share that is good; grasps without a pose are \
+         left out of those of the angle",
     );
 }
 
 /// A value without its unit, which the heading says.
 fn number(metric: Metric, value: f64) -> String {
-    if value.is_nan() { metric.text(value) } else { format!("{:.*}", metric.decimals(), metric.shown(value)) }
+    if value.is_nan() || metric == Metric::Verdict {
+        metric.text(value)
+    } else {
+        format!("{:.*}", metric.decimals(), metric.shown(value))
+    }
 }
 
 fn put(ui: &Ui, cell: Rect, text: &str, color: Color32) {
