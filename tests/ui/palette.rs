@@ -3,7 +3,8 @@
 use eframe::egui::{Event, Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::settings::Workspace;
+use touch2touch::app::command::Pane;
+use touch2touch::app::settings::{Workspace, prefer};
 
 use super::rig::Rig;
 
@@ -57,4 +58,19 @@ fn other_words_find_actions() {
         rig.harness.key_press(Key::Escape);
         rig.settle();
     }
+}
+
+#[test]
+fn a_pane_is_found_from_a_workspace_that_has_none_of_it() {
+    let Some(mut rig) = Rig::new([1280.0, 800.0], 1) else { return };
+    rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
+    rig.settle();
+    open(&mut rig);
+    rig.harness.get_by_label("Find anything").type_text(Pane::Settings.title());
+    rig.harness.step();
+    rig.harness.key_press(Key::Enter);
+    rig.settle();
+    let state = rig.harness.state().state();
+    assert_eq!(state.settings.workspace, Workspace::Inspect);
+    assert!(state.selection.panes.contains(&Pane::Settings), "{:?}", state.selection.panes);
 }

@@ -1,11 +1,11 @@
-//! The command palette: finds actions, samples and tools.
+//! The command palette: finds actions, panes, samples and tools.
 
 use eframe::egui::{self, Align2, FontId, Key, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::fuzzy::score;
 use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, ViewCommand};
+use crate::app::command::{LibraryCommand, Pane, UiRequest, ViewCommand};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::SMALL;
 use touch2touch_core::dataset::PairId;
@@ -21,6 +21,7 @@ const ROW: f32 = 28.0;
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Entry {
     Action(Action),
+    Pane(Pane),
     Pair(PairId, String),
     Tool(String),
 }
@@ -56,7 +57,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
             )
         });
         let edit = egui::TextEdit::singleline(&mut memory.query)
-            .hint_text("Find an action, a pair or a tool")
+            .hint_text("Find an action, a pane, a pair or a tool")
             .font(FontId::proportional(15.0))
             .desired_width(520.0);
         let response = ui.add(edit).accessible_name("Find anything");
@@ -93,6 +94,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
         match entry {
             Entry::Action(action) if action != Action::Palette => cx.act(action),
             Entry::Action(_) => {}
+            Entry::Pane(pane) => cx.push(ViewCommand::Ui(UiRequest::ShowPane(pane))),
             Entry::Pair(pair, _) => cx.push(LibraryCommand::Select(pair)),
             Entry::Tool(tool) => cx.push(LibraryCommand::SetToolFilter(Some(tool))),
         }
@@ -119,6 +121,7 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
         }
     }
     if !query.trim().is_empty() {
+        ranked.extend(Pane::iter().filter_map(|pane| Some((score(&query, pane.title())? + 2, Entry::Pane(pane)))));
         if let Some(open) = &cx.state.library.open {
             ranked.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
         }
@@ -140,6 +143,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             let keys = cx.keys().text(*action);
             (action.name(), keys, action.command(cx.state).is_some())
         }
+        Entry::Pane(pane) => (pane.title(), "pane".to_owned(), true),
         Entry::Pair(_, name) => (name.as_str(), "pair".to_owned(), true),
         Entry::Tool(tool) => (tool.as_str(), "tool".to_owned(), true),
     };
@@ -154,7 +158,12 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
         let y = rect.center().y;
         let place =
             ui.painter().text(pos2(rect.left() + 8.0, y), Align2::LEFT_CENTER, name, FontId::proportional(13.0), color);
-        if let Entry::Action(action) = entry {
+        let tip = match entry {
+            Entry::Action(action) => Some(action.tooltip()),
+            Entry::Pane(pane) => Some(pane.tip()),
+            Entry::Pair(..) | Entry::Tool(_) => None,
+        };
+        if let Some(tip) = tip {
             let clip = egui::Rect::from_min_max(
                 pos2(place.right() + 12.0, rect.top()),
                 pos2(rect.right() - 110.0, rect.bottom()),
@@ -162,7 +171,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             ui.painter_at(clip).text(
                 pos2(clip.left(), y),
                 Align2::LEFT_CENTER,
-                action.tooltip(),
+                tip,
                 FontId::proportional(SMALL),
                 p.weak,
             );
