@@ -105,14 +105,14 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
     assert!(poses >= 4, "{poses} poses of {}", said.len());
 }
 
-/// Writes rows of the first pairs of the demo into a folder.
+/// Writes rows of all pairs of a data set into a folder.
 const ROWS: &str = r#"
 import sys
 import touch2touch as t2t
 import touch2touch.ray
 
-out, bundle = sys.argv[1:]
-data = t2t.open("demo")[:6]
+path, out, bundle = sys.argv[1:]
+data = t2t.open(path)
 recipe = t2t.Recipe("predicted", bundle=bundle, mask="threshold", runtime="rten", steps=1)
 touch2touch.ray.Worker(data, recipe, out)({"pair": data.names})
 "#;
@@ -121,10 +121,10 @@ touch2touch.ray.Worker(data, recipe, out)({"pair": data.names})
 fn rows_from_python_are_scores_in_the_studio() {
     let Some(python) = support::python() else { return };
     let home = tempfile::tempdir().unwrap();
-    let rows = home.path().join("felt");
+    let (lab, rows) = (lab_folder(home.path()), home.path().join("felt"));
     let bundle = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator");
-    assert!(Command::new(python).args(["-c", ROWS]).arg(&rows).arg(&bundle).status().unwrap().success());
-    let mut studio = Studio::open(Place::Demo, home.path());
+    assert!(Command::new(python).args(["-c", ROWS]).arg(&lab).arg(&rows).arg(&bundle).status().unwrap().success());
+    let mut studio = Studio::open(Place::Path(lab.clone()), home.path());
     studio.send(ViewCommand::ShowPanes([Pane::Table].into()).into());
     studio.send(EvaluateCommand::OpenRows(rows.join("nothing")).into());
     assert!(
@@ -134,18 +134,19 @@ fn rows_from_python_are_scores_in_the_studio() {
     studio.send(EvaluateCommand::OpenRows(rows).into());
     let table = &studio.state.table;
     let source = table.scores.source("felt").expect("the rows are a source of scores");
-    assert_eq!(source.scored, 6);
+    assert_eq!(source.scored, 3);
     let bundle = bundle.display().to_string();
     let model = ["--bundle", bundle.as_str(), "--runtime", "rten", "--steps", "1", "--no-cache"];
-    let pose = ["pose", "demo", "--imprint", "predicted", "--mask", "threshold"];
+    let lab = lab.to_str().unwrap();
+    let pose = ["pose", lab, "--imprint", "predicted", "--mask", "threshold"];
     let poses = json(&[&pose[..], &model].concat(), home.path());
     let out = home.path().join("out").display().to_string();
-    let generated = json(&[&["generate", "demo", "--finger", "both", "--out", &out][..], &model].concat(), home.path());
+    let generated = json(&[&["generate", lab, "--finger", "both", "--out", &out][..], &model].concat(), home.path());
     let of = |answer: &Value, list: &str, name: &str| -> Vec<Value> {
         answer[list].as_array().unwrap().iter().filter(|row| row["name"] == name).cloned().collect()
     };
     let mut worst = f64::INFINITY;
-    for &pair in studio.state.library.order.iter().take(6) {
+    for &pair in &studio.state.library.order {
         let name = &studio.state.library.pairs()[pair.0 as usize].name;
         let angle = source.value(pair, Metric::Angle).unwrap();
         let case = of(&poses, "cases", name).remove(0);

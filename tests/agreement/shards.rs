@@ -3,6 +3,8 @@
 use std::path::Path;
 
 use serde_json::Value;
+use touch2touch_core::dataset::PairId;
+use touch2touch_work::io::dataset::Dataset;
 
 use super::{json, lab_folder};
 use crate::support::{command, run};
@@ -41,18 +43,20 @@ fn merged(words: &[&str], of: usize, home: &Path) -> Value {
 pub(super) fn parts_of_a_run_are_merged_to_what_one_run_prints() {
     let home = tempfile::tempdir().unwrap();
     let lab = lab_folder(home.path());
-    // One pair that cannot be read, so that there is something to note.
-    let odd = lab.join("odd.txt");
-    std::fs::write(odd, "nothing").unwrap();
+    // A bubble without its GelSlim: every part notes it when it opens the data set, and the whole once.
+    let lonely = Dataset::open(&lab).unwrap().gelslim_file(PairId(2)).unwrap();
+    std::fs::remove_file(lonely).unwrap();
     let path = lab.to_str().unwrap();
     let [one, parts] = ["one", "parts"].map(|name| home.path().join(name).display().to_string());
     for (words, of) in [
         (vec!["pose", path, "--imprint", "both", "--engine", "all"], 2),
         (vec!["pose", "demo", "--limit", "4", "--imprint", "measured"], 5),
-        (vec!["sweep", path, "--dial", "threshold", "--values", "3,4,5"], 3),
+        (vec!["sweep", path, "--dial", "threshold", "--values", "3,4,5"], 2),
         (vec!["sweep", "demo", "--dial", "shift", "--limit", "4"], 2),
     ] {
         let (whole, merged) = (json(&words, home.path()), merged(&words, of, home.path()));
+        let is_noted = !merged["notes"].as_array().unwrap().is_empty();
+        assert_eq!(is_noted, words[1] == path, "{merged}");
         assert_eq!(timeless(merged), timeless(whole), "{words:?} in {of}");
     }
     let words = |out: &str| ["generate", path, "--finger", "both", "--out", out].map(str::to_owned);
