@@ -121,7 +121,7 @@ fn search(cx: &Cx<'_>, memory: &mut Memory) {
         }
     }
     if !query.trim().is_empty() {
-        ranked.extend(Pane::iter().filter_map(|pane| Some((score(&query, pane.title())? + 2, Entry::Pane(pane)))));
+        ranked.extend(Pane::iter().filter_map(|pane| Some((score(&query, pane.title())? + 6, Entry::Pane(pane)))));
         if let Some(open) = &cx.state.library.open {
             ranked.extend(open.tools.iter().filter_map(|t| Some((score(&query, t)?, Entry::Tool(t.clone())))));
         }
