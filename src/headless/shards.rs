@@ -1,6 +1,7 @@
 //! Shares of a run: `--shard I/N` of a verb does the I-th of N parts of its pairs, on whatever machine, and its JSON object is a
 //! *part*, of which `merge` makes what one run prints.
 
+use std::collections::HashSet;
 use std::path::Path;
 
 use clap::Args;
@@ -58,7 +59,7 @@ impl Shard {
 }
 
 impl ShardArg {
-    /// What is to be done of things in order; all without the option.
+    /// The things, in order, that are to be done; all without the option.
     pub(super) fn share<T>(self, all: Vec<T>) -> Vec<T> {
         match self.shard {
             Some(shard) => shard.share(all),
@@ -107,7 +108,7 @@ pub(super) enum Sharded {
     MasksPropose,
 }
 
-/// What a part says of itself.
+/// A part's words about itself.
 #[derive(Debug, Serialize, Deserialize)]
 struct Mark {
     verb: Sharded,
@@ -209,15 +210,11 @@ impl Parts {
 
 /// Oddities of parts by kind. Each part says what it met on the way to its pairs: what is the same in another was met there too.
 fn notes<'a>(parts: impl Iterator<Item = &'a [Problem]>) -> Vec<Finding> {
-    let (mut findings, mut before) = (Findings::default(), Vec::<&Problem>::new());
+    let key = |problem: &'a Problem| (&problem.file, &problem.what, &problem.hint);
+    let (mut findings, mut before) = (Findings::default(), HashSet::new());
     for part in parts {
-        let known = before.len();
-        for problem in part {
-            if !before[..known].contains(&problem) {
-                findings.add(problem.clone());
-                before.push(problem);
-            }
-        }
+        findings.extend(part.iter().filter(|problem| !before.contains(&key(problem))).cloned());
+        before.extend(part.iter().map(key));
     }
     findings.into_list()
 }

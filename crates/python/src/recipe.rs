@@ -56,7 +56,7 @@ impl Left<'_> {
         self.take::<String>(key)?.map(|name| choice(key, &name, all)).transpose()
     }
 
-    /// What a text stands for.
+    /// The value that a text stands for.
     ///
     /// # Errors
     /// Of the parser.

@@ -118,6 +118,7 @@ mod tests {
         for provider in Provider::iter() {
             assert_eq!(serde_json::to_value(provider).unwrap(), provider.key());
             assert_eq!(provider.key().parse(), Ok(provider));
+            assert!(provider.engine_name().ends_with(provider.name()));
             assert!(!provider.name().is_empty() && provider.name().len() < provider.engine_name().len());
         }
     }

@@ -14,7 +14,7 @@ const MAX_FILE: u64 = 1 << 30;
 /// The ending of the files.
 const ENDING: &str = "parquet";
 
-/// What is known of a touch; a number that is not there is `None`.
+/// Figures of a touch; a number that is not there is `None`.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TouchRow {
     /// The pair.

@@ -1,6 +1,6 @@
 //! Scores of many touches that were felt elsewhere: [`scores`] of the rows that `touch2touch.ray` in Python writes.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 use crate::error::TaskError;
@@ -68,8 +68,7 @@ fn of_rows(index: &Index, simulated: bool, name: &str, rows: Vec<TouchRow>) -> R
         recipes.entry(row.recipe.clone()).or_default().insert(row.pair.clone(), grasp(&row, entry, simulated));
     }
     let several = recipes.len() > 1;
-    let pairs: std::collections::BTreeSet<&String> = recipes.values().flat_map(BTreeMap::keys).collect();
-    let pairs = pairs.len();
+    let pairs = recipes.values().flat_map(BTreeMap::keys).collect::<BTreeSet<_>>().len();
     let scores = recipes.into_iter().map(|(recipe, grasps)| Scores {
         method: if several { format!("{name} {recipe}") } else { name.to_owned() },
         upper_bound: false,
