@@ -40,7 +40,7 @@ fi
 step "the Python package: its wheel in a fresh environment"
 python3 -m venv --clear target/python-venv
 python=target/python-venv/bin/python
-"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars
+"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars "ray[data]"
 "$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
 "$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
 

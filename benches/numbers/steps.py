@@ -124,7 +124,9 @@ def masks(bench):
     for kind in ("spoilt", "unet"):
         answer = bench.bench(f"masks_any_depth_{kind}", "registration", "--cases", folder, "--masks", kind, *BOTH)
         found.setdefault("any_depth", {})[kind] = engines(answer)
-    return found
+    folder = bench.cases("predicted", "--count", "100", "--seed", "6161", "--predicted", *GENERATOR)
+    answer = bench.bench("masks_predicted", "registration", "--cases", folder, "--masks", "unet", *BOTH)
+    return found | {"predicted": {"unet": engines(answer)}}
 
 
 def verdict(bench):

@@ -3,7 +3,7 @@
 import unittest
 from unittest import mock
 
-from . import pages
+from . import pages, study_tables
 from .steps import rounded
 from .tables import TABLES, number, share
 
@@ -34,6 +34,21 @@ class Pages(unittest.TestCase):
         self.assertEqual((number(None, 1), number(2.0, 0)), ("-", "2"))
         self.assertEqual(share(METHOD["success"]), "28/30 (79-98 %)")
         self.assertTrue(all(callable(of) for _, of in TABLES.values()))
+
+    def test_a_difference_is_the_row_less_what_it_is_compared_with(self):
+        base = {"method": "latent diffusion", "condition": "plain", "rotation": True, "flip": True, "geometry": "full", "shift": "exact",
+                "fit": [], "test": "test-set", "test_grasps": 4}
+        group = lambda value: {"group": "seen_tools", "psnr_db": {"value": value, "interval": [value - 0.5, value + 0.5]}}
+        row = lambda value, **other: {"settings": base | other, "groups": [group(value)]}
+        rows = [row(20.0 + n / 1000, samples=n) for n in (1000, 2000, 4000)] + [row(21.0, samples=2000, method="VQ-VAE")]
+        less = lambda one, value, **to: {"from": one["settings"], "to": to, "groups": [group(value)]}
+        # The first is the wrong way round, the second skips a budget.
+        differences = [less(rows[3], 1.0, method="latent diffusion"), less(rows[0], 3.0, samples=4000), less(rows[0], 1.0, samples=2000)]
+        text = study_tables.tables({"rows": rows, "differences": differences})
+        self.assertIn("| VQ-VAE, 2,000 samples | latent diffusion, 2,000 samples | **-1.0 [-1.5, -0.5]** | - ", text)
+        self.assertIn("| latent diffusion, 2,000 samples | latent diffusion, 1,000 samples | **1.0 [0.5, 1.5]** | - ", text)
+        self.assertNotIn("latent diffusion, 4,000 samples | latent diffusion, 1,000 samples", text)
+        self.assertNotIn("### Ablations", text, "a table of the reference alone says nothing")
 
 
 if __name__ == "__main__":

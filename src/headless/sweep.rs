@@ -13,7 +13,7 @@ use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::MaskSource;
 use touch2touch_work::pairs;
 use touch2touch_work::recipe::Recipe;
-use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep};
+use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep_part};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -69,7 +69,8 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let model = || args.model.mask_model(MaskSource::Unet, &dataset.rig);
     let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };
     let setup = SweepSetup { values, pairs, recipe: Recipe { mask_model, ..recipe } };
-    let found = sweep(&dataset, &setup, &models, &output.job())?;
+    let found = sweep_part(&dataset, &setup, &models, &output.job())?;
+    let found = if args.shard.shard.is_some() { found } else { found.moving()? };
     for remark in &found.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }
@@ -79,7 +80,7 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
 
 /// The parts of a run as one.
 pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
-    let found = Sweep::joined(parts.reports()?)?;
+    let found = Sweep::joined(parts.reports()?)?.moving()?;
     output.finish(&found, || text(&found))?;
     Ok(parts.complete())
 }

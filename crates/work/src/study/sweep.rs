@@ -154,6 +154,14 @@ type Made = Result<PerPad<Prediction>, TaskError>;
 /// If the values make no sense for what is in force, a model cannot be used, no pair has a pose that a dial could move,
 /// or it was told to stop before the first was done.
 pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx) -> Result<Sweep, TaskError> {
+    sweep_part(dataset, setup, models, cx)?.moving()
+}
+
+/// Turns a dial over a part of the pairs, as [`sweep`] does over all: in a part there may be none that it could move.
+///
+/// # Errors
+/// As [`sweep`], but for that.
+pub fn sweep_part(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx) -> Result<Sweep, TaskError> {
     let start = Instant::now();
     let job = SweepRun::new(dataset, setup, models, cx)?;
     let (mut left_out, mut tools) = (Vec::new(), BTreeMap::new());
@@ -208,10 +216,6 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
     }
     if rows.is_empty() {
         cx.check(WHAT)?;
-        let why = left_out.first().map_or("no pair was asked for".to_owned(), |first| {
-            format!("no pair has a pose that the dial could move; the first: {}: {}", first.name, first.why)
-        });
-        return Err(TaskError::new(WHAT, why));
     }
     let hand = rows.values().flatten().filter(|row| row.iter().any(|outcome| outcome.hand)).count();
     let line = |p: &Problem| format!("{}: {} ({})", p.file.display(), p.what, p.hint);
@@ -234,6 +238,22 @@ pub fn sweep(dataset: &Dataset, setup: &SweepSetup, models: &Models, cx: &JobCx)
         complete: done == total,
         seconds: start.elapsed().as_secs_f64(),
     })
+}
+
+impl<M> Sweep<M> {
+    /// This sweep, if it has a pose that the dial could move.
+    ///
+    /// # Errors
+    /// If there is none, with why the first pair has none.
+    pub fn moving(self) -> Result<Self, TaskError> {
+        if !self.series.is_empty() {
+            return Ok(self);
+        }
+        let why = self.left_out.first().map_or("there are no pairs".to_owned(), |first| {
+            format!("no pair has a pose that the dial could move; the first: {}: {}", first.name, first.why)
+        });
+        Err(TaskError::new(WHAT, why))
+    }
 }
 
 /// Settings of a sweep that are the same for all pairs.
@@ -261,9 +281,6 @@ impl<'a> SweepRun<'a> {
         }
         if setup.values.len() > MOST_VALUES {
             return Err(fail(format!("{} values are too many: at most {MOST_VALUES}", setup.values.len())));
-        }
-        if setup.pairs.is_empty() {
-            return Err(fail("there are no pairs".into()));
         }
         let model = setup.recipe.mask_model.as_ref();
         if dial == Dial::Probability && model.is_none() {
