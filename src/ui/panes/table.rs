@@ -185,9 +185,9 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
     for ((source, metric), cell) in columns.iter().zip(numbers) {
         let values = order.iter().filter_map(|pair| source.value(*pair, *metric)).filter(|v| v.is_finite());
         let text = match metric {
-            // Of words, the share of the best.
+            // Of words, the share of the best: a cell has room for a number.
             Metric::Verdict => mean(values.map(|value| f64::from(u8::from(value == f64::from(Grade::Good as u8)))))
-                .map(|share| format!("{:.0} % {}", 100.0 * share, Grade::Good)),
+                .map(|share| format!("{:.0} %", 100.0 * share)),
             metric => mean(values).map(|mean| number(*metric, mean)),
         };
         let text = text.unwrap_or_else(|| "–".to_owned());

@@ -1,5 +1,6 @@
 //! The command palette: finds actions, panes, samples and tools.
 
+use eframe::egui::text::{LayoutJob, TextWrapping};
 use eframe::egui::{self, Align2, FontId, Key, Role, ScrollArea, Sense, Ui, WidgetInfo, pos2, vec2};
 use strum::IntoEnumIterator as _;
 
@@ -163,20 +164,16 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             Entry::Pane(pane) => Some(pane.tip()),
             Entry::Pair(..) | Entry::Tool(_) => None,
         };
+        let kind_font = FontId::proportional(SMALL);
+        let right =
+            ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, kind_font.clone(), p.weak);
         if let Some(tip) = tip {
-            let clip = egui::Rect::from_min_max(
-                pos2(place.right() + 12.0, rect.top()),
-                pos2(rect.right() - 110.0, rect.bottom()),
-            );
-            ui.painter_at(clip).text(
-                pos2(clip.left(), y),
-                Align2::LEFT_CENTER,
-                tip,
-                FontId::proportional(SMALL),
-                p.weak,
-            );
+            let left = place.right() + 12.0;
+            let mut job = LayoutJob::simple_singleline(tip.to_owned(), kind_font, p.weak);
+            job.wrap = TextWrapping::truncate_at_width((right.left() - 12.0 - left).max(0.0));
+            let galley = ui.painter().layout_job(job);
+            ui.painter().galley(pos2(left, y - 0.5 * galley.size().y), galley, p.weak);
         }
-        ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, FontId::proportional(SMALL), p.weak);
     }
     response
 }
