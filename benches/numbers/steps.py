@@ -113,6 +113,11 @@ THRESHOLDS = {"own": "5", "other": "2.5"}
 BOTH = ("--engines", "joint,distance_field", "--no-peers")
 
 
+def predicted(bench):
+    """Cases of the built-in simulator with what the shipped generator predicts in the place of the imprints."""
+    return bench.cases("predicted", "--count", "100", "--seed", "6161", "--predicted", *GENERATOR)
+
+
 def masks(bench):
     """The registration by membrane and mask, and that by the mask alone, on masks of every kind."""
     found = {}
@@ -124,8 +129,7 @@ def masks(bench):
     for kind in ("spoilt", "unet"):
         answer = bench.bench(f"masks_any_depth_{kind}", "registration", "--cases", folder, "--masks", kind, *BOTH)
         found.setdefault("any_depth", {})[kind] = engines(answer)
-    folder = bench.cases("predicted", "--count", "100", "--seed", "6161", "--predicted", *GENERATOR)
-    answer = bench.bench("masks_predicted", "registration", "--cases", folder, "--masks", "unet", *BOTH)
+    answer = bench.bench("masks_predicted", "registration", "--cases", predicted(bench), "--masks", "unet", *BOTH)
     return found | {"predicted": {"unet": engines(answer)}}
 
 
@@ -137,7 +141,8 @@ def verdict(bench):
         for kind in ("spoilt", "unet"):
             answer = bench.bench(f"verdict_{kind}", "verdict", "--cases", bench.places["other"], "--masks", kind)
             found[kind] = {key: answer[key] for key in ("faults", "named")}
-    return found
+    answer = bench.bench("verdict_predicted", "verdict", "--cases", predicted(bench), "--masks", "unet")
+    return found | {"predicted": {key: answer[key] for key in ("faults", "named")}}
 
 
 def doctor(bench):

@@ -140,8 +140,9 @@ FAULTS = {"wrong_unit": "model in another unit", "mirrored": "model mirrored", "
 def verdict(steps):
     """Faults by what the verdict calls them."""
     found = steps["verdict"]
-    sources = [s for s in ("own", "spoilt", "unet") if s in found]
-    words = {"own": "built-in simulator", "spoilt": "independent simulator", "unet": "the same, masks by the shipped model"}
+    words = {"own": "built-in simulator", "predicted": "the same simulator, predicted imprints", "spoilt": "independent simulator",
+             "unet": "that one, masks by the shipped model"}
+    sources = [s for s in words if s in found]
     rows = []
     for at, fault in enumerate(found["own"]["faults"]):
         of = [found[s]["faults"][at] for s in sources]
