@@ -2,7 +2,7 @@
 
 A step whose figures are kept in docs/numbers.json is not made again unless it is named. `--real`, `--other` and `--python`
 give what does not come with the repository; the steps that need it are left out otherwise, with the figures that are kept.
-`--vqvae` adds a row to the trials.
+`--study` adds rows to the trials.
 """
 
 import argparse
@@ -41,7 +41,7 @@ def listed(kept):
 
 
 def measure(step, args, kept):
-    places = {name: getattr(args, name) for name in ("real", "other", "python", "vqvae")}
+    places = {name: getattr(args, name) for name in ("real", "other", "python", "study")}
     bench = Bench(Path(args.programs).resolve(), Path(args.out).resolve(), places)
     begun, load = time.monotonic(), machine()
     figures = rounded(step.figures(bench))
@@ -55,7 +55,7 @@ def parser():
     parser.add_argument("--real", type=Path, metavar="DIR", help="folder of real pairs")
     parser.add_argument("--other", type=Path, metavar="DIR", help="folder of cases with known truth by another simulator")
     parser.add_argument("--python", type=Path, metavar="PY", help="Python with open3d and small_gicp, the peers of the registration")
-    parser.add_argument("--vqvae", type=Path, metavar="DIR", help="bundle of a VQ-VAE that `training.study` has made, for the trials")
+    parser.add_argument("--study", type=Path, metavar="DIR", help="folder of `training.study`, whose methods are tried too in the trials")
     parser.add_argument("--out", default=ROOT / "target" / "study", help="folder of what is made on the way (default: target/study)")
     parser.add_argument("--programs", default=ROOT / "target" / "release", help="folder of the programs (default: target/release)")
     parser.add_argument("--list", action="store_true", help="say which steps there are, how long each took and when, and make nothing")

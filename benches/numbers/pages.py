@@ -45,7 +45,8 @@ def page(steps, kept, study):
             "edited by hand. Intervals in brackets are 95 %: bootstrap over the grasps for figures of a table, Wilson's score for counts. "
             "Rows marked *published* are the paper's and its lab's, on real data: compare the order, not the decimals. All else is of "
             "simulated sensors unless it says real. What the columns mean: [words](glossary.md), `touch2touch evaluate --help`. "
-            "OTHER are 40 grasps of an independent simulator and REAL 36 published real pairs, which are not part of the repository."]
+            "OTHER are 40 grasps of an independent simulator and REAL 36 published real pairs, which are not part of the repository; "
+            "STUDY is the folder of `training.study`."]
     for step in STEPS:
         body = table(step.name, steps)
         if body:
