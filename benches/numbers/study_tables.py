@@ -1,5 +1,7 @@
 """The rows of `docs/study.json` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
 
+from training.study_runs import CONDITIONS
+
 from .tables import COLUMNS, GROUPS, group_of, markdown, number
 
 SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "fid", "angle_deg", "success_5", "success_10")]
@@ -95,7 +97,7 @@ def order(settings):
     """By test set; then what was not trained here, and by budget, method and what else differs, the reference first."""
     others = [settings.get(key, value) != value for key, value in REFERENCE.items() if key != "method"]
     return (TESTS.index(settings["test"]), settings.get("samples") or 0, METHODS.index(settings["method"]), sum(others), others[::-1],
-            str(settings.get("condition")), tuple(settings.get("fit") or ()), str(settings.get("shift")))
+            CONDITIONS.index(settings.get("condition", "plain")), tuple(settings.get("fit") or ()), str(settings.get("shift")))
 
 
 # The tables: a heading, what they say, the start of the test sets' names, and the settings in which rows differ.
@@ -120,7 +122,8 @@ def tables(study):
     for heading, words, tests, varied in SECTIONS:
         within = lambda s: (s["test"].startswith(tests) and plain(s, *varied) and ("samples" in varied or s.get("samples") == equal)
                             and (tests != "test-set" or "samples" not in varied or s["test"] == tests))
-        for grasps in dict.fromkeys(s["test_grasps"] for s in of):
+        # All grasps (no number) first.
+        for grasps in sorted({s["test_grasps"] for s in of}, key=lambda n: (n is not None, n or 0)):
             here = lambda s: s["test_grasps"] == grasps and within(s)
             rows = sorted((row for row in study["rows"] if here(row["settings"])), key=lambda row: order(row["settings"]))
             if all(plain(row["settings"]) for row in rows):
