@@ -114,7 +114,7 @@ SECTIONS = (
 
 
 def tables(study):
-    """All tables of the file."""
+    """The tables, each of the rows with most grasps; the file has the others too."""
     text, of = [], [row["settings"] for row in study["rows"]]
     budgets = sorted({s["samples"] for s in of if s.get("samples")})
     # Of the trainings of equal length: conditions and ablations.
@@ -122,8 +122,8 @@ def tables(study):
     for heading, words, tests, varied in SECTIONS:
         within = lambda s: (s["test"].startswith(tests) and plain(s, *varied) and ("samples" in varied or s.get("samples") == equal)
                             and (tests != "test-set" or "samples" not in varied or s["test"] == tests))
-        # All grasps (no number) first.
-        for grasps in sorted({s["test_grasps"] for s in of}, key=lambda n: (n is not None, n or 0)):
+        # The rows of most grasps: all of them where there is no number.
+        for grasps in sorted({s["test_grasps"] for s in of}, key=lambda n: (n is not None, -(n or 0))):
             here = lambda s: s["test_grasps"] == grasps and within(s)
             rows = sorted((row for row in study["rows"] if here(row["settings"])), key=lambda row: order(row["settings"]))
             if all(plain(row["settings"]) for row in rows):
@@ -134,4 +134,5 @@ def tables(study):
                 text += [f"**{name}**", table(rows, group, varied)]
                 less = paired(differences, budgets, group, varied)
                 text += ["Paired differences, in bold where 0 is not in the interval:", less] if less else []
+            break
     return "\n\n".join(text)
