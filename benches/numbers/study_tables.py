@@ -1,6 +1,7 @@
 """The rows of `docs/study.json` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
 
-from training.study_runs import CONDITIONS
+from training import study_runs
+from training.study_runs import CONDITIONS, SHIFTS, Row, Training, test_set
 
 from .tables import COLUMNS, GROUPS, group_of, markdown, number
 
@@ -8,7 +9,7 @@ SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim",
 # Columns of the paired differences.
 PAIRED = [c for c in SHOWN if c[1] in ("psnr_db", "ssim", "angle_deg", "success_5", "success_10")]
 # What a row is compared with, by the setting in which it differs; samples are compared with the next smaller number.
-REFERENCE = {"method": "latent diffusion", "condition": "plain", "rotation": True, "flip": True, "geometry": "full", "shift": "exact", "fit": []}
+REFERENCE = {key: value for key, value in Row(Training(), None).settings().items() if key not in ("samples", "test")}
 
 
 def plain(settings, *but):
@@ -89,15 +90,15 @@ def paired(differences, budgets, group, varied):
     return markdown(heads, [cells if several else cells[1:] for _, cells in lines], 2 + several) if lines else None
 
 
-TESTS = ("test-set", "test-set-ambiguous", "test-set-mixed", "test-set-misaligned", "test-set-noise", "other-sensors", "other-gelslims")
-METHODS = ("measured imprints", "shipped generator", "latent diffusion", "VQ-VAE", "L1 UNet", "VisGel")
+TESTS = (*map(test_set, CONDITIONS), "other-sensors", "other-gelslims")
+METHODS = ("measured imprints", "shipped generator", *study_runs.METHODS)
 
 
 def order(settings):
     """By test set; then what was not trained here, and by budget, method and what else differs, the reference first."""
     others = [settings.get(key, value) != value for key, value in REFERENCE.items() if key != "method"]
     return (TESTS.index(settings["test"]), settings.get("samples") or 0, METHODS.index(settings["method"]), sum(others), others[::-1],
-            CONDITIONS.index(settings.get("condition", "plain")), tuple(settings.get("fit") or ()), str(settings.get("shift")))
+            CONDITIONS.index(settings.get("condition", "plain")), tuple(settings.get("fit") or ()), SHIFTS.index(settings.get("shift", "exact")))
 
 
 # The tables: a heading, what they say, the start of the test sets' names, and the settings in which rows differ.
