@@ -13,7 +13,7 @@ use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::MaskSource;
 use touch2touch_work::pairs;
 use touch2touch_work::recipe::Recipe;
-use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep_part};
+use touch2touch_work::sweep::{Dial, MOST_VALUES, Point, Series, Setting, Sweep, SweepSetup, sweep, sweep_part};
 
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
@@ -69,8 +69,8 @@ pub(super) fn run(args: &SweepArgs) -> VerbResult {
     let model = || args.model.mask_model(MaskSource::Unet, &dataset.rig);
     let mask_model = if args.dial == Dial::Probability { model()? } else { recipe.mask_model.clone() };
     let setup = SweepSetup { values, pairs, recipe: Recipe { mask_model, ..recipe } };
-    let found = sweep_part(&dataset, &setup, &models, &output.job())?;
-    let found = if args.shard.shard.is_some() { found } else { found.moving()? };
+    let turn = if args.shard.shard.is_some() { sweep_part } else { sweep };
+    let found = turn(&dataset, &setup, &models, &output.job())?;
     for remark in &found.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }

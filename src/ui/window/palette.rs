@@ -164,12 +164,11 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
             Entry::Pane(pane) => Some(pane.tip()),
             Entry::Pair(..) | Entry::Tool(_) => None,
         };
-        let kind_font = FontId::proportional(SMALL);
-        let right =
-            ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, kind_font.clone(), p.weak);
+        let small = FontId::proportional(SMALL);
+        let right = ui.painter().text(pos2(rect.right() - 8.0, y), Align2::RIGHT_CENTER, kind, small.clone(), p.weak);
         if let Some(tip) = tip {
             let left = place.right() + 12.0;
-            let mut job = LayoutJob::simple_singleline(tip.to_owned(), kind_font, p.weak);
+            let mut job = LayoutJob::simple_singleline(tip.to_owned(), small, p.weak);
             job.wrap = TextWrapping::truncate_at_width((right.left() - 12.0 - left).max(0.0));
             let galley = ui.painter().layout_job(job);
             ui.painter().galley(pos2(left, y - 0.5 * galley.size().y), galley, p.weak);
