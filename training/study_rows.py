@@ -9,11 +9,16 @@ import json
 import os
 from pathlib import Path
 
+from .study_runs import REFERENCE
+
 
 def differ(a, b):
-    """The settings in which a row is compared with another: the one in which they differ, unless it is the test set."""
+    """The setting by which two rows are compared, in a list: the only one in which they differ, if one of them has the reference's."""
     keys = [key for key in a if a[key] != b.get(key)]
-    return keys if len(keys) == 1 and keys != ["test"] and a.keys() == b.keys() else []
+    if len(keys) != 1 or a.keys() != b.keys():
+        return []
+    key, = keys
+    return keys if key == "samples" or key in REFERENCE and REFERENCE[key] in (a[key], b[key]) else []
 
 
 class Rows:

@@ -1,15 +1,13 @@
 """The rows of `docs/study.json` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
 
 from training import study_runs
-from training.study_runs import CONDITIONS, SHIFTS, Row, Training, test_set
+from training.study_runs import CONDITIONS, REFERENCE, SHIFTS, test_set
 
 from .tables import COLUMNS, GROUPS, group_of, markdown, number
 
 SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "fid", "angle_deg", "success_5", "success_10")]
 # Columns of the paired differences.
 PAIRED = [c for c in SHOWN if c[1] in ("psnr_db", "ssim", "angle_deg", "success_5", "success_10")]
-# What a row is compared with, by the setting in which it differs; samples are compared with the next smaller number.
-REFERENCE = {key: value for key, value in Row(Training(), None).settings().items() if key not in ("samples", "test")}
 
 
 def plain(settings, *but):
@@ -51,7 +49,7 @@ def table(rows, group, varied):
 
 
 def against(found, budgets):
-    """A difference as (row, reference, sign), or `None` where neither of its two is what the other is compared with."""
+    """A difference as (row, reference, sign), or `None`: of samples, the reference is the next smaller number."""
     one, other = found["from"], found["from"] | found["to"]
     key, = found["to"]
     if key == "samples":

@@ -165,7 +165,7 @@ macro_rules! panes {
                 Steps, needs [Steps], at [Align Bottom(1)]
             } }
             trial { Trial {
-                "Robot trial" as "Trial", "What a robot would do with the pose: the tool let down into a hole of its own outline",
+                "Robot trial" as "Trial", "What a robot would do with the pose: the tool let down into a hole of its own outline, a cup onto a cup",
                 Form, needs [Trial], at [Align Bottom(1)]
             } }
             basin { BasinMap {

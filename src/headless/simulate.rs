@@ -21,7 +21,7 @@ pub(super) struct SimulateArgs {
     /// The folder to write; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// `all`, `seen`, `unseen`, or tool names separated by commas.
+    /// `all`, `seen`, `unseen`, or tool names separated by commas; by name also `pencil`, and `cup` (held by its handle).
     #[arg(long, default_value = "all")]
     tools: String,
     /// Grasps per tool.
@@ -121,7 +121,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
             let touched = args.condition.tool(tool, g);
             let (grasp, seed) = if args.test_set {
                 // By the place in the whole list, so that a choice of tools does not change their grasps.
-                sim::test_grasp(catalog::tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
+                sim::test_grasp(catalog::all_tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
             } else {
                 // One seed per pair, so that a pair does not depend on how many others were asked for.
                 let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ g;
@@ -186,8 +186,9 @@ fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static ToolSpec>> {
         names => names
             .split(',')
             .map(|name| {
-                all.iter().find(|t| t.name == name.trim()).ok_or_else(|| {
-                    let known: Vec<&str> = all.iter().map(|t| t.name.as_str()).collect();
+                let every = catalog::all_tools();
+                every.iter().find(|t| t.name == name.trim()).ok_or_else(|| {
+                    let known: Vec<&str> = every.iter().map(|t| t.name.as_str()).collect();
                     anyhow::anyhow!("no tool is named {name:?}; there are: {}", known.join(", "))
                 })
             })

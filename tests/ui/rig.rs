@@ -14,7 +14,7 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Settings;
 use touch2touch::app::state::State;
 use touch2touch::ui::{Options, StudioApp};
-use touch2touch_core::catalog;
+use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -192,9 +192,13 @@ impl Services for QuickGenerator {
 
 /// Writes a data set of a few simulated grasps of two tools.
 pub(super) fn write_dataset(root: &Path, grasps: u64) {
-    let tools: Vec<_> = catalog::tools().iter().take(2).collect();
+    write_tools_touched(root, &catalog::tools()[..2], grasps);
+}
+
+/// The same of other tools.
+fn write_tools_touched(root: &Path, tools: &[ToolSpec], grasps: u64) {
     let config = sim::SimConfig::default();
-    for tool in &tools {
+    for tool in tools {
         for index in 0..grasps {
             let grasp = sim::random_grasp(index + 3);
             let sample = sim::simulate(tool, grasp, index, &config);
@@ -218,10 +222,15 @@ impl Rig {
     ///
     /// `None` where there is no graphics adapter; a failure where the check script demands one.
     pub(super) fn new(size: [f32; 2], grasps: u64) -> Option<Self> {
+        Self::of_tools(size, &catalog::tools()[..2], grasps)
+    }
+
+    /// As [`Rig::new`] on grasps of these tools.
+    pub(super) fn of_tools(size: [f32; 2], tools: &[ToolSpec], grasps: u64) -> Option<Self> {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
-        write_dataset(&data, grasps);
+        write_tools_touched(&data, tools, grasps);
         let mut rig = Self { harness: Self::start(size, &data, &config), data, config, _folder: folder };
         rig.settle();
         Some(rig)

@@ -11,6 +11,7 @@ use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{Layer, ManualTry, PoseOf, SceneTool, WorkbenchCommand};
 use touch2touch_core::align::reason::Reason;
+use touch2touch_core::catalog;
 use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
@@ -73,7 +74,11 @@ impl Rig {
 
     /// The studio on the Align workspace with true masks, the pointer in the measured view, seen from the right.
     pub(super) fn aligned() -> Option<Self> {
-        let mut rig = Self::new(SIZE, 2)?;
+        Self::new(SIZE, 2).map(Self::in_align)
+    }
+
+    fn in_align(mut self) -> Self {
+        let rig = &mut self;
         rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(TasksCommand::LogSeen(u64::MAX));
         rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
@@ -85,7 +90,7 @@ impl Rig {
         rig.send(ViewCommand::Ui(UiRequest::Fit));
         assert!(results::pose(rig.model(), MEASURED).ready().is_some());
         assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
-        Some(rig)
+        self
     }
 
     /// Brings the tab of a pane to the front, wherever the workspace has it.
@@ -120,6 +125,20 @@ fn a_robot_tries_the_pose_and_the_picture_rests_when_it_is_over() {
     });
     assert!(over, "it ends");
     rig.shoot("trial");
+}
+
+#[test]
+fn a_cup_by_its_handle_is_set_on_another_cup() {
+    let Some(rig) = Rig::of_tools(SIZE, &[catalog::cup_handle()], 1) else { return };
+    let mut rig = rig.in_align();
+    rig.front("Trial");
+    rig.until("the trial", |state| results::trial(state, MEASURED).ready().is_some());
+    rig.settle();
+    rig.harness.get_by_label_contains("By the measured pose: stands");
+    rig.harness.get_by_label_contains("a margin of 10");
+    let canvas = rig.harness.get_by_label("3D view, trial").rect();
+    assert!(canvas.height() > 100.0, "{canvas:?}");
+    rig.shoot("trial_cup");
 }
 
 #[test]

@@ -10,7 +10,7 @@ use glam::{DVec2, Vec2Swizzles};
 
 use super::noise::{Noise, Stream};
 
-pub use household::{CUP_AXIS_M, CUP_BASE_M, cup_handle, pencil};
+pub use household::{CUP_AXIS_M, CUP_BASE_M, cup_handle, is_cup_handle, pencil};
 pub use shape::{Bar, ToolSpec};
 
 /// Length of shaft between the grasp and an ambiguous pair's pattern, meters: out of the GelSlim's 18 mm, within the
@@ -22,6 +22,13 @@ const SHAFT_SUFFIX: &str = "_on_shaft";
 /// The lab's twelve tools (names from its data loader, shapes after the published images), seen ones first.
 pub fn tools() -> &'static [ToolSpec] {
     static TOOLS: LazyLock<Vec<ToolSpec>> = LazyLock::new(lab_tools);
+    &TOOLS
+}
+
+/// The lab's tools, and after them what only a robot is tried with: a pencil, and a cup by its handle.
+pub fn all_tools() -> &'static [ToolSpec] {
+    static TOOLS: LazyLock<Vec<ToolSpec>> =
+        LazyLock::new(|| tools().iter().cloned().chain([pencil(), cup_handle()]).collect());
     &TOOLS
 }
 

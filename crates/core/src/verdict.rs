@@ -1,8 +1,9 @@
 //! [`Verdict`]: how much a registered pose can be relied on, without the truth, in words. One for every view, table and file.
 
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-use crate::align::{AlignReport, Elsewhere, Evidence};
+use crate::align::{self, AlignReport, Basis, Evidence, PLACE_OPEN_M};
 use crate::manual::PoseDifference;
 use crate::units;
 
@@ -63,26 +64,48 @@ impl Grade {
 /// simulated grasps, of which about two of a hundred are doubted (`touch2touch-bench verdict`).
 type Limits = [f64; 2];
 
-/// Share of the misfit that goes away if the fingers are swapped. A straight tool fits about as well either way.
-const SWAPPED: Limits = [0.08, 0.14];
-/// Share of the fingers' misfit that goes away if each may have its own pose.
-const FINGERS: Limits = [0.13, 0.2];
+/// Limits of the signs whose meaning depends on the membranes.
+struct Membranes {
+    /// Share of the misfit that goes away if the fingers are swapped. A straight tool fits about as well either way.
+    swapped: Limits,
+    /// Share of the fingers' misfit that goes away if each may have its own pose.
+    fingers: Limits,
+    /// Share of the misfit that goes away elsewhere near by, without the mask.
+    elsewhere: Limits,
+    /// One minus likeness, plus [`OFF_COUNTS`] times the share of the contact off the tool, of which no more than [`OFF_CAP`] counts:
+    /// where the relief is like the tool's, the mask is at fault.
+    misfit: Limits,
+    /// Standard deviation of the angle, radians.
+    angle_rad: Limits,
+}
+
+/// Membranes that the tool explains.
+const EXPLAINED: Membranes = Membranes {
+    swapped: [0.08, 0.14],
+    fingers: [0.13, 0.2],
+    elsewhere: [0.1, 0.3],
+    misfit: [0.6, 0.72],
+    angle_rad: [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI],
+};
+/// Predictions that are no membrane of this tool at this pressure ([`Basis::Unlike`]), most of them of light grasps. The mask gives
+/// the pose and every one is to be checked for it; wrong is only what such predictions of right poses do not show. Where the
+/// membranes would rather have the tool, which is what spreads the angle there, says nothing.
+const UNLIKE: Membranes = Membranes {
+    swapped: [0.45; 2],
+    fingers: [0.3; 2],
+    elsewhere: [f64::INFINITY; 2],
+    misfit: [0.9; 2],
+    angle_rad: [EXPLAINED.angle_rad[0], f64::INFINITY],
+};
+const OFF_COUNTS: f64 = 0.7;
+const OFF_CAP: f64 = 0.4;
 /// Difference of the angle and of the place that the fingers then have, radians and meters: below, it is no fault.
 const APART_RAD: Limits = [3.0 / 180.0 * std::f64::consts::PI, 5.0 / 180.0 * std::f64::consts::PI];
 const APART_M: Limits = [2e-3, 4e-3];
-/// Share of the misfit that goes away elsewhere near by, without the mask.
-const ELSEWHERE: Limits = [0.1, 0.3];
-/// One minus likeness, plus this share of the contact off the tool, of which no more than so much counts: where the relief is
-/// like the tool's, the mask is at fault.
-const MISFIT: Limits = [0.6, 0.72];
-const OFF_COUNTS: f64 = 0.7;
-const OFF_CAP: f64 = 0.4;
 /// Share of contact off the tool.
 const OFF: Limits = [0.5, f64::INFINITY];
-/// Standard deviation of the angle, radians.
-const ANGLE_SD_RAD: Limits = [2.0 / 180.0 * std::f64::consts::PI, 8.0 / 180.0 * std::f64::consts::PI];
 /// Standard deviation of the place where it is known least, meters.
-const PLACE_SD_M: Limits = [2e-3, f64::INFINITY];
+const PLACE_SD_M: Limits = [PLACE_OPEN_M, f64::INFINITY];
 
 /// Verdict on a pose: all that speaks against it, without the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -95,9 +118,35 @@ pub struct Verdict {
     pub against: Vec<Sign>,
 }
 
+/// Kind of a sign.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SignKind {
+    /// The gripper cannot hold it so.
+    NotHeld,
+    /// The imprints fit better with the fingers swapped.
+    Swapped,
+    /// The fingers have it at different places.
+    Fingers,
+    /// The membranes fit better elsewhere.
+    Elsewhere,
+    /// The contact is not like this tool's.
+    Misfit,
+    /// The contact mask lies off the tool.
+    OffTool,
+    /// The contact leaves the angle open.
+    AngleOpen,
+    /// The contact leaves the place open.
+    PlaceOpen,
+    /// The mask alone gave the pose.
+    MaskAlone,
+}
+
 /// Sign that speaks against a pose.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Sign {
+    /// Kind of it.
+    pub kind: SignKind,
     /// Weight of it.
     pub grade: Grade,
     /// In a few words.
@@ -117,6 +166,16 @@ impl Verdict {
         };
         Some(Self { grade, why, against })
     }
+
+    /// The grade for one who lets the tool down along its own axis, z of the object frame, until it meets something: a place
+    /// that the contact leaves open along that axis is no fault then. `report` is the one that the verdict is on.
+    pub fn grade_let_down(&self, report: &AlignReport) -> Grade {
+        let pose = report.grasp_from_object;
+        let across = DVec2::from_angle(pose.theta_rad);
+        let open = report.evidence.map(|evidence| Grade::of(evidence.uncertainty.along_m(pose, across), PLACE_SD_M));
+        let rest = self.against.iter().filter(|sign| sign.kind != SignKind::PlaceOpen);
+        rest.map(|sign| sign.grade).chain(open).max().unwrap_or(Grade::Good)
+    }
 }
 
 /// The sentence of a pose that nothing speaks against.
@@ -129,39 +188,49 @@ fn fits(evidence: &Evidence) -> String {
 }
 
 fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
+    use SignKind::{AngleOpen, Elsewhere, Fingers, MaskAlone, Misfit, NotHeld, OffTool, PlaceOpen, Swapped};
     let mut signs = Vec::new();
-    let mut sign = |grade, what| signs.push(Sign { grade, what });
+    let mut sign = |kind, grade, what| signs.push(Sign { kind, grade, what });
     if !report.within_prior {
-        sign(Grade::Wrong, "the gripper cannot hold it so (±22.5°, ±5 mm)".to_owned());
+        sign(NotHeld, Grade::Wrong, "the gripper cannot hold it so (±22.5°, ±5 mm)".to_owned());
     }
     let off = 1.0 - evidence.on_tool;
     let percent = |share: f64| format!("{:.0} %", 100.0 * share);
+    let limits = match report.joint {
+        Some(fit) if fit.basis == Basis::Unlike => &UNLIKE,
+        _ => &EXPLAINED,
+    };
     if let Some(membrane) = evidence.membrane {
         if let Some(gain) = membrane.swapped {
-            sign(Grade::of(gain, SWAPPED), "the imprints fit better with the fingers swapped".to_owned());
+            sign(
+                Swapped,
+                Grade::of(gain, limits.swapped),
+                "the imprints fit better with the fingers swapped".to_owned(),
+            );
         }
-        let way = |to: Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
+        let way =
+            |to: align::Elsewhere| format!("{} and {}", units::text_deg(to.angle_rad), units::text_mm(to.position_m));
         if let Some(fingers) = membrane.fingers {
             let apart = Grade::of(fingers.angle_rad, APART_RAD).max(Grade::of(fingers.position_m, APART_M));
             let what = format!("the fingers do not agree: they are {} apart", way(fingers));
-            sign(Grade::of(fingers.gain, FINGERS).min(apart), what);
+            sign(Fingers, Grade::of(fingers.gain, limits.fingers).min(apart), what);
         }
         let what = format!("the membranes fit better {} from here: look at the mask", way(membrane.own));
-        sign(Grade::of(membrane.own.gain, ELSEWHERE), what);
-        let grade = Grade::of(1.0 - membrane.likeness + OFF_COUNTS * off.min(OFF_CAP), MISFIT);
+        sign(Elsewhere, Grade::of(membrane.own.gain, limits.elsewhere), what);
+        let grade = Grade::of(1.0 - membrane.likeness + OFF_COUNTS * off.min(OFF_CAP), limits.misfit);
         let (likeness, off) = (membrane.likeness, percent(off));
         let what = format!("the contact is not like this tool's (likeness {likeness:.2}, {off} of it off the tool)");
-        sign(grade, what);
+        sign(Misfit, grade, what);
     }
-    sign(Grade::of(off, OFF), format!("{} of the contact mask lie off the tool", percent(off)));
+    sign(OffTool, Grade::of(off, OFF), format!("{} of the contact mask lie off the tool", percent(off)));
     let angle_rad = evidence.uncertainty.angle_rad();
     let what = format!("the contact leaves the angle open (±{})", units::text_deg(angle_rad));
-    sign(Grade::of(angle_rad, ANGLE_SD_RAD), what);
+    sign(AngleOpen, Grade::of(angle_rad, limits.angle_rad), what);
     let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
     let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
-    sign(Grade::of(place_m, PLACE_SD_M), what);
+    sign(PlaceOpen, Grade::of(place_m, PLACE_SD_M), what);
     if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {
-        sign(Grade::Check, fit.basis.to_string());
+        sign(MaskAlone, Grade::Check, fit.basis.to_string());
     }
     signs
 }

@@ -63,7 +63,7 @@ pub(in crate::headless) struct PoseArgs {
     #[arg(long)]
     pub(super) trace: bool,
     /// Add a robot's trial with each pose: the tool is let down into a hole of its own outline, with 1 mm of room to each
-    /// side (as `trials` does with simulated grasps). Where the truth is known.
+    /// side, the simulator's cup onto another (as `trials` does with simulated grasps). Where the truth is known.
     #[arg(long)]
     pub(super) trial: bool,
     /// Write into this folder which pixels each angle hangs on: by how many degrees to the square millimeter it changes

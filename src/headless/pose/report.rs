@@ -231,8 +231,11 @@ pub(super) fn text(report: &Report) -> String {
             c.stop
         );
         if let Some(trial) = &c.trial {
-            let needs = trial.needs_m.map_or("more than 5 mm".to_owned(), text_mm);
-            text += &format!("    a robot: {}; needs {needs} of room to each side\n", trial.attempt.end);
+            let needs = trial.room.map_or(String::new(), |room| {
+                let needs = room.needs_m.map_or("more than 5 mm".to_owned(), text_mm);
+                format!("; needs {needs} of room to each side")
+            });
+            text += &format!("    a robot: {}{needs}\n", trial.attempt.end);
         }
         for ranked in c.tools.iter().flatten().take(3) {
             text += &format!("    {:>3.0} % {}\n", 100.0 * ranked.chance, ranked.tool);

@@ -1,9 +1,13 @@
-//! Trial of a robot with the pose: the tool let down into a hole of its own outline, played in 3D.
+//! Trial of a robot with the pose, played in 3D: the tool let down into a hole of its own outline, or a cup onto a cup.
+
+mod stage;
 
 use std::sync::Arc;
 
 use eframe::egui::{self, RichText, Slider, Ui, vec2};
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
+
+use stage::Stage;
 
 use super::images;
 use super::scene::{SceneMesh, rgb, update_mesh};
@@ -11,6 +15,7 @@ use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PairKey};
 use crate::app::results;
 use crate::app::state::Lookup;
+use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::PointSize;
 use crate::gpu::scene::SceneData;
@@ -22,9 +27,9 @@ use crate::ui::parts::theme::{SMALL, caption, pane_frame};
 use crate::ui::parts::widget::empty;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::trials::{Hole, Waypoint};
+use touch2touch_core::trials::Waypoint;
 use touch2touch_core::units::{text_deg, text_mm};
-use touch2touch_work::trials::PairTrial;
+use touch2touch_work::trials::{Goal, PairTrial};
 
 /// Time of a whole trial while it plays, seconds.
 const TRIAL_S: f64 = 4.0;
@@ -32,10 +37,12 @@ const TRIAL_S: f64 = 4.0;
 const PACE_S: f64 = 0.05;
 /// Way of a tool's rim for a turn of one radian, meters: turns take time, too.
 const REACH_M: f64 = 0.03;
-/// Thickness of the plates behind the plane of the outline, and width of the block beside the hole, meters.
-const BLOCK_M: [f64; 2] = [0.012, 0.008];
 /// Diameter of the mark of the first touch, meters.
 const TOUCH_M: f32 = 0.001_2;
+/// Diameter of the mark of a cup's center of mass, meters.
+const MASS_M: f32 = 0.004;
+/// Opacity of the cup that is held: its handle and its center of mass show through.
+const CUP: f32 = 0.4;
 /// Height over the mouth up to which the camera shows a tool, meters.
 const NEAR_M: f64 = 0.022;
 /// Direction of the camera at first, degrees: from before the cut block, a little from above.
@@ -47,7 +54,7 @@ pub(crate) struct Memory {
     view: SceneView,
     /// The pair and the imprint that the view was framed for.
     of: Option<(PairKey, ImprintSource)>,
-    block: Option<(Arc<PairTrial>, Arc<TriMesh>)>,
+    stage: Option<(Arc<PairTrial>, Arc<Stage>)>,
     tool: Option<SceneMesh>,
     revision: u64,
     /// Share of the trial that is over, 0 to 1.
@@ -83,16 +90,11 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
 fn said(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, trial: &PairTrial) {
     let attempt = &trial.attempt;
     let color = if attempt.end.is_success() { cx.p.good } else { cx.p.wrong };
-    let needs = match trial.needs_m {
-        Some(room) => format!("{} of room would do", text_mm(room)),
-        None => "5 mm of room would not do".to_owned(),
-    };
+    let (details, tip) = terms(trial);
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
         images::side_mark(ui, cx.p, source);
         ui.label(RichText::new(format!("By the {} pose: {}", source.key(), attempt.end)).color(color));
-        let details = format!("{} of room to each side; {needs}", text_mm(trial.room_m));
-        let tip = "The hole is the tool's own outline, 10 mm deep. The gripper gives way by 2° and 1 mm; nothing slips or bends";
         ui.label(caption(details, cx.p)).on_hover_text(tip);
     });
     let mut text = format!(
@@ -100,7 +102,7 @@ fn said(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, trial: &PairTrial) {
         text_deg(attempt.tilt_rad),
         text_mm(attempt.offset_m.abs())
     );
-    if let Some(touch) = attempt.contact {
+    if let (Some(touch), Goal::Insertion(_)) = (attempt.contact, &trial.goal) {
         text += &format!(
             "; first touch {} deep, overlap at the bottom {}",
             text_mm(touch.depth_m),
@@ -108,6 +110,31 @@ fn said(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, trial: &PairTrial) {
         );
     }
     ui.add(egui::Label::new(RichText::new(text).size(SMALL).color(cx.p.weak)).wrap());
+}
+
+/// The goal's terms in a few words, and what they leave out.
+fn terms(trial: &PairTrial) -> (String, String) {
+    match (&trial.goal, trial.room) {
+        (Goal::Stacking(stacking), _) => {
+            let (cup, margin) = (stacking.cup(), text_mm(stacking.margin_m()));
+            let tip = format!(
+                "It is let go on the rim of another ({} wide), and stands while its center of mass, {} above its base, is over \
+                 that rim, {margin} inside. The gripper levels it by up to 2°; nothing slides",
+                text_mm(2.0 * cup.rim_m),
+                text_mm(cup.mass_m)
+            );
+            (format!("a margin of {margin} is asked of it"), tip)
+        }
+        (Goal::Insertion(_), room) => {
+            let needs = match room.and_then(|room| room.needs_m) {
+                Some(room) => format!("{} of room would do", text_mm(room)),
+                None => "5 mm of room would not do".to_owned(),
+            };
+            let room = room.map_or(0.0, |room| room.room_m);
+            let tip = "The hole is the tool's own outline, 10 mm deep. The gripper gives way by 2° and 1 mm; nothing slips or bends";
+            (format!("{} of room to each side; {needs}", text_mm(room)), tip.to_owned())
+        }
+    }
 }
 
 /// Play, and the time. Nothing is painted for it while nothing plays.
@@ -146,8 +173,8 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
     };
     update(cx, memory, trial);
     let tool = memory.tool.as_ref().map(|held| held.mesh.clone());
-    let (Some(tool), Some((_, block))) = (tool, memory.block.clone()) else { return };
-    let scene = scene(cx, (&tool, &block, memory.revision), trial, memory.share);
+    let (Some(tool), Some((_, stage))) = (tool, memory.stage.clone()) else { return };
+    let scene = scene(cx, (&tool, &stage, memory.revision), trial, memory.share);
     let output = memory.view.interact(ui, "3D view, trial", Grip::Nothing);
     let of = cx.state.pair_key().map(|pair| (pair, source));
     if output.fit || memory.of != of || !memory.view.placed {
@@ -155,7 +182,7 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
         let [yaw, pitch] = CAMERA_DEG.map(f64::to_radians);
         let camera = Camera { yaw_rad: yaw, pitch_rad: pitch, ..Camera::default() };
         memory.view.camera = camera;
-        memory.view.camera.frame(&whole_way(&tool, &block, trial), 0.95);
+        memory.view.camera.frame(&whole_way(&tool, &stage, trial), 0.95);
         memory.view.placed = true;
     }
     let scene = SceneData { moving: output.moved || memory.played_at.is_some(), ..scene };
@@ -168,27 +195,31 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
 /// Makes the meshes, where the trial or the tool changed.
 fn update(cx: &Cx<'_>, memory: &mut Memory, trial: &Arc<PairTrial>) {
     update_mesh(cx, &mut memory.tool, &mut memory.revision);
-    if memory.block.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, trial)) {
-        memory.block = Some((trial.clone(), Arc::new(cut_block(trial.insertion.hole()))));
+    if memory.stage.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, trial)) {
+        memory.stage = Some((trial.clone(), Arc::new(Stage::of(&trial.goal))));
         memory.revision += 1;
     }
 }
 
-/// The corners of the block and of what comes near it on the whole way: what the camera has to show.
-fn whole_way(tool: &TriMesh, block: &TriMesh, trial: &PairTrial) -> Vec<DVec3> {
+/// The corners of all that stands and of what comes near it on the whole way: what the camera has to show.
+fn whole_way(tool: &TriMesh, stage: &Stage, trial: &PairTrial) -> Vec<DVec3> {
     let path = &trial.attempt.path;
-    let ends = [path.first(), path.last()].into_iter().flatten();
-    let tools = ends.flat_map(|at| {
-        let world_from_object = at.world_from_object.to_affine();
+    let ends = || [path.first(), path.last()].into_iter().flatten().map(|at| at.world_from_object.to_affine());
+    let tools = ends().flat_map(|world_from_object| {
         let placed = tool.vertices.iter().map(move |p| world_from_object.transform_point3(*p));
         placed.filter(|p| p.z > -NEAR_M)
     });
-    tools.chain(block.vertices.iter().copied()).collect()
+    let cups = stage.carried.iter().flat_map(|cup| {
+        let of =
+            |world_from_object: DAffine3| cup.body.vertices.iter().map(move |p| world_from_object.transform_point3(*p));
+        ends().flat_map(of)
+    });
+    tools.chain(cups).chain(stage.stands.vertices.iter().copied()).collect()
 }
 
 fn scene(
     cx: &Cx<'_>,
-    (tool, block, revision): (&Arc<TriMesh>, &Arc<TriMesh>, u64),
+    (tool, stage, revision): (&Arc<TriMesh>, &Stage, u64),
     trial: &PairTrial,
     share: f64,
 ) -> SceneData {
@@ -211,7 +242,20 @@ fn scene(
     let Some((at, depth_m)) = place(path, share) else { return scene };
     scene.meshes.push(mesh("tool", tool, solid(rgb(cx.p.cad), at)));
     let wood = items::mix(rgb(cx.p.accent), rgb(cx.p.weak), 0.6);
-    scene.meshes.push(mesh("block", block, MeshStyle { edges: None, ..solid(wood, PlanarPose::default()) }));
+    scene.meshes.push(mesh("stands", &stage.stands, MeshStyle { edges: None, ..solid(wood, PlanarPose::default()) }));
+    if let Some(cup) = &stage.carried {
+        let veil = MeshStyle { edges: None, look: Look::Veil, opacity: CUP, ..solid(rgb(cx.p.cad), at) };
+        scene.meshes.push(mesh("cup", &cup.body, veil));
+        let ends = cup.plumb(at);
+        let color = if trial.attempt.end.is_success() { cx.p.good } else { cx.p.wrong };
+        let look = (PointSize::Meters(MASS_M), 1.0);
+        // Its place changes at every picture of the way.
+        let moved = revision.wrapping_add(share.to_bits());
+        scene.clouds.push(items::contact("mass", (moved, vec![ends[0]].into()), rgb(color), look));
+        let segments = [Segment { ends, rgba: color.to_array() }].into();
+        let style = LinesStyle { world_from_lines: DAffine3::IDENTITY, width_px: 1.5, opacity: 1.0, overlay: true };
+        scene.lines.push(LinesItem { name: "plumb".into(), revision: moved, segments, style });
+    }
     if let Some(last) = path.last() {
         let end = items::truth(last.world_from_object.to_affine(), rgb(cx.p.strong), 0.5, 1.0);
         scene.meshes.push(mesh("end", tool, end));
@@ -250,43 +294,6 @@ fn place(path: &[Waypoint], share: f64) -> Option<(PlanarPose, f64)> {
     path.last().map(|last| (last.world_from_object, last.depth_m))
 }
 
-/// The half of the block behind the plane of the outline, with the hole laid open: plates between its openings, and the floor.
-fn cut_block(hole: &Hole) -> TriMesh {
-    let mut mesh = TriMesh::default();
-    let shape = hole.shape();
-    let reach = hole.plates().flat_map(|(_, openings)| openings.iter().flatten().map(|y| y.abs()).collect::<Vec<_>>());
-    let reach = reach.fold(0.0, f64::max) + BLOCK_M[1];
-    let plates: Vec<(f64, Vec<[f64; 2]>)> = hole.plates().map(|(top, openings)| (top, openings.to_vec())).collect();
-    let floor = shape.depth_m + shape.clearance_m;
-    for (i, (top, openings)) in plates.iter().enumerate() {
-        let bottom = plates.get(i + 1).map_or(floor, |(next, _)| *next);
-        let mut from = -reach;
-        for [low, high] in openings {
-            solid(&mut mesh, [from, *low], [*top, bottom]);
-            from = *high;
-        }
-        solid(&mut mesh, [from, reach], [*top, bottom]);
-    }
-    solid(&mut mesh, [-reach, reach], [floor, floor + 0.25 * BLOCK_M[1]]);
-    mesh
-}
-
-/// Adds a box from `y[0]` to `y[1]` and `z[0]` to `z[1]`.
-fn solid(mesh: &mut TriMesh, y: [f64; 2], z: [f64; 2]) {
-    if y[1] <= y[0] || z[1] <= z[0] {
-        return;
-    }
-    let (x, first) = ([-BLOCK_M[0], 0.0], mesh.vertices.len() as u32);
-    for corner in 0..8usize {
-        mesh.vertices.push(DVec3::new(x[corner & 1], y[corner >> 1 & 1], z[corner >> 2 & 1]));
-    }
-    // Corners by bits x, y, z; counter-clockwise seen from outside.
-    const SIDES: [[u32; 4]; 6] = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
-    for [a, b, c, d] in SIDES.map(|side| side.map(|corner| first + corner)) {
-        mesh.triangles.extend([[a, b, c], [a, c, d]]);
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -307,16 +314,5 @@ mod tests {
         }
         assert_eq!(place(&path, f64::NAN).map(|(pose, _)| pose.z_m.is_finite()), Some(true));
         assert_eq!(place(&[], 0.5), None);
-    }
-
-    #[test]
-    fn a_box_is_closed_and_looks_outwards() {
-        let mut mesh = TriMesh::default();
-        solid(&mut mesh, [0.0, 0.002], [0.001, 0.004]);
-        let volume: f64 =
-            (0..mesh.triangles.len()).map(|i| mesh.corners(i)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
-        assert!((volume - BLOCK_M[0] * 0.002 * 0.003).abs() < 1e-15, "{volume}");
-        solid(&mut mesh, [0.002, 0.001], [0.0, 1.0]);
-        assert_eq!(mesh.vertices.len(), 8, "nothing of no width");
     }
 }

@@ -14,6 +14,7 @@ use glam::DVec2;
 
 use super::batch::{Cloud, State};
 use super::certify::certify;
+use super::joint::Uncertainty;
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
 use super::{
@@ -370,8 +371,10 @@ impl<'a> Problem<'a> {
         let (config, c) = (self.config, self.centroid);
         let best = *answer.best();
         let runs = &answer.runs;
+        let told = || Uncertainty::of_mask(points_yz, self.field, answer.pose);
+        let pose = config.prior.slid_in(answer.pose, told);
         AlignReport {
-            grasp_from_object: answer.pose,
+            grasp_from_object: pose,
             grasp_from_object_6dof: None,
             converged: best.stop.converged(),
             stop: best.stop,
@@ -402,17 +405,13 @@ impl<'a> Problem<'a> {
             used: self.points.len(),
             inlier_share: answer.inlier_share,
             inlier_rms_m: (best.inlier_squares / (best.inliers as f64).max(1.0)).sqrt(),
-            within_prior: config.prior.allows(answer.pose),
+            within_prior: config.prior.allows(pose),
             observability: Some(answer.seen),
             joint: None,
             evidence: None,
             directions: None,
             trace: answer.trace,
-            fits: if config.record {
-                fits(points_yz, self.field, answer.pose, config.final_kernel_m())
-            } else {
-                Vec::new()
-            },
+            fits: if config.record { fits(points_yz, self.field, pose, config.final_kernel_m()) } else { Vec::new() },
         }
     }
 }

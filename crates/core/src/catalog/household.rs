@@ -4,10 +4,11 @@
 //! closing axis as the lab's tools: thinner, and the two membranes would meet beside them, which the simulator does not
 //! know.
 
-use glam::DVec2;
+use glam::{DVec2, DVec3};
 
 use super::shape::{Bar, ToolSpec};
 use super::tool;
+use crate::mesh::TriMesh;
 
 /// Place of the cup's axis along y, meters, object frame: its wall is farther from the grip than the membranes reach.
 pub const CUP_AXIS_M: f64 = 0.075;
@@ -41,6 +42,16 @@ pub fn cup_handle() -> ToolSpec {
     tool("cup", false, vec![strap([0.0, -HALF_GRIP_M], [0.0, HALF_GRIP_M]), arm(-HALF_GRIP_M), arm(HALF_GRIP_M)])
 }
 
+/// True for the model of [`cup_handle`], however its vertices are ordered: a tool of its extent and its number of triangles.
+pub fn is_cup_handle(mesh: &TriMesh) -> bool {
+    /// Rounding of a file, meters.
+    const SAME_M: f64 = 1e-6;
+    let handle = cup_handle().mesh();
+    let near = |(a, b): (&DVec3, &DVec3)| a.abs_diff_eq(*b, SAME_M);
+    let extents = mesh.bounds().zip(handle.bounds());
+    mesh.triangles.len() == handle.triangles.len() && extents.is_some_and(|(a, b)| a.iter().zip(&b).all(near))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +80,9 @@ mod tests {
             assert!(count > 500, "{}: {count} pixels of contact", spec.name);
             assert_ne!(a, b, "{}: its angle can be seen", spec.name);
         }
+        let is_cup = |spec: &ToolSpec| is_cup_handle(&spec.mesh());
+        assert!(is_cup(&cup_handle()) && !is_cup(&pencil()) && !tools().iter().any(is_cup));
+        assert!(!is_cup_handle(&TriMesh::default()));
         let tip = pencil().mesh().bounds().unwrap()[1].z;
         assert!((tip - 0.0345).abs() < 1e-4, "{tip}");
     }

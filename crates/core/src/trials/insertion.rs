@@ -101,6 +101,15 @@ impl Insertion {
         Ok(Self { outline, hole, compliance: compliance.checked()? })
     }
 
+    /// The same with another room to each side, meters.
+    ///
+    /// # Errors
+    /// As [`Hole::new`].
+    pub fn with_clearance(&self, clearance_m: f64) -> Result<Self, TrialError> {
+        let shape = HoleShape { clearance_m, ..self.hole.shape() };
+        Self::new(self.outline.clone(), shape, self.compliance)
+    }
+
     /// The hole.
     pub fn hole(&self) -> &Hole {
         &self.hole

@@ -86,6 +86,11 @@ impl Stacking {
         &self.cup
     }
 
+    /// Least distance that the center of mass keeps from the edge of its support, meters.
+    pub fn margin_m(&self) -> f64 {
+        self.margin_m
+    }
+
     /// Pose of the upright cup on the rim, `world_from_object`.
     pub fn goal(&self) -> PlanarPose {
         PlanarPose { theta_rad: 0.0, y_m: -self.cup.base_at.x, z_m: -self.cup.base_at.y }

@@ -5,6 +5,7 @@
 //! all as the floor. A second grasp is made of a trial where a method's verdict on the first is not *good*. The sweep over
 //! clearances tries the same poses again; nothing is felt anew for it.
 
+mod goal;
 mod pair;
 mod report;
 mod task;
@@ -30,9 +31,11 @@ use touch2touch_core::sim::{Sensors, SimConfig, random_grasp, simulate};
 use touch2touch_core::trials::{Compliance, HoleShape, InHand, Published, published};
 use touch2touch_core::units::angle_error;
 
-pub use pair::{PairTrial, of_pair};
+pub use goal::{Goal, GoalKind};
+pub use pair::{PairTrial, Room, of_pair};
 pub use report::{Held, MethodTrials, Swept, ToolTrials, Trial};
-pub use task::{Task, TaskKind, default_tools, known_tools};
+use task::Task;
+pub use task::{default_tools, known_tools};
 
 /// Name of the task in errors.
 const WHAT: &str = "Trials";
@@ -210,7 +213,7 @@ impl Run<'_> {
     fn grasped(&self, number: usize, again: u64) -> Grasped {
         let seed = self.seed(number, again);
         let grasp = random_grasp(seed);
-        let sample = simulate(&self.task.spec, grasp, seed, self.config);
+        let sample = simulate(self.task.spec, grasp, seed, self.config);
         Grasped { seed, sample, truth: grasp.object_from_grasp().inverse() }
     }
 
@@ -246,7 +249,7 @@ impl Run<'_> {
                 truth,
                 estimate: Some(found.grasp_from_object),
                 angle_error_rad: found.error_rad,
-                grade: found.verdict.as_ref().map(|verdict| verdict.grade),
+                grade: found.verdict.as_ref().map(|verdict| verdict.grade_let_down(&found.report)),
                 why: found.verdict.as_ref().map(|verdict| verdict.why.clone()).unwrap_or_default(),
                 attempt: Some(tried(found.grasp_from_object)?),
             },

@@ -383,6 +383,7 @@ impl<'a> Problem<'a> {
         let config = self.config;
         let best = answer.runs[answer.winner];
         let pose = best.state.to_pose(self.centroid);
+        let pose = config.mask.prior.slid_in(pose, || self.uncertainty(pose));
         let seen = self.mask.as_ref().map(|[_, cloud]| of_cloud(cloud, self.centroid, &self.tool.field, best.state));
         let square = config.kernels_m[LAST].powi(2);
         let run = |(run, start): (&Progress, &PlanarPose)| Run {

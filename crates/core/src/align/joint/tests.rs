@@ -6,7 +6,7 @@ use super::template::template;
 use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
-use crate::align::{Contacts, Evidence, PadImage};
+use crate::align::{Contacts, Evidence, PadImage, Prior};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};
@@ -225,4 +225,69 @@ fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     let evidence = Evidence::about(&nothing, &touch.tool, &report);
     assert_eq!((evidence.on_tool, evidence.membrane), (0.0, None));
     assert!((evidence.uncertainty.angle_rad().to_degrees() - 13.0).abs() < 0.1, "{evidence:?}");
+}
+
+#[test]
+fn a_prediction_unlike_the_tool_is_to_be_checked_and_wrong_only_beyond_what_right_ones_show() {
+    let touch = Touch::new(0, 3);
+    let (mut report, _) = judged(&touch, &touch.tool);
+    let mut evidence = report.evidence.unwrap();
+    let mut membrane = evidence.membrane.unwrap();
+    let mut grade = |basis, gain: f64| {
+        (membrane.swapped, membrane.likeness) = (Some(gain), 0.3);
+        evidence.membrane = Some(membrane);
+        report.evidence = Some(evidence);
+        report.joint = report.joint.map(|fit| JointFit { basis, ..fit });
+        Verdict::of(&report).unwrap().grade
+    };
+    assert_eq!([0.3, 0.5].map(|gain| grade(Basis::Both, gain)), [Grade::Wrong; 2]);
+    assert_eq!([0.3, 0.5].map(|gain| grade(Basis::Unlike, gain)), [Grade::Check, Grade::Wrong]);
+}
+
+/// A spread along the tool's own axis and across it, meters, and next to none of the angle.
+fn spread_along(pose: PlanarPose, [along_m, across_m]: [f64; 2]) -> Uncertainty {
+    let turn = DVec2::from_angle(pose.theta_rad);
+    let (across, along) = (across_m.powi(2), along_m.powi(2));
+    let yy = across * turn.x.powi(2) + along * turn.y.powi(2);
+    let zz = across * turn.y.powi(2) + along * turn.x.powi(2);
+    let yz = (across - along) * turn.x * turn.y;
+    let covariance = [[1e-6, 0.0, 0.0], [0.0, yy, yz], [0.0, yz, zz]];
+    Uncertainty { covariance, center: DVec2::new(pose.y_m, pose.z_m) }
+}
+
+#[test]
+fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
+    let rod = tools().iter().position(|tool| tool.name.ends_with("_rod")).unwrap();
+    let touch = Touch::new(rod, 2);
+    let (mut report, _) = judged(&touch, &touch.tool);
+    let (pose, evidence) = (report.grasp_from_object, report.evidence.unwrap());
+    let mut graded = |along_m: f64, across_m: f64| {
+        let uncertainty = spread_along(pose, [along_m, across_m]);
+        assert!((uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)) - across_m).abs() < 1e-9);
+        report.evidence = Some(Evidence { uncertainty, ..evidence });
+        let verdict = Verdict::of(&report).unwrap();
+        (verdict.grade, verdict.grade_let_down(&report))
+    };
+    assert_eq!(graded(3e-3, 1e-4), (Grade::Check, Grade::Good));
+    assert_eq!(graded(1e-4, 3e-3), (Grade::Check, Grade::Check));
+    assert_eq!(graded(1e-4, 1e-4), (Grade::Good, Grade::Good));
+}
+
+#[test]
+fn a_rod_that_slid_out_of_the_hand_comes_back_along_itself() {
+    let (pose, prior) = (PlanarPose { theta_rad: 0.2, y_m: 0.001, z_m: -0.003 }, Prior::default());
+    let slid = |along_m: f64| {
+        let moved = pose.transform_yz(DVec2::new(0.0, along_m));
+        PlanarPose { y_m: moved.x, z_m: moved.y, ..pose }
+    };
+    let told = |of: PlanarPose, along_m: f64| move || spread_along(of, [along_m, 2e-4]);
+    let far = slid(0.02);
+    let back = prior.slid_in(far, told(far, 2.8e-3));
+    let from_middle = DVec2::new(back.y_m, back.z_m).dot(DVec2::from_angle(pose.theta_rad).perp());
+    assert!(!prior.allows(far) && prior.allows(back) && from_middle.abs() < 1e-9, "{back:?}");
+    // What the gripper can hold stays, and nothing is asked about it; so does what no slide brings back, and what is known.
+    assert_eq!(prior.slid_in(pose, || panic!("asked")), pose);
+    let aside = PlanarPose { y_m: 0.02, ..pose };
+    assert_eq!(prior.slid_in(aside, told(aside, 2.8e-3)), aside);
+    assert_eq!(prior.slid_in(far, told(far, 1e-3)), far);
 }

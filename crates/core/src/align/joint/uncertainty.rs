@@ -1,7 +1,7 @@
 //! [`Uncertainty`]: spread of the errors that a pose may have.
 
 use glam::DVec2;
-use nalgebra::{Matrix2x3, Matrix3, Vector3};
+use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
 use super::cost::{Joint, Relief, noise_m};
@@ -63,7 +63,7 @@ impl Uncertainty {
     }
 
     /// Uncertainty of a pose from the mask alone. `points_yz` in the grasp frame, meters.
-    pub(super) fn of_mask(points_yz: &[DVec2], field: &DistanceField, pose: PlanarPose) -> Self {
+    pub(in crate::align) fn of_mask(points_yz: &[DVec2], field: &DistanceField, pose: PlanarPose) -> Self {
         let Observability { eigenvalues, motions, center, .. } = observability(points_yz, field, pose);
         let information = eigenvalues.iter().zip(motions).map(|(value, motion)| {
             let motion = Vector3::from(motion);
@@ -86,16 +86,27 @@ impl Uncertainty {
         self.covariance[0][0].sqrt()
     }
 
-    /// Half axes of the ellipse of one standard deviation of the place of the tool's point in the [`center`](Self::center),
-    /// `(y, z)`, meters, the longer one first; whatever the angle does meanwhile.
-    pub fn half_axes(&self, grasp_from_object: PlanarPose) -> [DVec2; 2] {
+    /// Covariance of the place of the tool's point in the [`center`](Self::center), `(y, z)`, square meters, whatever the angle
+    /// does meanwhile.
+    fn place(&self, grasp_from_object: PlanarPose) -> Matrix2<f64> {
         let arm = (self.center - DVec2::new(grasp_from_object.y_m, grasp_from_object.z_m)).perp();
         let to_center = Matrix2x3::new(arm.x, 1.0, 0.0, arm.y, 0.0, 1.0);
-        let place = to_center * Matrix3::from(self.covariance) * to_center.transpose();
+        to_center * Matrix3::from(self.covariance) * to_center.transpose()
+    }
+
+    /// Half axes of the ellipse of one standard deviation of that place, `(y, z)`, meters, the longer one first.
+    pub fn half_axes(&self, grasp_from_object: PlanarPose) -> [DVec2; 2] {
+        let place = self.place(grasp_from_object);
         let (mean, half) = (0.5 * (place[(0, 0)] + place[(1, 1)]), 0.5 * (place[(0, 0)] - place[(1, 1)]));
         let spread = half.hypot(place[(0, 1)]);
         let direction = DVec2::from_angle(0.5 * place[(0, 1)].atan2(half));
         [direction * (mean + spread).max(0.0).sqrt(), direction.perp() * (mean - spread).max(0.0).sqrt()]
+    }
+
+    /// Standard deviation of that place along a unit direction `(y, z)`, meters.
+    pub fn along_m(&self, grasp_from_object: PlanarPose, direction: DVec2) -> f64 {
+        let direction = Vector2::new(direction.x, direction.y);
+        (self.place(grasp_from_object) * direction).dot(&direction).sqrt()
     }
 
     /// Standard deviation of that place along the axis where it is known least, meters.

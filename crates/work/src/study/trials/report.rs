@@ -2,8 +2,8 @@
 
 use serde::Serialize;
 
-use super::TrialsSetup;
-use super::task::{Task, TaskKind};
+use super::task::Task;
+use super::{GoalKind, TrialsSetup};
 use crate::error::TaskError;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::metrics::AngleSummary;
@@ -23,7 +23,8 @@ pub struct Held {
     pub estimate: Option<PlanarPose>,
     /// Size of the angle's error, radians.
     pub angle_error_rad: Option<f64>,
-    /// The verdict's grade; `None` without a pose, or where none is estimated.
+    /// The verdict's grade for a robot that lets the tool down: a place left open along the tool is no fault. `None` without a
+    /// pose, or where none is estimated.
     pub grade: Option<Grade>,
     /// The verdict in a sentence, or why there is no pose.
     pub why: String,
@@ -86,7 +87,7 @@ pub struct ToolTrials {
     /// Name of the tool.
     pub tool: String,
     /// Task that it was tried with.
-    pub task: TaskKind,
+    pub task: GoalKind,
     /// One per method, in the order of the settings.
     pub methods: Vec<MethodTrials>,
 }
@@ -113,7 +114,7 @@ pub(super) fn tool_trials(task: &Task, setup: &TrialsSetup, made: Vec<Vec<Trial>
         })
     };
     let methods = setup.methods.iter().zip(by_method).map(one).collect::<Result<Vec<_>, TaskError>>()?;
-    Ok(ToolTrials { tool: task.name().to_owned(), task: task.kind(), methods })
+    Ok(ToolTrials { tool: task.name().to_owned(), task: task.goal.kind(), methods })
 }
 
 /// Assumptions of the trials, in words.

@@ -4,6 +4,7 @@ use std::sync::atomic::AtomicUsize;
 use super::*;
 use crate::job::Cancel;
 use crate::mask::{MaskChoice, MaskSource};
+use touch2touch_core::catalog::{ToolSpec, cup_handle, tools};
 use touch2touch_core::trials::{After, Share};
 use touch2touch_core::verdict::Grade;
 
@@ -119,4 +120,33 @@ fn what_makes_no_sense_is_refused_and_a_stopped_run_says_so() {
     let part = trials(&TrialsSetup { count: 40, ..setup }, &Models::new(None), &stop_at_once).unwrap();
     assert!(!part.complete && !part.tools[0].methods[0].trials.is_empty());
     assert!(part.tools[0].methods[0].trials.len() < 40);
+}
+
+#[test]
+fn a_pair_is_tried_as_its_tool_is_a_peg_or_a_cup() {
+    let truth = PlanarPose { theta_rad: 0.1, ..PlanarPose::default() };
+    let tried = |spec: &ToolSpec, off_deg: f64| {
+        let estimate = PlanarPose { theta_rad: truth.theta_rad + off_deg.to_radians(), ..truth };
+        of_pair(&ToolModel::new(spec.mesh()).unwrap(), truth, estimate).unwrap()
+    };
+    let peg = tried(&tools()[0], 0.0);
+    let room = peg.room.unwrap();
+    assert!(peg.attempt.end.is_success() && peg.goal.kind() == GoalKind::Insertion);
+    assert_eq!((room.room_m, room.needs_m), (0.001, Some(0.0005)));
+    assert_eq!(tried(&tools()[0], 30.0).room.unwrap().needs_m, None);
+    let [stands, falls] = [0.0, 30.0].map(|off| tried(&cup_handle(), off));
+    assert!(stands.attempt.end.is_success() && !falls.attempt.end.is_success());
+    assert_eq!((stands.room, falls.goal.kind()), (None, GoalKind::Stacking));
+    let json = serde_json::to_value(&stands).unwrap();
+    assert!(json["end"]["kind"] == "stands" && json.get("room_m").is_none(), "{json}");
+    assert_eq!(serde_json::to_value(&peg).unwrap()["room_m"], 0.001);
+}
+
+#[test]
+fn a_rod_is_not_refused_for_where_it_is_along_itself() {
+    let made = run(&setup(&["pencil"], 6));
+    let [by_pose, _] = made.tools[0].methods.as_slice() else { panic!("two methods") };
+    let good = by_pose.trials.iter().filter(|trial| trial.first.grade == Some(Grade::Good));
+    let good = good.inspect(|trial| assert!(trial.first.tried().success, "{trial:?}")).count();
+    assert!(good >= 5, "{:?}", by_pose.trials.iter().map(|trial| &trial.first.why).collect::<Vec<_>>());
 }
