@@ -115,9 +115,9 @@ THRESHOLDS = {"own": "5", "other": "2.5"}
 BOTH = ("--engines", "joint,distance_field", "--no-peers")
 
 
-def predicted(bench):
+def predicted(bench, seed):
     """Cases of the built-in simulator with what the shipped generator predicts in the place of the imprints."""
-    return bench.cases("predicted", "--count", "100", "--seed", "6161", "--predicted", *GENERATOR)
+    return bench.cases(f"predicted_{seed}", "--count", "100", "--seed", str(seed), "--predicted", *GENERATOR)
 
 
 def masks(bench):
@@ -131,7 +131,7 @@ def masks(bench):
     for kind in ("spoilt", "unet"):
         answer = bench.bench(f"masks_any_depth_{kind}", "registration", "--cases", folder, "--masks", kind, *BOTH)
         found.setdefault("any_depth", {})[kind] = engines(answer)
-    answer = bench.bench("masks_predicted", "registration", "--cases", predicted(bench), "--masks", "unet", *BOTH)
+    answer = bench.bench("masks_predicted", "registration", "--cases", predicted(bench, 6161), "--masks", "unet", *BOTH)
     return found | {"predicted": {"unet": engines(answer)}}
 
 
@@ -143,7 +143,7 @@ def verdict(bench):
         for kind in ("spoilt", "unet"):
             answer = bench.bench(f"verdict_{kind}", "verdict", "--cases", bench.places["other"], "--masks", kind)
             found[kind] = {key: answer[key] for key in ("faults", "named")}
-    answer = bench.bench("verdict_predicted", "verdict", "--cases", predicted(bench), "--masks", "unet")
+    answer = bench.bench("verdict_predicted", "verdict", "--cases", predicted(bench, 8181), "--masks", "unet")
     return found | {"predicted": {key: answer[key] for key in ("faults", "named")}}
 
 

@@ -114,8 +114,20 @@ fn said(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, trial: &PairTrial) {
 
 /// The goal's terms in a few words, and what they leave out.
 fn terms(trial: &PairTrial) -> (String, String) {
-    match (&trial.goal, trial.room) {
-        (Goal::Stacking(stacking), _) => {
+    match &trial.goal {
+        Goal::Insertion(insertion) => {
+            let shape = insertion.hole().shape();
+            let needs = match trial.room.and_then(|room| room.needs_m) {
+                Some(room) => format!("{} of room would do", text_mm(room)),
+                None => "5 mm of room would not do".to_owned(),
+            };
+            let tip = format!(
+                "The hole is the tool's own outline, {} deep. The gripper gives way by 2° and 1 mm; nothing slips or bends",
+                text_mm(shape.depth_m)
+            );
+            (format!("{} of room to each side; {needs}", text_mm(shape.clearance_m)), tip)
+        }
+        Goal::Stacking(stacking) => {
             let (cup, margin) = (stacking.cup(), text_mm(stacking.margin_m()));
             let tip = format!(
                 "It is let go on the rim of another ({} wide), and stands while its center of mass, {} above its base, is over \
@@ -124,15 +136,6 @@ fn terms(trial: &PairTrial) -> (String, String) {
                 text_mm(cup.mass_m)
             );
             (format!("a margin of {margin} is asked of it"), tip)
-        }
-        (Goal::Insertion(_), room) => {
-            let needs = match room.and_then(|room| room.needs_m) {
-                Some(room) => format!("{} of room would do", text_mm(room)),
-                None => "5 mm of room would not do".to_owned(),
-            };
-            let room = room.map_or(0.0, |room| room.room_m);
-            let tip = "The hole is the tool's own outline, 10 mm deep. The gripper gives way by 2° and 1 mm; nothing slips or bends";
-            (format!("{} of room to each side; {needs}", text_mm(room)), tip.to_owned())
         }
     }
 }
