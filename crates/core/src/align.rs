@@ -31,6 +31,7 @@ mod register;
 mod search;
 #[cfg(test)]
 pub(crate) mod testing;
+mod uncertainty;
 mod windows;
 
 use std::borrow::Cow;
@@ -43,13 +44,15 @@ use super::frames::PlanarPose;
 pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
-pub use joint::{Basis, Elsewhere, Evidence, Hold, JointConfig, JointFit, MaskWeight, MembraneEvidence, Uncertainty};
+pub use joint::{Basis, Elsewhere, Evidence, Hold, JointConfig, JointFit, MaskWeight, MembraneEvidence};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
 pub(crate) use refine::RefineConfig;
 pub use register::{Ask, Contacts, PadImage, Register, Scene};
+pub(crate) use uncertainty::PLACE_OPEN_M;
+pub use uncertainty::Uncertainty;
 
 /// Length that makes an angle comparable with a shift: one radian counts as this many meters.
 ///
@@ -149,10 +152,6 @@ impl Default for Accept {
     }
 }
 
-/// Standard deviation of a place, where it is known least, beyond which the contact leaves it open, meters. The gripper alone knows
-/// it to 2.9 mm.
-pub(crate) const PLACE_OPEN_M: f64 = 2e-3;
-
 /// The box around zero in which the gripper can hold a tool.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prior {
@@ -175,21 +174,6 @@ impl Prior {
         super::units::wrap_angle(pose.theta_rad).abs() <= 1.5 * self.theta_rad
             && pose.y_m.abs() <= 1.5 * self.shift_m
             && pose.z_m.abs() <= 1.5 * self.shift_m
-    }
-
-    /// The pose, where the gripper can hold the tool so; else the one to which it slides along what the contact leaves open, as
-    /// near to the middle as that leads, if the gripper can hold that. A rod may be anywhere along itself: of two places that fit
-    /// alike, one is possible.
-    fn slid_in(&self, pose: PlanarPose, told: impl FnOnce() -> Uncertainty) -> PlanarPose {
-        if self.allows(pose) {
-            return pose;
-        }
-        let [open, _] = told().half_axes(pose);
-        let along = open.normalize_or_zero();
-        let origin = DVec2::new(pose.y_m, pose.z_m);
-        let slid = origin - along * origin.dot(along);
-        let slid = PlanarPose { y_m: slid.x, z_m: slid.y, ..pose };
-        if open.length() > PLACE_OPEN_M && self.allows(slid) { slid } else { pose }
     }
 }
 

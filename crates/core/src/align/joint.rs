@@ -11,6 +11,7 @@
 mod bound;
 mod certify;
 mod cost;
+mod curvature;
 mod evidence;
 mod hold;
 mod image;
@@ -20,7 +21,6 @@ mod smooth;
 mod template;
 #[cfg(test)]
 mod tests;
-mod uncertainty;
 
 use serde::{Deserialize, Serialize};
 
@@ -31,7 +31,6 @@ use crate::tool::ToolModel;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
 pub use hold::Hold;
 use problem::{Problem, check};
-pub use uncertainty::Uncertainty;
 
 /// Choices of the registration by membrane and mask. The default is what the product uses.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

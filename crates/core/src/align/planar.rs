@@ -14,9 +14,9 @@ use glam::DVec2;
 
 use super::batch::{Cloud, State};
 use super::certify::certify;
-use super::joint::Uncertainty;
 use super::observability::of_cloud;
 use super::search::{Progress, Search};
+use super::uncertainty::Uncertainty;
 use super::{
     AlignConfig, AlignError, AlignReport, Certificate, Fate, MIN_POINTS, MIN_SHARE, Observability, Outcome, PointFit,
     Prior, REACH_M, Run, Rung, RungAttempt, clean,

@@ -6,10 +6,9 @@ use serde::{Deserialize, Serialize};
 use super::JointConfig;
 use super::cost::{Joint, Relief};
 use super::problem::{Patches, Problem};
-use super::uncertainty::Uncertainty;
 use crate::align::batch::State;
 use crate::align::search::{Cost, Progress, minimize};
-use crate::align::{AlignReport, Contacts, PadImage, Scene};
+use crate::align::{AlignReport, Contacts, PadImage, Scene, Uncertainty};
 use crate::mesh::sampling::spread;
 use crate::tool::ToolModel;
 

@@ -6,7 +6,7 @@ use super::template::template;
 use super::*;
 use crate::align::batch::{Cloud, State};
 use crate::align::search::Cost;
-use crate::align::{Contacts, Evidence, PadImage, Prior};
+use crate::align::{Contacts, Evidence, PadImage, Prior, Uncertainty};
 use crate::catalog::tools;
 use crate::cloud::lift;
 use crate::grid::{DepthMap, Mask};

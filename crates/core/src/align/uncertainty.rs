@@ -1,17 +1,17 @@
-//! [`Uncertainty`]: spread of the errors that a pose may have.
+//! [`Uncertainty`]: spread of the errors that a pose may have, and [`Prior::slid_in`], which goes by it.
 
 use glam::DVec2;
 use nalgebra::{Matrix2, Matrix2x3, Matrix3, Vector2, Vector3};
 use serde::{Deserialize, Serialize};
 
-use super::cost::{Joint, Relief, noise_m};
-use super::problem::{LAST, Problem};
-use crate::align::batch::State;
-use crate::align::observability::{Observability, observability};
-use crate::align::search::Cost as _;
-use crate::align::{ANGLE_SCALE_M, Prior};
+use super::observability::{Observability, observability};
+use super::{ANGLE_SCALE_M, Prior};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
+
+/// Standard deviation of a place, where it is known least, beyond which the contact leaves it open, meters. The gripper alone knows
+/// it to 2.9 mm.
+pub(crate) const PLACE_OPEN_M: f64 = 2e-3;
 
 /// Spread of the errors of a pose, as a normal distribution about it.
 ///
@@ -32,22 +32,13 @@ const MOUNTING: [f64; 2] = [0.25 / 180.0 * std::f64::consts::PI, 0.2e-3];
 /// Deviation of the place, y and z, that no finger can see alone: where the template is not the membrane's own law, or the
 /// camera, which looks obliquely along z, does not see behind the tool. From fresh grasps under two laws.
 const LAW_M: [f64; 2] = [0.2e-3, 0.28e-3];
-/// Places of the membranes, and the kernel, meters, as in the answer.
-const PLACES: usize = 800;
-const KERNEL_M: f64 = 0.5e-3;
-/// The variance of a place's height is four times this times the noise that is left, meters: neighbors err together, and a
-/// part of what is left is the template's error, which hardly moves the pose. From fresh grasps under two laws.
-const SHARED_M: f64 = 4e-5;
-/// The same of predicted images, whose errors go together over the width of a bar. From fresh grasps that the shipped
-/// generator predicted.
-const PREDICTED_SHARED_M: f64 = 42e-5;
 /// Deviation of a mask's whole outline, meters: its errors go together. From fresh grasps with masks that fit.
 const OUTLINE_M: f64 = 0.07e-3;
 
 impl Uncertainty {
     /// From the information (inverse covariance) about (angle times [`ANGLE_SCALE_M`], y, z) of the tool turned about
     /// `center`, grasp frame, of so many cameras.
-    fn new(information: Matrix3<f64>, center: DVec2, pose: PlanarPose, cameras: f64) -> Self {
+    pub(super) fn new(information: Matrix3<f64>, center: DVec2, pose: PlanarPose, cameras: f64) -> Self {
         let Prior { theta_rad, shift_m } = Prior::default();
         // Of an even distribution.
         let held = [theta_rad * ANGLE_SCALE_M, shift_m, shift_m].map(|half| half * half / 3.0);
@@ -63,7 +54,7 @@ impl Uncertainty {
     }
 
     /// Uncertainty of a pose from the mask alone. `points_yz` in the grasp frame, meters.
-    pub(in crate::align) fn of_mask(points_yz: &[DVec2], field: &DistanceField, pose: PlanarPose) -> Self {
+    pub(super) fn of_mask(points_yz: &[DVec2], field: &DistanceField, pose: PlanarPose) -> Self {
         let Observability { eigenvalues, motions, center, .. } = observability(points_yz, field, pose);
         let information = eigenvalues.iter().zip(motions).map(|(value, motion)| {
             let motion = Vector3::from(motion);
@@ -115,31 +106,19 @@ impl Uncertainty {
     }
 }
 
-/// Curvature by motions of the tool in the hand, of that by steps of the points in the object frame, which go the other way.
-fn in_the_hand([a, b, c, d, e, f]: &[f64; 6], pose: PlanarPose) -> Matrix3<f64> {
-    let turn = -DVec2::from_angle(pose.theta_rad);
-    let to_hand = Matrix3::new(-1.0, 0.0, 0.0, 0.0, turn.x, -turn.y, 0.0, turn.y, turn.x);
-    to_hand * Matrix3::new(*a, *b, *c, *b, *d, *e, *c, *e, *f) * to_hand.transpose()
-}
-
-impl Problem<'_> {
-    /// Curvature of the membranes' part of the cost that decides the answer, about (angle times [`ANGLE_SCALE_M`], y, z) of the
-    /// tool turned about the centroid.
-    pub(super) fn answer_curvature(&self, pose: PlanarPose) -> Matrix3<f64> {
-        let patches = self.patches(LAST);
-        let mut joint = Joint { fingers: &patches, kernel_m: self.config().kernels_m[LAST], mask: None, lookups: 0 };
-        in_the_hand(&joint.sums(State::from_pose(pose, self.centroid())).h, pose)
-    }
-
-    /// Uncertainty of a pose from the membranes.
-    pub(super) fn uncertainty(&self, pose: PlanarPose) -> Uncertainty {
-        let at = State::from_pose(pose, self.centroid());
-        let patches = self.patches_of(self.answer_band(), PLACES);
-        let noise_m = noise_m(Relief::of(&patches, at, KERNEL_M).residuals_m).max(1e-6);
-        let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
-        let shared_m = if self.is_predicted() { PREDICTED_SHARED_M } else { SHARED_M };
-        let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * shared_m * noise_m);
-        let information = in_the_hand(&joint.sums(at).h, pose) * scale;
-        Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)
+impl Prior {
+    /// The pose, where the gripper can hold the tool so; else the one to which it slides along what the contact leaves open, as
+    /// near to the middle as that leads, if the gripper can hold that. A rod may be anywhere along itself: of two places that fit
+    /// alike, one is possible.
+    pub(super) fn slid_in(&self, pose: PlanarPose, told: impl FnOnce() -> Uncertainty) -> PlanarPose {
+        if self.allows(pose) {
+            return pose;
+        }
+        let [open, _] = told().half_axes(pose);
+        let along = open.normalize_or_zero();
+        let origin = DVec2::new(pose.y_m, pose.z_m);
+        let slid = origin - along * origin.dot(along);
+        let slid = PlanarPose { y_m: slid.x, z_m: slid.y, ..pose };
+        if open.length() > PLACE_OPEN_M && self.allows(slid) { slid } else { pose }
     }
 }
