@@ -45,6 +45,8 @@ const MASS_M: f32 = 0.004;
 const CUP: f32 = 0.4;
 /// Height over the mouth up to which the camera shows a tool, meters.
 const NEAR_M: f64 = 0.022;
+/// Depth under the mouth or the rim down to which it shows what stands there, meters: a block whole, a cup's upper part.
+const BELOW_M: f64 = 0.03;
 /// Direction of the camera at first, degrees: from before the cut block, a little from above.
 const CAMERA_DEG: [f64; 2] = [20.0, 14.0];
 
@@ -199,7 +201,7 @@ fn picture(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSou
 fn update(cx: &Cx<'_>, memory: &mut Memory, trial: &Arc<PairTrial>) {
     update_mesh(cx, &mut memory.tool, &mut memory.revision);
     if memory.stage.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, trial)) {
-        memory.stage = Some((trial.clone(), Arc::new(Stage::of(&trial.goal))));
+        memory.stage = Some((trial.clone(), Arc::new(Stage::of(trial))));
         memory.revision += 1;
     }
 }
@@ -217,7 +219,8 @@ fn whole_way(tool: &TriMesh, stage: &Stage, trial: &PairTrial) -> Vec<DVec3> {
             |world_from_object: DAffine3| cup.body.vertices.iter().map(move |p| world_from_object.transform_point3(*p));
         ends().flat_map(of)
     });
-    tools.chain(cups).chain(stage.stands.vertices.iter().copied()).collect()
+    let stands = stage.stands.vertices.iter().copied().filter(|p| p.z < BELOW_M);
+    tools.chain(cups).chain(stands).collect()
 }
 
 fn scene(

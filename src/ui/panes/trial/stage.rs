@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::trials::{Cup, Hole, Stacking};
-use touch2touch_work::trials::Goal;
+use touch2touch_work::trials::{Goal, PairTrial};
 
 /// Thickness of the plates behind the plane of the outline, and width of the block beside the hole, meters.
 const BLOCK_M: [f64; 2] = [0.012, 0.008];
@@ -31,9 +31,13 @@ pub(super) struct Carried {
 }
 
 impl Stage {
-    pub(super) fn of(goal: &Goal) -> Self {
-        match goal {
-            Goal::Insertion(insertion) => Self { stands: Arc::new(cut_block(insertion.hole())), carried: None },
+    pub(super) fn of(trial: &PairTrial) -> Self {
+        match &trial.goal {
+            Goal::Insertion(insertion) => {
+                // Where a tool touches far beside its hole, there is still the block.
+                let touched = trial.attempt.contact.map_or(0.0, |touch| touch.point_m.y.abs());
+                Self { stands: Arc::new(cut_block(insertion.hole(), touched)), carried: None }
+            }
             Goal::Stacking(stacking) => {
                 let cup = stacking.cup();
                 let lower = body(cup, DVec2::new(0.0, cup.height_m));
@@ -78,12 +82,13 @@ fn body(cup: &Cup, base_at: DVec2) -> TriMesh {
     mesh
 }
 
-/// The half of the block behind the plane of the outline, with the hole laid open: plates between its openings, and the floor.
-fn cut_block(hole: &Hole) -> TriMesh {
+/// The half of the block behind the plane of the outline, with the hole laid open: plates between its openings, and the floor. It is
+/// wider than the hole, and than `out_to_m` to either side, meters.
+fn cut_block(hole: &Hole, out_to_m: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
     let shape = hole.shape();
     let reach = hole.plates().flat_map(|(_, openings)| openings.iter().flatten().map(|y| y.abs()).collect::<Vec<_>>());
-    let reach = reach.fold(0.0, f64::max) + BLOCK_M[1];
+    let reach = reach.fold(out_to_m, f64::max) + BLOCK_M[1];
     let plates: Vec<(f64, Vec<[f64; 2]>)> = hole.plates().map(|(top, openings)| (top, openings.to_vec())).collect();
     let floor = shape.depth_m + shape.clearance_m;
     for (i, (top, openings)) in plates.iter().enumerate() {
