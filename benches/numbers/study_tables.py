@@ -105,7 +105,9 @@ SECTIONS = (
      "test-set", ("method", "samples", "shift")),
     ("Conditions", "Pairs with a fault, as in the paper's Table I: a latent diffusion trained on each kind, tested on each.",
      "test-set", ("condition",)),
-    ("Ablations", "Pairs turned and mirrored while training (both, as the paper chose) and pictures resized, or each of these left out.",
+    ("Ablations", "Pairs turned and mirrored while training (both, as the paper chose) and pictures resized, or each of these left out. "
+     "Padded, the GelSlim's picture lies where the bubble would see it; cropped, only the part of the imprint that the GelSlim sees is "
+     "learned, and the rest is counted as no imprint.",
      "test-set", ("rotation", "flip", "geometry")),
     ("Other sensors", "Another drawn pair of sensors, and GelSlims in other colors with other dots: as trained, and fitted by `adapt` to "
      "pairs of these.", "other", ("method", "samples", "fit")),
