@@ -28,8 +28,8 @@ fn in_the_hand([a, b, c, d, e, f]: &[f64; 6], pose: PlanarPose) -> Matrix3<f64> 
 }
 
 impl Problem<'_> {
-    /// Curvature of the membranes' part of the cost that decides the answer, about (angle times [`ANGLE_SCALE_M`], y, z) of the
-    /// tool turned about the centroid.
+    /// Curvature of the membranes' part of the cost that decides the answer, about (angle times
+    /// [`ANGLE_SCALE_M`](crate::align::ANGLE_SCALE_M), y, z) of the tool turned about the centroid.
     pub(super) fn answer_curvature(&self, pose: PlanarPose) -> Matrix3<f64> {
         let patches = self.patches(LAST);
         let mut joint = Joint { fingers: &patches, kernel_m: self.config().kernels_m[LAST], mask: None, lookups: 0 };
