@@ -31,7 +31,7 @@ static TABLE: &[(&str, How)] = &[
     // The studio itself.
     ("touch2touch", How::Parse),
     ("touch2touch --version", How::Run(&[], "", &[0])),
-    ("touch2touch simulate", How::Run(&[("all", "pattern_36,pattern_31_rod"), ("46", "1")], "", &[0])),
+    ("touch2touch simulate", How::Run(&[("all", "pattern_36,pattern_31_rod"), ("46", "1"), ("10", "1")], "", &[0])),
     ("touch2touch generate", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch watch", How::Run(&[], "--once --steps 1", &[0])),
     ("touch2touch compare", How::Run(&[("seed=7,steps=50", "steps=2")], "--steps 1", &[0])),
@@ -155,6 +155,7 @@ impl Stage {
                 (other, _) => {
                     let placeholder = other.len() > 1 && other.chars().all(|c| c.is_ascii_uppercase());
                     assert!(!placeholder, "`{command}`: say in this test what {other} stands for");
+                    assert!(before != "--out", "`{command}`: {other} would be written where the tests run");
                     other.to_owned()
                 }
             };
