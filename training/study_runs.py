@@ -46,7 +46,7 @@ class Row:
         return training | {"samples": self.samples, "test": self.test, "shift": self.shift, "fit": list(self.fit or ())}
 
 
-# What a row is compared with, by the setting in which it differs. Of samples, every number is compared with every other.
+# Settings that a row is compared with, by the one in which it differs. Of samples, every number is compared with every other.
 REFERENCE = {key: value for key, value in Row(Training(), None).settings().items() if key not in ("samples", "test")}
 
 

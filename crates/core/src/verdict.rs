@@ -97,6 +97,7 @@ const UNLIKE: Membranes = Membranes {
     misfit: [0.9; 2],
     angle_rad: [EXPLAINED.angle_rad[0], f64::INFINITY],
 };
+/// Weight of contact off the tool beside likeness, and the largest share of it that counts.
 const OFF_COUNTS: f64 = 0.7;
 const OFF_CAP: f64 = 0.4;
 /// Difference of the angle and of the place that the fingers then have, radians and meters: below, it is no fault.

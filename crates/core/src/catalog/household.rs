@@ -4,6 +4,8 @@
 //! closing axis as the lab's tools: thinner, and the two membranes would meet beside them, which the simulator does not
 //! know.
 
+use std::sync::LazyLock;
+
 use glam::{DVec2, DVec3};
 
 use super::shape::{Bar, ToolSpec};
@@ -46,10 +48,14 @@ pub fn cup_handle() -> ToolSpec {
 pub fn is_cup_handle(mesh: &TriMesh) -> bool {
     /// Rounding of a file, meters.
     const SAME_M: f64 = 1e-6;
-    let handle = cup_handle().mesh();
+    // The model is made once: every trial of every tool asks.
+    static HANDLE: LazyLock<(usize, Option<[DVec3; 2]>)> = LazyLock::new(|| {
+        let handle = cup_handle().mesh();
+        (handle.triangles.len(), handle.bounds())
+    });
+    let (triangles, bounds) = *HANDLE;
     let near = |(a, b): (&DVec3, &DVec3)| a.abs_diff_eq(*b, SAME_M);
-    let extents = mesh.bounds().zip(handle.bounds());
-    mesh.triangles.len() == handle.triangles.len() && extents.is_some_and(|(a, b)| a.iter().zip(&b).all(near))
+    mesh.triangles.len() == triangles && mesh.bounds().zip(bounds).is_some_and(|(a, b)| a.iter().zip(&b).all(near))
 }
 
 #[cfg(test)]

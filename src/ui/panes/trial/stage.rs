@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{DVec2, DVec3};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::trials::{Cup, Hole, Stacking};
+use touch2touch_core::trials::{Cup, Hole};
 use touch2touch_work::trials::{Goal, PairTrial};
 
 /// Thickness of the plates behind the plane of the outline, and width of the block beside the hole, meters.
@@ -25,9 +25,9 @@ pub(super) struct Stage {
 
 /// The cup that a handle belongs to.
 pub(super) struct Carried {
-    /// Its body, object frame.
+    /// Body, object frame.
     pub(super) body: Arc<TriMesh>,
-    stacking: Stacking,
+    cup: Cup,
 }
 
 impl Stage {
@@ -41,7 +41,7 @@ impl Stage {
             Goal::Stacking(stacking) => {
                 let cup = stacking.cup();
                 let lower = body(cup, DVec2::new(0.0, cup.height_m));
-                let upper = Carried { body: Arc::new(body(cup, cup.base_at)), stacking: *stacking };
+                let upper = Carried { body: Arc::new(body(cup, cup.base_at)), cup: *cup };
                 Self { stands: Arc::new(lower), carried: Some(upper) }
             }
         }
@@ -51,8 +51,7 @@ impl Stage {
 impl Carried {
     /// The center of mass, and the point below it in the plane of the lower rim, for a pose of the handle; world frame, meters.
     pub(super) fn plumb(&self, world_from_object: PlanarPose) -> [DVec3; 2] {
-        let cup = self.stacking.cup();
-        let mass = world_from_object.transform_yz(cup.base_at - DVec2::new(0.0, cup.mass_m));
+        let mass = world_from_object.transform_yz(self.cup.base_at - DVec2::new(0.0, self.cup.mass_m));
         [DVec3::new(0.0, mass.x, mass.y), DVec3::new(0.0, mass.x, 0.0)]
     }
 }
@@ -138,8 +137,8 @@ mod tests {
         let wanted = frustum(cup.base_m, cup.rim_m, cup.height_m) - inside;
         assert!((volume(&mesh) / wanted - 1.0).abs() < 0.01, "{} {wanted}", volume(&mesh));
         // Its mass is over the middle of the rim where it stands upright.
-        let stacking = Stacking::new(cup, 0.01, Default::default()).unwrap();
-        let upper = Carried { body: Arc::new(mesh), stacking };
+        let stacking = touch2touch_core::trials::Stacking::new(cup, 0.01, Default::default()).unwrap();
+        let upper = Carried { body: Arc::new(mesh), cup };
         let [mass, below] = upper.plumb(stacking.goal());
         assert!(mass.abs_diff_eq(DVec3::new(0.0, 0.0, -cup.mass_m), 1e-12) && below.length() < 1e-12, "{mass} {below}");
         // The handle reaches its wall, and not its inside.
