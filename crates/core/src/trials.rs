@@ -23,7 +23,7 @@ use glam::DVec3;
 use serde::Serialize;
 
 use crate::frames::PlanarPose;
-use crate::units::text_mm;
+use crate::units::{text_deg, text_mm};
 
 pub use count::Share;
 pub use hole::{Hole, HoleShape};
@@ -95,6 +95,12 @@ impl Compliance {
         length("the turn of the compliance", self.turn_rad)?;
         length("the shift of the compliance", self.shift_m)?;
         Ok(self)
+    }
+}
+
+impl std::fmt::Display for Compliance {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} and {}", text_deg(self.turn_rad), text_mm(self.shift_m))
     }
 }
 

@@ -158,24 +158,27 @@ impl Verdict {
     /// The verdict on the answer of a registration; `None` unless its evidence was asked for.
     pub fn of(report: &AlignReport) -> Option<Self> {
         let evidence = report.evidence.as_ref()?;
-        let mut against = signs(report, evidence);
+        Some(Self::with_place(report, evidence, evidence.uncertainty.place_m(report.grasp_from_object)))
+    }
+
+    /// The verdict for one who lets the tool down along its own axis, z of the object frame, until it meets something: a place
+    /// that the contact leaves open along that axis is no fault then. `None` as with [`Self::of`].
+    pub fn let_down(report: &AlignReport) -> Option<Self> {
+        let (evidence, pose) = (report.evidence.as_ref()?, report.grasp_from_object);
+        let across_m = evidence.uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad));
+        Some(Self::with_place(report, evidence, across_m))
+    }
+
+    /// The verdict, given the standard deviation of the place that counts, meters.
+    fn with_place(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Self {
+        let mut against = signs(report, evidence, place_m);
         against.retain(|sign| sign.grade > Grade::Good);
         against.sort_by_key(|sign| std::cmp::Reverse(sign.grade));
         let (grade, why) = match against.first() {
             Some(sign) => (sign.grade, sign.what.clone()),
             None => (Grade::Good, fits(evidence)),
         };
-        Some(Self { grade, why, against })
-    }
-
-    /// The grade for one who lets the tool down along its own axis, z of the object frame, until it meets something: a place
-    /// that the contact leaves open along that axis is no fault then. `report` is the one that the verdict is on.
-    pub fn grade_let_down(&self, report: &AlignReport) -> Grade {
-        let pose = report.grasp_from_object;
-        let across = DVec2::from_angle(pose.theta_rad);
-        let open = report.evidence.map(|evidence| Grade::of(evidence.uncertainty.along_m(pose, across), PLACE_SD_M));
-        let rest = self.against.iter().filter(|sign| sign.kind != SignKind::PlaceOpen);
-        rest.map(|sign| sign.grade).chain(open).max().unwrap_or(Grade::Good)
+        Self { grade, why, against }
     }
 }
 
@@ -188,7 +191,7 @@ fn fits(evidence: &Evidence) -> String {
     }
 }
 
-fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
+fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
     use SignKind::{AngleOpen, Elsewhere, Fingers, MaskAlone, Misfit, NotHeld, OffTool, PlaceOpen, Swapped};
     let mut signs = Vec::new();
     let mut sign = |kind, grade, what| signs.push(Sign { kind, grade, what });
@@ -227,7 +230,6 @@ fn signs(report: &AlignReport, evidence: &Evidence) -> Vec<Sign> {
     let angle_rad = evidence.uncertainty.angle_rad();
     let what = format!("the contact leaves the angle open (±{})", units::text_deg(angle_rad));
     sign(AngleOpen, Grade::of(angle_rad, limits.angle_rad), what);
-    let place_m = evidence.uncertainty.place_m(report.grasp_from_object);
     let what = format!("the contact leaves the place open (±{})", units::text_mm(place_m));
     sign(PlaceOpen, Grade::of(place_m, PLACE_SD_M), what);
     if let Some(fit) = report.joint.filter(|fit| !fit.basis.has_membrane()) {

@@ -124,8 +124,9 @@ fn terms(trial: &PairTrial) -> (String, String) {
                 None => "5 mm of room would not do".to_owned(),
             };
             let tip = format!(
-                "The hole is the tool's own outline, {} deep. The gripper gives way by 2° and 1 mm; nothing slips or bends",
-                text_mm(shape.depth_m)
+                "The hole is the tool's own outline, {} deep. The gripper gives way by {}; nothing slips or bends",
+                text_mm(shape.depth_m),
+                insertion.compliance()
             );
             (format!("{} of room to each side; {needs}", text_mm(shape.clearance_m)), tip)
         }
@@ -133,9 +134,10 @@ fn terms(trial: &PairTrial) -> (String, String) {
             let (cup, margin) = (stacking.cup(), text_mm(stacking.margin_m()));
             let tip = format!(
                 "It is let go on the rim of another ({} wide), and stands while its center of mass, {} above its base, is over \
-                 that rim, {margin} inside. The gripper levels it by up to 2°; nothing slides",
+                 that rim, {margin} inside. The gripper levels it by up to {}; nothing slides",
                 text_mm(2.0 * cup.rim_m),
-                text_mm(cup.mass_m)
+                text_mm(cup.mass_m),
+                text_deg(stacking.compliance().turn_rad)
             );
             (format!("a margin of {margin} is asked of it"), tip)
         }

@@ -115,6 +115,11 @@ impl Insertion {
         &self.hole
     }
 
+    /// Motions that the gripper lets contact forces make.
+    pub fn compliance(&self) -> Compliance {
+        self.compliance
+    }
+
     /// Pose of the upright tool at the bottom of the hole, `world_from_object`.
     pub fn goal(&self) -> PlanarPose {
         let at = self.hole.goal();

@@ -91,6 +91,11 @@ impl Stacking {
         self.margin_m
     }
 
+    /// Motions that the gripper lets contact forces make; of these a cup is only turned.
+    pub fn compliance(&self) -> Compliance {
+        self.compliance
+    }
+
     /// Pose of the upright cup on the rim, `world_from_object`.
     pub fn goal(&self) -> PlanarPose {
         PlanarPose { theta_rad: 0.0, y_m: -self.cup.base_at.x, z_m: -self.cup.base_at.y }

@@ -30,6 +30,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{Sensors, SimConfig, random_grasp, simulate};
 use touch2touch_core::trials::{Compliance, HoleShape, InHand, Published, published};
 use touch2touch_core::units::angle_error;
+use touch2touch_core::verdict::Verdict;
 
 pub use goal::{Goal, GoalKind};
 pub use pair::{PairTrial, Room, of_pair};
@@ -244,15 +245,18 @@ impl Run<'_> {
         let touch = Touch { dataset: self.dataset, pair: PairId(0), sample, tool: Ok(self.model), labels: &labels };
         let felt = feel(touch, recipe, Stage::Pose, self.models, &self.cx.quiet())?;
         Ok(match felt.pose() {
-            Ok(found) => Held {
-                seed,
-                truth,
-                estimate: Some(found.grasp_from_object),
-                angle_error_rad: found.error_rad,
-                grade: found.verdict.as_ref().map(|verdict| verdict.grade_let_down(&found.report)),
-                why: found.verdict.as_ref().map(|verdict| verdict.why.clone()).unwrap_or_default(),
-                attempt: Some(tried(found.grasp_from_object)?),
-            },
+            Ok(found) => {
+                let verdict = Verdict::let_down(&found.report);
+                Held {
+                    seed,
+                    truth,
+                    estimate: Some(found.grasp_from_object),
+                    angle_error_rad: found.error_rad,
+                    grade: verdict.as_ref().map(|verdict| verdict.grade),
+                    why: verdict.map(|verdict| verdict.why).unwrap_or_default(),
+                    attempt: Some(tried(found.grasp_from_object)?),
+                }
+            }
             Err(err) => Held {
                 seed,
                 truth,

@@ -265,12 +265,14 @@ fn a_place_open_along_the_tool_is_no_fault_where_it_is_let_down_along_itself() {
         let uncertainty = spread_along(pose, [along_m, across_m]);
         assert!((uncertainty.along_m(pose, DVec2::from_angle(pose.theta_rad)) - across_m).abs() < 1e-9);
         report.evidence = Some(Evidence { uncertainty, ..evidence });
-        let verdict = Verdict::of(&report).unwrap();
-        (verdict.grade, verdict.grade_let_down(&report))
+        [Verdict::of(&report), Verdict::let_down(&report)].map(Option::unwrap)
     };
-    assert_eq!(graded(3e-3, 1e-4), (Grade::Check, Grade::Good));
-    assert_eq!(graded(1e-4, 3e-3), (Grade::Check, Grade::Check));
-    assert_eq!(graded(1e-4, 1e-4), (Grade::Good, Grade::Good));
+    let [held, let_down] = graded(3e-3, 1e-4);
+    assert_eq!((held.grade, let_down.grade), (Grade::Check, Grade::Good));
+    // Its sentence is its own: what is no fault is no reason.
+    assert!(held.why.contains("the place open") && let_down.why.contains("lies on the tool"), "{held:?} {let_down:?}");
+    assert_eq!(graded(1e-4, 3e-3).map(|verdict| verdict.grade), [Grade::Check; 2]);
+    assert_eq!(graded(1e-4, 1e-4).map(|verdict| verdict.grade), [Grade::Good; 2]);
 }
 
 #[test]

@@ -9,7 +9,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::sim::Sensors;
 use touch2touch_core::trials::{After, Attempt, Cup, InHand, Loop, Share, Tried, with_verdict};
-use touch2touch_core::units::{text_deg, text_mm};
+use touch2touch_core::units::text_mm;
 use touch2touch_core::verdict::Grade;
 
 /// A grasp, the pose that a method found, and the attempt by it.
@@ -26,7 +26,7 @@ pub struct Held {
     /// The verdict's grade for a robot that lets the tool down: a place left open along the tool is no fault. `None` without a
     /// pose, or where none is estimated.
     pub grade: Option<Grade>,
-    /// The verdict in a sentence, or why there is no pose.
+    /// That verdict in a sentence, or why there is no pose.
     pub why: String,
     /// The attempt; `None` without a pose.
     pub attempt: Option<Attempt>,
@@ -119,16 +119,15 @@ pub(super) fn tool_trials(task: &Task, setup: &TrialsSetup, made: Vec<Vec<Trial>
 
 /// Assumptions of the trials, in words.
 pub(super) fn notes(setup: &TrialsSetup) -> Vec<String> {
-    let (hole, give, cup) = (setup.hole, setup.compliance, Cup::default());
+    let (hole, cup) = (setup.hole, Cup::default());
     let mut notes = vec![
         format!(
             "insertion: the tool's own outline as the hole, {} deep, {} of room to each side, chamfer {}; the gripper gives \
-             way by {} and {}",
+             way by {}",
             text_mm(hole.depth_m),
             text_mm(hole.clearance_m),
             text_mm(hole.chamfer_m),
-            text_deg(give.turn_rad),
-            text_mm(give.shift_m)
+            setup.compliance
         ),
         format!(
             "stacking: a base of {} on a rim of {} (radii), center of mass {} high, at least {} inside its support",
