@@ -17,13 +17,19 @@ def _layer(node_name):
     return ".".join(kept)
 
 
-def read(path):
-    """The state dict of the network that was exported to the graph at `path`."""
-    graph = onnx.load(str(path)).graph
+def _values(graph):
+    """The graph's weights by name, those that are stored in 16 bits as the 32 that are computed with."""
     values = {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in graph.initializer}
     for node in graph.node:
         if node.op_type == "Cast" and node.input[0] in values and node.input[0].endswith("_f16"):
             values[node.output[0]] = values.pop(node.input[0]).float()
+    return values
+
+
+def read(path):
+    """The state dict of the network that was exported to the graph at `path`."""
+    graph = onnx.load(str(path)).graph
+    values = _values(graph)
     state = {k: v for k, v in values.items() if not k.startswith("onnx::")}
     for node in graph.node:
         if node.op_type not in UNNAMED:
@@ -36,13 +42,13 @@ def read(path):
 
 
 def load(net, path, prefix=""):
-    """Fills `net` from the graph at `path`, names there beginning with `prefix`. Returns what else the graph holds.
+    """Fills `net` from the graph at `path`, names there beginning with `prefix` or not. Returns what else the graph holds.
 
     A missing or misshapen weight is an error: the bundle is of another architecture.
     """
     found = read(path)
     wanted = net.state_dict()
-    state = {k: found.pop(prefix + k, None) for k in wanted}
+    state = {k: found.pop(prefix + k, None) if prefix + k in found else found.pop(k, None) for k in wanted}
     wrong = [k for k, v in state.items() if v is None or v.shape != wanted[k].shape]
     if wrong:
         raise SystemExit(f"{Path(path)}: not this architecture's weights; missing or of another shape: {', '.join(wrong[:5])}")
@@ -56,8 +62,7 @@ def load_folded(net, path):
     The norms come out as plain scales and shifts (running mean 0, variance 1), right in `eval` mode.
     """
     graph = onnx.load(str(path)).graph
-    values = {i.name: torch.from_numpy(numpy_helper.to_array(i).copy()) for i in graph.initializer}
-    state = net.state_dict()
+    values, state = _values(graph), net.state_dict()
     for node in (n for n in graph.node if n.op_type == "Conv"):
         weight, bias = (values[name] for name in node.input[1:3])
         block, number = _layer(node.name).rpartition(".")[::2]
