@@ -5,13 +5,16 @@ L1 UNet and VisGel (a conditional GAN) draw the imprint (N,1,128,128) from the s
 imprint. Sized for a CPU, not the sizes of the papers.
 """
 
+from pathlib import Path
+
 import torch
 import torch.nn.functional as F
 from torch import nn
 
-from . import data
+from . import weights
 from .models import ResBlock, Transformer, norm
-from .run import Run, batches, condition, edges, symmetries, target
+from .run import Run, edges
+from .touches import PAIR, Touches, batches, pair, picture
 
 # In the order of the simulator's list, which is what a shard's `meta` counts by.
 NAMES = (
@@ -135,27 +138,16 @@ class Classifier(nn.Module):
         return self.body(image)
 
 
-def begin(args, kind, net, rate, nets=None, others=None):
-    net = net.to(memory_format=torch.channels_last)
-    return data.Shards(args.data), Run(args, kind, {kind: net, **(nets or {})}, rate, others)
-
-
-def pair(shards, batch, args, rng):
-    """GelSlim images and the clean imprints of the same touches, turned alike."""
-    k = symmetries(args, rng, len(batch))
-    return {"gelslim": condition(shards, batch, k, args, rng), "clean": target(shards, "clean", batch, k, args)}
-
-
-def pairs(shards, run, size=16):
+def pairs(run):
     """Batches of (GelSlim, clean imprint) until the budget is spent."""
-    for batch in batches(shards, run, size, pair):
+    for batch in batches(run, Touches(run.args, run.place, PAIR), pair):
         yield batch["gelslim"], batch["clean"]
 
 
 def l1unet(args):
     net = L1UNet()
-    shards, run = begin(args, "l1unet", net, 1e-3)
-    for gelslim, clean in pairs(shards, run):
+    run = Run(args, "l1unet", {"l1unet": net}, (16, 1e-3), (256, 1e-3))
+    for gelslim, clean in pairs(run):
         with run.place.autocast():
             loss = (net(gelslim).float() - clean).abs().mean()
         run.descend(loss, len(gelslim), {"l1": loss})
@@ -167,8 +159,8 @@ def visgel(args):
     net, critic = L1UNet(), PatchCritic()
     optimiser = torch.optim.AdamW(critic.parameters(), lr=3e-4, betas=(0.5, 0.99))
     critic.requires_grad_(False)
-    shards, run = begin(args, "visgel", net, 7e-4, {"critic": critic}, {"critic": optimiser})
-    for gelslim, clean in pairs(shards, run):
+    run = Run(args, "visgel", {"visgel": net, "critic": critic}, (16, 7e-4), (256, 7e-4), others={"critic": optimiser})
+    for gelslim, clean in pairs(run):
         with run.place.autocast():
             drawn = net(gelslim).float()
         critic.requires_grad_(True)
@@ -186,8 +178,8 @@ def visgel(args):
 
 def vqvae(args):
     net = VqVae()
-    shards, run = begin(args, "vqvae", net, 1e-3)
-    for gelslim, clean in pairs(shards, run):
+    run = Run(args, "vqvae", {"vqvae": net}, (16, 1e-3), (256, 1e-3))
+    for gelslim, clean in pairs(run):
         with run.place.autocast():
             drawn, z, q = net(gelslim)
         l1, edge = (drawn.float() - clean).abs().mean(), edges(drawn.float(), clean)
@@ -209,16 +201,21 @@ def revive(net, z):
     net.book[unused] = flat[torch.randint(len(flat), (int(unused.sum()),)).to(z.device)]
 
 
-def named_imprints(shards, batch, args, rng):
-    batch = batch[shards.meta[batch, 5] >= 0]
-    key = "imprint" if rng.random() < 0.5 else "clean"
-    return {"image": data.to_model(shards.metres(key, batch)), "tool": torch.from_numpy(shards.meta[batch, 5]).long()}
+def named_imprints(touches, places, args):
+    batch = touches.get(places)
+    name = "imprint" if torch.rand(1) < 0.5 else "clean"
+    plain = torch.zeros(len(places), dtype=torch.int64, device=touches.place.device)
+    return {"image": picture(batch, name, plain, args), "tool": batch["tool"]}
 
 
 def classifier(args):
-    net = Classifier()
-    shards, run = begin(args, "classifier", net, 1e-3)
-    for batch in batches(shards, run, 32, named_imprints):
+    # A real imprint is named where the bubble's camera has it.
+    args.frame, net = "bubble", Classifier()
+    if args.start:
+        weights.load(net, Path(args.start) / "tool_classifier.onnx", "net.")
+    run = Run(args, "classifier", {"classifier": net}, (32, 1e-3), (256, 1e-3))
+    touches = Touches(args, run.place, ("imprint_picture", "clean_picture", "tool"), usable=lambda shards, n: shards.meta[n, 5] >= 0)
+    for batch in batches(run, touches, named_imprints):
         with run.place.autocast():
             loss = F.cross_entropy(net(batch["image"]).float(), batch["tool"])
         run.descend(loss, len(batch["tool"]), {"cross": loss})

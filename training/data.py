@@ -34,63 +34,86 @@ FRAME_PX = (68.5, 69.0)
 
 
 class Shards:
-    """All shards under one folder as one list of samples. `refresh` picks up shards added meanwhile."""
+    """All shards under one folder, or several, as one list of samples. `refresh` picks up shards added meanwhile."""
 
-    def __init__(self, folder):
-        self.folder, self.names, self.parts = Path(folder), [], []
+    def __init__(self, folders):
+        self.roots = [Path(f) for f in ([folders] if isinstance(folders, (str, Path)) else folders)]
+        self.folders, self.parts = [], []
         self.refresh()
         if not self.parts:
-            raise SystemExit(f"no shards in {folder}: write some with `touch2touch training-data` (see README.md)")
+            raise SystemExit(f"no shards in {folders}: write some with `touch2touch training-data` (see README.md)")
 
     def refresh(self):
-        for path in sorted(self.folder.glob("*/done.json")):
-            if path.parent.name not in self.names:
-                self.names.append(path.parent.name)
-                self.parts.append({f.stem: np.load(f, mmap_mode="r") for f in path.parent.glob("*.npy")})
-        self.sizes = [len(p["meta"]) for p in self.parts]
-        self.starts = np.concatenate([[0], np.cumsum(self.sizes)]).astype(int)
+        known = set(self.folders)
+        for done in sorted(done for root in self.roots for done in root.glob("*/done.json")):
+            if done.parent not in known:
+                self.folders.append(done.parent)
+                self.parts.append({f.stem: np.load(f, mmap_mode="r") for f in done.parent.glob("*.npy")})
+        self.starts = np.cumsum([0] + [len(p["meta"]) for p in self.parts])
         self.meta = np.concatenate([p["meta"] for p in self.parts]) if self.parts else np.zeros((0, 8), np.float32)
 
     def __len__(self):
         return int(self.starts[-1])
 
-    def place(self, index):
-        """Part, and place in it, of a sample."""
-        part = int(np.searchsorted(self.starts, index, side="right")) - 1
-        return part, index - self.starts[part]
+    def take(self, key, numbers):
+        """An array of samples (numbers: an array of integers), as it is stored."""
+        parts = np.searchsorted(self.starts, numbers, side="right") - 1
+        taken = np.empty((len(numbers), *self.parts[0][key].shape[1:]), self.parts[0][key].dtype)
+        for part in np.unique(parts):
+            of_part = parts == part
+            taken[of_part] = self.parts[part][key][numbers[of_part] - self.starts[part]]
+        return torch.from_numpy(taken)
 
-    def take(self, key, indices):
-        return torch.from_numpy(np.stack([self.parts[part][key][at] for part, at in map(self.place, indices)]))
-
-    def gelslim(self, indices):
+    def gelslim(self, numbers):
         """Standardised differences (N,3,128,128)."""
-        x = self.take("gelslim", indices).float() / (64 * 255)
-        return (x - torch.tensor(MEAN)[:, None, None]) / torch.tensor(STD)[:, None, None]
+        return standardised(self.take("gelslim", numbers))
 
-    def metres(self, key, indices):
+    def metres(self, key, numbers):
         """`imprint` or `clean` in metres (N,1,140,175), raw orientation; missing pixels from the clean image."""
-        raw = self.take(key, indices)
-        if key == "imprint":
-            missing = raw == -32768
-            if missing.any():
-                raw = torch.where(missing, self.take("clean", indices), raw)
-        return raw.float()[:, None] * 1e-6
+        raw = self.take(key, numbers)
+        return metres(filled(raw, self.take("clean", numbers)) if key == "imprint" else raw)
 
-    def offsets(self, indices):
+    def offsets(self, numbers):
         """How far each sample's window lies from the frame's, raw bubble pixels (N,2), along x and y."""
-        windows = torch.tensor(WINDOWS_PX)[torch.from_numpy(self.meta[indices, 1]).long()]
+        windows = torch.tensor(WINDOWS_PX)[torch.from_numpy(self.meta[numbers, 1]).long()]
         return windows - torch.tensor(FRAME_PX)
 
-    def contact(self, indices):
-        return self.take("contact", indices).long()
+    def contact(self, numbers):
+        return self.take("contact", numbers).long()
 
-    def contact_known(self, indices):
+    def contact_known(self, numbers):
         """Which of the samples say where contact is (N,)."""
-        return np.array([self.parts[part]["contact"][at, 0, 0] != 255 for part, at in map(self.place, indices)], bool)
+        parts = np.searchsorted(self.starts, numbers, side="right") - 1
+        return np.array([self.parts[p]["contact"][at, 0, 0] != 255 for p, at in zip(parts, numbers - self.starts[parts])], bool)
 
     def record(self):
-        """What provenance says about the data: every shard's own description."""
-        return [json.loads((self.folder / n / "done.json").read_text()) for n in self.names]
+        """Every shard's own description."""
+        return [json.loads((folder / "done.json").read_text()) for folder in self.folders]
+
+
+def standardised(raw):
+    """Difference images as stored to standardised ones."""
+    mean, std = (torch.tensor(v, device=raw.device)[:, None, None] for v in (MEAN, STD))
+    return raw * (1 / (64 * 255 * std)) - mean / std
+
+
+def filled(imprint, clean):
+    """Imprints as stored, holes filled from the clean ones."""
+    return torch.where(imprint == -32768, clean, imprint)
+
+
+def metres(raw):
+    """Imprints as stored (N,140,175) in metres (N,1,140,175)."""
+    return raw[:, None] * 1e-6
+
+
+def stored(picture):
+    """Pictures (N,1,S,S) in [-1,1] in 16 bits: a step is a thousandth of a millimetre."""
+    return torch.round(picture * 32767).to(torch.int16)
+
+
+def restored(stored):
+    return stored * (1 / 32767)
 
 
 def sampled(image, x, y):
@@ -107,8 +130,8 @@ def to_model(metres, offsets=None):
     With `offsets` (N,2) moved so that the windows come to lie where the frame has them.
     """
     height, width = metres.shape[2:]
-    offsets = torch.zeros(len(metres), 2) if offsets is None else offsets
-    at = (torch.arange(128) + 0.5)[None] / 128
+    offsets = torch.zeros(len(metres), 2, device=metres.device) if offsets is None else offsets
+    at = (torch.arange(128, device=metres.device) + 0.5)[None] / 128
     x = width - 0.5 - at * width + offsets[:, :1]
     y = height - 0.5 - at * height + offsets[:, 1:]
     image = sampled(metres, x, y)
@@ -121,7 +144,7 @@ def from_model(image, offsets=None):
     metres = torch.flip(F.interpolate(metres, size=(140, 175), mode="bilinear", align_corners=False), dims=(2, 3))
     if offsets is None:
         return metres
-    x, y = torch.arange(175.0)[None] - offsets[:, :1], torch.arange(140.0)[None] - offsets[:, 1:]
+    x, y = (torch.arange(size, device=metres.device)[None] - by for size, by in zip((175.0, 140.0), offsets.split(1, dim=1)))
     return sampled(metres, x, y)
 
 
@@ -131,15 +154,13 @@ def to_mask_input(metres):
     return torch.floor(unit.clamp(0, 1) * 255) / 255
 
 
-def dihedral(image, k):
-    """One of the 8 symmetries of the square, k in 0..8, the same for both images of a pair."""
-    image = torch.rot90(image, k % 4, dims=(-2, -1))
-    return torch.flip(image, dims=(-1,)) if k >= 4 else image
-
-
-def each_dihedral(images, k):
-    """`dihedral` with an own symmetry per image (N,C,S,S), k (N,)."""
-    return torch.stack([dihedral(image, int(i)) for image, i in zip(images, k)])
+def turned(images, k):
+    """Images (N,C,S,S), each by its own of the 8 symmetries of the square, k (N,): k % 4 quarter turns, mirrored from 4 on."""
+    k = k[:, None, None, None]
+    turns, mirrored = k % 4, k >= 4
+    images = torch.where(turns % 2 == 1, images.transpose(2, 3), images)
+    images = torch.where((turns == 1) | (turns == 2), images.flip(2), images)
+    return torch.where((turns >= 2) ^ mirrored, images.flip(3), images)
 
 
 # The GelSlim's window in the generator's image (128 x 128, rotated bubble), both fingers' in the frame: rows, then columns.
@@ -160,7 +181,7 @@ def shrunk():
 
 def padded(gelslim):
     """GelSlim images (N,3,128,128) drawn where the sensor lies in the bubble's view, nothing around."""
-    rows, columns = shrunk()
+    rows, columns = (matrix.to(gelslim.device) for matrix in shrunk())
     return rows @ gelslim @ columns
 
 
@@ -169,30 +190,36 @@ def cropped(image):
     return F.interpolate(image[:, :, *WINDOW], size=(128, 128), mode="bilinear", align_corners=False)
 
 
-def augment_gelslim(x, randomised, rng):
+@lru_cache
+def uneven():
+    """Matrix (128,3): U g U' is a 3 x 3 raster g drawn smoothly over a picture."""
+    return F.interpolate(torch.eye(3)[None, None], size=(128, 3), mode="bicubic", align_corners=True)[0, 0]
+
+
+def augment_gelslim(x, randomised):
     """Sensor variety for standardised differences (N,3,128,128): strong where `randomised` (N,) is true.
 
     Mixed colours, gain, uneven light, blur and noise; and now and then the negative half cut off, as the lab's
     own colour jitter does to the images that it feeds to its networks.
     """
-    n = x.shape[0]
+    n, device = len(x), x.device
     strong = randomised.float()[:, None, None, None]
 
-    def uniform(lo, hi, *shape):
-        return torch.from_numpy(rng.uniform(lo, hi, shape).astype(np.float32))
+    def uniform(lo, hi):
+        return lo + (hi - lo) * torch.rand(n, 1, 1, 1, device=device)
 
     def normal(*shape):
-        return torch.from_numpy(rng.standard_normal(shape, dtype=np.float32))
+        return torch.randn(n, *shape, device=device)
 
-    mix = torch.eye(3) + strong[:, :, :, 0] * 0.2 * normal(n, 3, 3)
-    x = torch.einsum("nij,njhw->nihw", mix, x)
-    x = x * torch.exp(strong * 0.4 * normal(n, 3, 1, 1))
-    x = x + F.interpolate(strong * 0.15 * normal(n, 3, 3, 3), size=x.shape[-2:], mode="bicubic", align_corners=True)
+    mix = torch.eye(3, device=device) + strong[:, :, :, 0] * 0.2 * normal(3, 3)
+    mix = torch.exp(strong[:, :, :, 0] * 0.4 * normal(3, 1)) * mix
+    light = uneven().to(device)
+    x = (mix @ x.flatten(2)).view_as(x) + light @ (strong * 0.15 * normal(3, 3, 3)) @ light.T
     blurred = F.avg_pool2d(F.pad(x, (1, 1, 1, 1), mode="replicate"), 3, stride=1)
-    x = torch.lerp(x, blurred, uniform(0, 1, n, 1, 1, 1) * (0.3 + 0.7 * strong))
-    x = x + uniform(0, 0.06, n, 1, 1, 1) * (1 + 3 * strong) * normal(*x.shape)
-    cut = torch.from_numpy(rng.random(n) < 0.35)[:, None, None, None] & (strong > 0)
-    return torch.where(cut, (x * uniform(0.4, 3, n, 1, 1, 1) + uniform(0, 0.15, n, 1, 1, 1)).clamp(0, 1), x)
+    x = torch.lerp(x, blurred, uniform(0, 1) * (0.3 + 0.7 * strong))
+    x = x + uniform(0, 0.06) * (1 + 3 * strong) * torch.randn_like(x)
+    cut = (uniform(0, 1) < 0.35) & (strong > 0)
+    return torch.where(cut, (x * uniform(0.4, 3) + uniform(0, 0.15)).clamp(0, 1), x)
 
 
 def sha256(path):

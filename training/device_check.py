@@ -1,7 +1,7 @@
 """Command line: `python -m training.device_check`.
 
-Trains on a few random samples: two processes must do the steps of one that takes both parts, workers must change nothing, and
-a run must go on to the same weights in another number of processes. Says what it found; an AssertionError is a failure.
+Trains on a few random samples: two processes must do the steps of one that takes both parts, data read for each batch must change
+nothing, and a run must go on to the same weights in another number of processes. Says what it found; an AssertionError is a failure.
 """
 
 import subprocess
@@ -40,7 +40,7 @@ def main():
         assert moved > 1e-4, f"three steps changed next to nothing: {moved:.1e}"
         for name, difference in {
             "two processes": apart(alone, train("l1unet", data, place / "two", 4, processes=2)),
-            "two workers": apart(alone, train("l1unet", data, place / "workers", 4, "--parts", 2, "--workers", 2)),
+            "data not kept": apart(alone, train("l1unet", data, place / "read", 4, "--parts", 2, "--resident", "no")),
             "two processes from there": apart(alone, train("l1unet", data, place / "start", 4, processes=2)),
         }.items():
             print(f"{name}: weights differ by {difference:.1e} of their size, where three steps change them by {moved:.1e}")

@@ -18,19 +18,6 @@ from . import baselines, data, diffusion, half, models, weights
 OPSET = 17
 
 
-class Decoder(nn.Module):
-    """The autoencoder's decoder, with the whitening of the latents folded in."""
-
-    def __init__(self, decoder, mean, std):
-        super().__init__()
-        self.decoder = decoder
-        self.register_buffer("mean", mean)
-        self.register_buffer("std", std)
-
-    def forward(self, latent):
-        return self.decoder(latent * self.std + self.mean)
-
-
 class OneShot(nn.Module):
     """The "denoiser" of a network that draws in one go: always the v that leads to the condition itself.
 
@@ -113,16 +100,34 @@ class Named(nn.Module):
         return self.net.body[-2:](maps), maps.mean(dim=(2, 3))
 
 
-def load_generator(run):
-    """(condition encoder, denoiser, decoder) with averaged weights, and the states they came from."""
-    ae = torch.load(Path(run) / "autoencoder.pt", weights_only=True)
-    state = torch.load(Path(run) / "generator.pt", weights_only=True)
-    encoder, denoiser, autoencoder = models.ConditionEncoder(), models.Denoiser(), models.Autoencoder()
-    encoder.load_state_dict(state["nets"]["encoder_ema"])
-    denoiser.load_state_dict(state["nets"]["denoiser_ema"])
-    autoencoder.load_state_dict(ae["nets"]["autoencoder"])
-    decoder = Decoder(autoencoder.decoder, state["extra"]["latent_mean"], state["extra"]["latent_std"])
-    return encoder.eval(), denoiser.eval(), decoder.eval(), ae, state
+def bundle_nets(folder):
+    """(condition encoder, denoiser, decoder) of a bundle of this architecture."""
+    nets = models.generator()
+    for net, role in zip(nets, ("condition_encoder", "denoiser", "decoder")):
+        weights.load(net, Path(folder) / f"{role}.onnx")
+    return nets
+
+
+def generator_nets(run):
+    """(condition encoder, denoiser, decoder) with averaged weights, and the states that they came from by name.
+
+    As tuned through the sampler, where that stage has begun.
+    """
+    states = {name: torch.load(path, weights_only=True) for name in ("autoencoder", "generator", "sampler")
+              if (path := Path(run) / f"{name}.pt").exists()}
+    known, extra = states.get("sampler") or states.get("generator"), states.get("generator", {}).get("extra", {})
+    if not known or "sampler" not in states and "autoencoder" not in states:
+        raise SystemExit(f"{run} holds neither sampler.pt nor autoencoder.pt and generator.pt: train them first")
+    nets = encoder, denoiser, decoder = models.generator()
+    if "sampler" in states:
+        decoder.load_state_dict(known["nets"]["decoder_ema"])
+    else:
+        ae = states["autoencoder"]["nets"]["autoencoder"]
+        decoder.load_state_dict({k: v for k, v in ae.items() if k.startswith("decoder.")}
+                                | {"mean": extra["latent_mean"], "std": extra["latent_std"]})
+    encoder.load_state_dict(known["nets"]["encoder_ema"])
+    denoiser.load_state_dict(known["nets"]["denoiser_ema"])
+    return tuple(net.eval() for net in nets), states
 
 
 def predict(nets, gelslim, offsets, steps=10, seed=42, shape=(4, 16, 16)):
@@ -182,12 +187,42 @@ def titled(name, shards):
     return f"{name}, {', '.join(real)}" if real else f"{name}, simulated data"
 
 
+# What shards of one kind say alike; all else of them is summed, listed or left out.
+KIND = ("source", "mix", "condition", "simulator", "version")
+
+
+def summed(record):
+    """The shards' own descriptions in one entry for each kind: shards, touches, contact by how it is known, and seeds."""
+    kinds = {}
+    for about in record:
+        kind = {"source": "simulator"} | {key: about[key] for key in KIND if key in about}
+        empty = kind | {"shards": 0, "touches": 0, "contact": {}, "seeds": set()}
+        entry = kinds.setdefault(json.dumps(kind, sort_keys=True), empty)
+        entry["shards"] += 1
+        entry["touches"] += about["samples"]
+        for how, count in about.get("contact", {}).items():
+            entry["contact"][how] = entry["contact"].get(how, 0) + count
+        entry["seeds"] |= {about["seed"]} if "seed" in about else set()
+    return [{**entry, "seeds": ranges(entry["seeds"])} for entry in kinds.values()]
+
+
+def ranges(numbers):
+    """Whole numbers in words: `1-4, 7`."""
+    runs = []
+    for number in sorted(numbers):
+        if runs and number == runs[-1][1] + 1:
+            runs[-1][1] = number
+        else:
+            runs.append([number, number])
+    return ", ".join(str(first) if first == last else f"{first}-{last}" for first, last in runs)
+
+
 def provenance(note, shards, states, differences):
     record = shards.record()
     return {
         "note": note,
         "data": sources(record),
-        "shards": record,
+        "shards": summed(record),
         "runs": {name: {k: s[k] for k in ("step", "samples", "minutes", "losses", "seed", "options") if k in s} for name, s in states.items()},
         "onnx_minus_torch_max": differences,
         "tools": {"torch": torch.__version__, "onnx_opset": OPSET},
@@ -247,13 +282,12 @@ def averaged(nets, args):
 
 
 def generator(args, out):
-    encoder, denoiser, decoder, ae, state = load_generator(args.run)
+    nets, states = generator_nets(args.run)
     if args.average_with:
-        averaged((encoder, denoiser, decoder), args)
+        averaged(nets, args)
     shapes = (models.CONDITION, 16, 16), (models.LATENT, 16, 16)
-    nets = placed((encoder, denoiser, decoder), state["options"]["geometry"])
-    return generator_bundle(args, out, "Latent diffusion", nets, shapes, args.steps,
-                            {"autoencoder": ae, "generator": state})
+    (geometry,) = {state["options"]["geometry"] for state in states.values()}
+    return generator_bundle(args, out, "Latent diffusion", placed(nets, geometry), shapes, args.steps, states)
 
 
 def one_shot(args, out):
@@ -317,7 +351,7 @@ def parser():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("what", choices=tuple(WHAT))
     parser.add_argument("--run", default="training/runs/demo", help="folder of checkpoints")
-    parser.add_argument("--data", default="training/data/train", help="folder of the training shards")
+    parser.add_argument("--data", nargs="+", default=["training/data/train"], help="folders of the training shards")
     parser.add_argument("--out", required=True, help="bundle folder to write")
     parser.add_argument("--fp16", action="store_true", help="store large weights in 16 bits (half the size)")
     parser.add_argument("--average-with", help="generator bundle that the run began from (`--from`); its weights are mixed in")

@@ -217,6 +217,25 @@ class Autoencoder(nn.Module):
         return self.decoder(latent)
 
 
+class Decoder(nn.Module):
+    """The autoencoder's decoder, with the whitening of the latents folded in."""
+
+    def __init__(self, decoder, mean, std):
+        super().__init__()
+        self.decoder = decoder
+        self.register_buffer("mean", mean)
+        self.register_buffer("std", std)
+
+    def forward(self, latent):
+        return self.decoder(latent * self.std + self.mean)
+
+
+def generator(geometry="full"):
+    """Condition encoder, denoiser and decoder as a bundle has them."""
+    decoder = Decoder(Autoencoder().decoder, torch.zeros(1, LATENT, 16, 16), torch.ones(1, LATENT, 1, 1))
+    return ConditionEncoder(geometry=geometry), Denoiser(), decoder
+
+
 class MaskUNet(nn.Module):
     """conv-BN-ReLU UNet, three levels down, padded to 144 x 176 inside."""
 

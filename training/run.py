@@ -1,34 +1,43 @@
-"""What every training run shares: progress, learning rate, log, checkpoints, and the batches."""
+"""What every training run shares: progress, learning rate, averages of weights, log and checkpoints."""
 
-import itertools
+import copy
 import json
+import math
 import os
 import time
-from functools import lru_cache
 from pathlib import Path
 
-import numpy as np
 import torch
 
-from . import data, weights
+from . import weights
 from .place import Place
+
+# Averages of weights forget with this share in a step; less at first.
+DECAY = 0.998
 
 
 class Run:
-    """Progress, learning rate, log and checkpoints of one training run."""
+    """Progress, learning rate, averages, log and checkpoints of one training run."""
 
-    def __init__(self, args, kind, nets, rate, others=None):
-        """`others`: further optimisers by name, to be kept with the checkpoint. Moves the networks to the device."""
-        self.args, self.kind, self.nets, self.rate = args, kind, nets, getattr(args, "rate", None) or rate
+    def __init__(self, args, kind, nets, small, large, averaged=(), others=None):
+        """Moves the networks to the device. `small`, `large`: batch and learning rate of a processor and of a GPU.
+
+        `averaged`: networks whose weights are also averaged, as NAME_ema. `others`: further optimisers by name, to be kept with
+        the checkpoint.
+        """
+        self.args, self.kind, self.nets, self.averaged, self.others = args, kind, nets, averaged, others or {}
         self.place = Place(args)
+        self.batch = args.batch or (small if self.place.device.type == "cpu" else large)[0]
+        self.rate = args.rate or rate_for(self.batch, small, large)
         for net in nets.values():
-            net.to(self.place.device)
+            net.to(self.place.device, memory_format=torch.channels_last)
+        for name in averaged:
+            nets[f"{name}_ema"] = copy.deepcopy(nets[name]).requires_grad_(False)
         self.out = Path(args.out)
         self.out.mkdir(parents=True, exist_ok=True)
         self.optimiser = torch.optim.AdamW([p for n in nets.values() for p in n.parameters() if p.requires_grad],
-                                           lr=rate, betas=(0.9, 0.99), weight_decay=0.01)
-        self.others = others or {}
-        self.step, self.samples, self.spent, self.means, self.extra = 0, 0, 0.0, {}, {}
+                                           lr=self.rate, betas=(0.9, 0.99), weight_decay=0.01, fused=True)
+        self.step, self.samples, self.spent, self.names, self.means, self.extra = 0, 0, 0.0, [], None, {}
         self.worked = -time.process_time()
         self.checkpoint = self.out / f"{kind}.pt"
         if self.checkpoint.exists():
@@ -42,7 +51,8 @@ class Run:
                     optimiser.load_state_dict(state["others"][name])
             self.step, self.samples, self.spent = state["step"], state["samples"], state["minutes"]
             self.worked += 60 * state.get("processor_minutes", 0.0)
-            self.means, self.extra = state["losses"], state["extra"]
+            self.names, self.extra = list(state["losses"]), state["extra"]
+            self.means = torch.tensor(list(state["losses"].values()), device=self.place.device)
         self.started = self.saved = self.logged = time.monotonic()
         self.begun_at, self.taken = self.samples, 0
         self.at = self.place.same(self.minutes())
@@ -64,53 +74,48 @@ class Run:
 
     def learning_rate(self):
         """Warm-up, then constant, then a cosine fall."""
-        fall = self.fallen()
-        return float(self.rate * min(1, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + np.cos(np.pi * fall)) / 2))
+        return self.rate * min(1, (self.step + 1) / 100) * (0.02 + 0.98 * (1 + math.cos(math.pi * self.fallen())) / 2)
 
     def descend(self, loss, count, figures):
         """The gradient of one part's loss; with that of the last part, a step. True where there was one."""
         parameters = self.optimiser.param_groups[0]["params"]
         if self.taken == 0:
             self.optimiser.zero_grad()
-        (loss / len(self.place.own) if len(self.place.own) > 1 else loss).backward()
-        if not self.part_is_done(count):
+        (loss / len(self.place.own)).backward()
+        self.taken += 1
+        self.samples += count * self.place.processes
+        if self.taken < len(self.place.own):
             return False
-        rate = self.learning_rate()
-        for group in self.optimiser.param_groups:
-            group["lr"] = rate
+        rate = self.optimiser.param_groups[0]["lr"] = self.learning_rate()
         self.place.average(parameters)
         torch.nn.utils.clip_grad_norm_(parameters, 1.0)
         self.optimiser.step()
-        self.step_is_done()
-        for key, value in ((k, float(v.detach())) for k, v in figures.items()):
-            self.means[key] = 0.98 * self.means.get(key, value) + 0.02 * value
+        self.taken, self.step = 0, self.step + 1
+        decay = min(DECAY, (1 + self.step) / (20 + self.step))
+        for name in self.averaged:
+            torch._foreach_lerp_(*(list(self.nets[n].parameters()) for n in (f"{name}_ema", name)), 1 - decay)
+        # They stay on the device: to ask for a figure is to wait for the step.
+        self.names, figures = list(figures), torch.stack([v.detach().float() for v in figures.values()])
+        self.means = figures if self.means is None else torch.lerp(self.means, figures, 0.02)
         now = time.monotonic()
         if now - self.logged > 20:
             self.logged = now
-            text = " ".join(f"{k} {v:.5f}" for k, v in self.means.items())
+            text = " ".join(f"{k} {v:.5f}" for k, v in self.losses().items())
             line = f"{self.minutes():.2f} min step {self.step} samples {self.samples} lr {rate:.2e} {text} {self.pace()}"
             if self.place.first():
                 with (self.out / f"{self.kind}.log").open("a") as log:
                     log.write(f"{line}\n")
         if now - self.saved > 120:
             self.save()
+        self.at = self.place.same(self.minutes())
         return True
 
-    def part_is_done(self, count):
-        """Counts a part's samples; true where it was the step's last of this process."""
-        self.taken += 1
-        self.samples += count * self.place.processes
-        return self.taken == len(self.place.own)
-
-    def step_is_done(self):
-        self.taken, self.step = 0, self.step + 1
-        self.at = self.place.same(self.minutes())
-
-    def pass_over(self):
-        """A part without a sample that can be learnt from."""
-        if self.place.parts > 1:
-            raise SystemExit(f"step {self.step} has a part without a sample to learn from: train without --parts and torchrun")
-        self.step_is_done()
+    def losses(self):
+        """Running means of the figures."""
+        found = dict(zip(self.names, self.means.tolist())) if self.names else {}
+        if not all(map(math.isfinite, found.values())):
+            raise SystemExit(f"{self.kind}: step {self.step} is no number any more: {found}; lower --rate, and go on from {self.checkpoint}")
+        return found
 
     def pace(self):
         seconds = time.monotonic() - self.started
@@ -123,14 +128,16 @@ class Run:
             print(f"{self.kind}: {self.samples} samples, {self.pace()} on {self.place}", flush=True)
 
     def save(self):
+        losses = self.losses()
         self.saved = time.monotonic()
         if not self.place.first():
             return
+        extra = {k: v.cpu() if isinstance(v, torch.Tensor) else v for k, v in self.extra.items()}
         state = {"nets": {k: n.state_dict() for k, n in self.nets.items()}, "optimiser": self.optimiser.state_dict(),
                  "others": {k: o.state_dict() for k, o in self.others.items()},
                  "step": self.step, "samples": self.samples, "minutes": self.minutes(),
-                 "processor_minutes": (self.worked + time.process_time()) / 60, "extra": on_the_processor(self.extra),
-                 "losses": self.means, "seed": self.args.seed, "options": options(self.args)}
+                 "processor_minutes": (self.worked + time.process_time()) / 60, "extra": extra,
+                 "losses": losses, "seed": self.args.seed, "options": options(self)}
         partial = self.checkpoint.with_suffix(".partial")
         torch.save(state, partial)
         os.replace(partial, self.checkpoint)
@@ -138,111 +145,17 @@ class Run:
         (self.out / f"{self.kind}.json").write_text(json.dumps(facts, indent=1))
 
 
-def on_the_processor(extra):
-    return {k: v.cpu() if isinstance(v, torch.Tensor) else v for k, v in extra.items()}
+def rate_for(batch, small, large):
+    """The learning rate of a batch between a small and a large one, or beyond them, whose rates are known."""
+    share = math.log(batch / small[0]) / math.log(large[0] / small[0])
+    return small[1] * (large[1] / small[1]) ** min(max(share, 0), 1)
 
 
-def options(args):
+def options(run):
     """The switches that make one run differ from another, for the checkpoint and the provenance."""
-    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise", "rate", "fall")
-    return {k: getattr(args, k) for k in keys} | {"begun_from_a_bundle": bool(args.start)}
-
-
-@lru_cache(maxsize=2)
-def order(seed, turn, total):
-    """The samples in the order of pass `turn`."""
-    return np.random.default_rng((seed, turn)).permutation(total)
-
-
-def numbers(seed, first, count, total):
-    """Samples `first` to `first + count` of the endless list of passes that `seed` draws from `total` samples."""
-    return np.array([order(seed, at // total, total)[at % total] for at in range(first, first + count)])
-
-
-class Parts(torch.utils.data.Dataset):
-    """What is learnt from in each part of each step, as a list without an end: part `i % parts` of step `i // parts`.
-
-    All of it is a function of seed, step and part alone: every method is given the same samples in the same order, and a run
-    that was stopped goes on as if it had not been.
-    """
-
-    def __init__(self, shards, args, size, parts, prepare):
-        self.shards, self.args, self.size, self.parts, self.prepare = shards, args, size, parts, prepare
-
-    def __getitem__(self, index):
-        shards, size, seed = self.shards, self.size, self.args.seed
-        if len(shards) < size:
-            raise SystemExit(f"{shards.folder} holds {len(shards)} samples, fewer than one batch of {size}")
-        step, part = divmod(index, self.parts)
-        batch = np.sort(numbers(seed, index * size, size, len(shards)))
-        rng = np.random.default_rng((seed, step, size, part) if part else (seed, step, size))
-        # What the network itself draws begins at the same place too.
-        return index, seed * 1_000_003 + step + part * 500_009, self.prepare(shards, batch, self.args, rng)
-
-    def ends_a_pass(self, index):
-        return (index + 1) * self.size % len(self.shards) < self.size
-
-
-def batches(shards, run, size, prepare):
-    """What `prepare(shards, numbers, args, rng)` makes of each of this process's parts, on the device, until the budget is
-    spent. New shards are looked for after each pass, unless workers prepare the batches."""
-    parts, own = Parts(shards, run.args, size, run.place.parts, prepare), run.place.own
-    order_of_parts = (step * len(own) * run.place.processes + part for step in itertools.count(run.step) for part in own)
-    if run.args.workers:
-        ready = iter(torch.utils.data.DataLoader(parts, batch_size=None, sampler=order_of_parts, num_workers=run.args.workers,
-                                                 collate_fn=lambda part: part, pin_memory=run.place.device.type == "cuda"))
-    else:
-        ready = (parts[index] for index in order_of_parts)
-    while not run.over():
-        index, seed, batch = next(ready)
-        torch.manual_seed(seed)
-        yield run.place.moved(batch)
-        if not run.args.workers and parts.ends_a_pass(index):
-            shards.refresh()
-
-
-def symmetries(args, rng, count):
-    """A symmetry for each of `count` pairs: plain, or one of the turns and mirrorings that the switches allow."""
-    allowed = [k for k in range(1, 8) if (args.rotation or k % 4 == 0) and (args.flip or k < 4)]
-    if not allowed:
-        return np.zeros(count, int)
-    return np.where(rng.random(count) < args.turned, rng.choice(allowed, size=count), 0)
-
-
-def condition(shards, batch, k, args, rng):
-    """Augmented, standardised GelSlim images (N,3,128,128), channels last, turned by `k`."""
-    gelslim = shards.gelslim(batch)
-    if args.geometry == "padding":
-        gelslim = data.padded(gelslim)
-    gelslim = data.augment_gelslim(data.each_dihedral(gelslim, k), torch.from_numpy(shards.meta[batch, 6] == 0), rng)
-    if args.condition_noise:
-        gelslim = gelslim + args.condition_noise * torch.from_numpy(rng.standard_normal(gelslim.shape, dtype=np.float32))
-    return gelslim.contiguous(memory_format=torch.channels_last)
-
-
-# Real imprints lie this far (deviation, pixels of the raw bubble image: a millimetre) from where the GelSlim image says: the
-# two sensors touch the tool in two grasps. Whoever draws a sharp edge in a place that is not sure pays for it twice.
-PLACEMENT_PX = 2.3
-
-
-def offsets(shards, batch, args):
-    """How far the imprints are moved into the frame of the generator's picture; `None` where they stay.
-
-    Those of drawn sensors are also misplaced, each sample always by the same; the nominal sensors are exact.
-    """
-    if args.frame != "window":
-        return None
-    drawn = np.stack([np.random.default_rng((args.seed, int(i))).standard_normal(2) for i in batch]).astype(np.float32)
-    drawn[shards.meta[batch, 6] == 1] = 0
-    return shards.offsets(batch) + PLACEMENT_PX * torch.from_numpy(drawn)
-
-
-def target(shards, key, batch, k, args):
-    """Imprints (N,1,128,128) in [-1,1], turned by `k`."""
-    image = data.to_model(shards.metres(key, batch), offsets(shards, batch, args))
-    if args.geometry == "cropping":
-        image = data.cropped(image)
-    return data.each_dihedral(image, k).contiguous(memory_format=torch.channels_last)
+    keys = ("turned", "rotation", "flip", "geometry", "frame", "condition_noise", "fall")
+    return {k: getattr(run.args, k) for k in keys} | {
+        "batch": run.batch, "rate": run.rate, "begun_from_a_bundle": bool(run.args.start)}
 
 
 def start(net, args, role, prefix=""):

@@ -14,6 +14,7 @@ import torch
 
 from benches.program import commit, machine, today
 
+from .place import keep_freed_memory
 from .study_rows import Rows
 from .study_runs import AUTOENCODER, SECTIONS
 from .study_training import FALL, TURNED, exported
@@ -83,6 +84,7 @@ def parser():
 def main():
     args = parser().parse_args()
     rows = Rows(args.json, Path(args.out) / "rows")
+    keep_freed_memory()
     torch.set_num_threads(1)
     program = Product(args.touch2touch, args.out)
     for name in args.only:

@@ -10,8 +10,6 @@ import os
 import shutil
 from pathlib import Path
 
-import torch
-
 from . import export, train
 from .study_runs import AUTOENCODER, METHODS
 
@@ -32,10 +30,10 @@ def train_to(kind, training, shards, folder, steps, fall, seed):
     if step_of(folder, kind) >= steps:
         return
     words = [kind, "--data", str(shards), "--out", str(folder), "--steps", str(steps), "--fall", str(fall), "--seed", str(seed),
-             "--turned", str(TURNED), "--geometry", training.geometry]
+             "--turned", str(TURNED), "--geometry", training.geometry,
+             "--batch", str(AUTOENCODER_BATCH if kind == "autoencoder" else BATCH)]
     words += ([] if training.rotation else ["--no-rotation"]) + ([] if training.flip else ["--no-flip"])
-    torch.manual_seed(seed)
-    train.WHAT[kind](train.parser().parse_args(words))
+    train.run(words)
 
 
 def branch_off(kind, trunk, branch):
