@@ -113,7 +113,7 @@ def generator_nets(run):
 
     As tuned through the sampler, where that stage has begun.
     """
-    states = {name: torch.load(path, weights_only=True) for name in ("autoencoder", "generator", "sampler")
+    states = {name: torch.load(path, weights_only=True, map_location="cpu") for name in ("autoencoder", "generator", "sampler")
               if (path := Path(run) / f"{name}.pt").exists()}
     known, extra = states.get("sampler") or states.get("generator"), states.get("generator", {}).get("extra", {})
     if not known or "sampler" not in states and "autoencoder" not in states:
@@ -292,7 +292,7 @@ def generator(args, out):
 
 def one_shot(args, out):
     """A baseline that draws in one go, as a generator whose denoiser leads any sampler to the drawn picture."""
-    state = torch.load(Path(args.run) / f"{args.what}.pt", weights_only=True)
+    state = torch.load(Path(args.run) / f"{args.what}.pt", weights_only=True, map_location="cpu")
     net = baselines.VqVae() if args.what == "vqvae" else baselines.L1UNet()
     net.load_state_dict(state["nets"][args.what])
     net = net.eval()
@@ -306,7 +306,7 @@ def one_shot(args, out):
 
 
 def classifier(args, out):
-    state = torch.load(Path(args.run) / "classifier.pt", weights_only=True)
+    state = torch.load(Path(args.run) / "classifier.pt", weights_only=True, map_location="cpu")
     net, shards = baselines.Classifier(), data.Shards(args.data)
     net.load_state_dict(state["nets"]["classifier"])
     entry, difference = write(Named(net.eval()), out / "tool_classifier.onnx", ("imprint",), ("logits", "features"),
@@ -321,7 +321,7 @@ def classifier(args, out):
 
 
 def mask(args, out):
-    state = torch.load(Path(args.run) / "mask.pt", weights_only=True)
+    state = torch.load(Path(args.run) / "mask.pt", weights_only=True, map_location="cpu")
     net, shards = models.MaskUNet(), data.Shards(args.data)
     net.load_state_dict(state["nets"]["mask"])
     entry, difference = write(net.eval(), out / "mask_unet.onnx", ("imprint",), "logits", (torch.rand(2, 1, 140, 175),), args.fp16)

@@ -55,7 +55,7 @@ def generator(args):
     ae, known = models.Autoencoder(), Path(args.out) / "autoencoder.pt"
     if not known.exists():
         raise SystemExit(f"{known} is not there: train the autoencoder first")
-    ae.load_state_dict(torch.load(known, weights_only=True)["nets"]["autoencoder"])
+    ae.load_state_dict(torch.load(known, weights_only=True, map_location="cpu")["nets"]["autoencoder"])
     encoder, denoiser = models.ConditionEncoder(geometry=args.geometry), models.Denoiser()
     start(encoder, args, "condition_encoder")
     start(denoiser, args, "denoiser")
