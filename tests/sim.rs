@@ -5,6 +5,9 @@ use std::sync::LazyLock;
 use glam::{DVec2, DVec3};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::grid::Grid;
+use touch2touch_core::measured;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::mesh::distance::MeshDistance;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sample::{ColorTouch, DepthTouch, Sample};
 use touch2touch_core::sim::{self, Grasp, Sensors, SimConfig};
@@ -104,6 +107,24 @@ fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
     };
     assert_eq!(pads(&a).0, pads(&b).0);
     assert_ne!(pads(&a).1, pads(&b).1);
+}
+
+/// The measured tools and the lab's published CAD models are the same solids.
+#[test]
+fn the_measured_tools_are_the_labs_own() {
+    let Some(folder) = crate::support::shared("lab-meshes") else { return };
+    for tool in measured::tools() {
+        let ours = tool.mesh();
+        let labs = touch2touch_work::io::stl::read(&folder.join(format!("{}.stl", tool.name))).unwrap().mesh;
+        let farthest = |from: &TriMesh, to: &TriMesh| {
+            let distance = MeshDistance::new(to).unwrap();
+            let points = from.sample_surface(20_000, 1).into_iter().chain(from.vertices.iter().copied());
+            points.map(|p| distance.signed(p).abs()).fold(0.0, f64::max)
+        };
+        let apart = farthest(&ours, &labs).max(farthest(&labs, &ours));
+        assert!(apart <= 1e-4, "{}: {:.3} mm apart", tool.name, apart * 1e3);
+        assert!((ours.volume() / labs.volume() - 1.0).abs() < 0.01, "{}", tool.name);
+    }
 }
 
 /// The key property: depth, intrinsics, rig, pose and CAD agree for both fingers.

@@ -26,11 +26,13 @@ RANGE_M = (-0.0188, 0.0264)
 MASK_RANGE_M = (-0.0116, 0.0225)
 
 
-# Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`crates/core/src/rig/lab.rs`).
+# Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`crates/core/src/rig/lab.rs`), for shards
+# that do not say it.
 WINDOWS_PX = ((78.5, 74.0), (69.5, 73.0))
 # Where a generator's picture has the window of either finger: nothing in a GelSlim image of an unknown sensor says which
-# finger it is of, so a network that drew each at its own place would have to draw the mean of both. Whole pixels from both.
-FRAME_PX = (68.5, 69.0)
+# finger it is of, so a network that drew each at its own place would have to draw the mean of both. In the middle of
+# the lab's two windows as measured (`crates/core/src/measured.rs`).
+FRAME_PX = (69.5, 72.6)
 
 
 class Shards:
@@ -38,7 +40,7 @@ class Shards:
 
     def __init__(self, folders):
         self.roots = [Path(f) for f in ([folders] if isinstance(folders, (str, Path)) else folders)]
-        self.folders, self.parts = [], []
+        self.folders, self.parts, self.windows = [], [], []
         self.refresh()
         if not self.parts:
             raise SystemExit(f"no shards in {folders}: write some with `touch2touch training-data` (see README.md)")
@@ -49,6 +51,7 @@ class Shards:
             if done.parent not in known:
                 self.folders.append(done.parent)
                 self.parts.append({f.stem: np.load(f, mmap_mode="r") for f in done.parent.glob("*.npy")})
+                self.windows.append(json.loads(done.read_text()).get("windows_px", WINDOWS_PX))
         self.starts = np.cumsum([0] + [len(p["meta"]) for p in self.parts])
         self.meta = np.concatenate([p["meta"] for p in self.parts]) if self.parts else np.zeros((0, 8), np.float32)
 
@@ -75,8 +78,9 @@ class Shards:
 
     def offsets(self, numbers):
         """How far each sample's window lies from the frame's, raw bubble pixels (N,2), along x and y."""
-        windows = torch.tensor(WINDOWS_PX)[torch.from_numpy(self.meta[numbers, 1]).long()]
-        return windows - torch.tensor(FRAME_PX)
+        parts = np.searchsorted(self.starts, numbers, side="right") - 1
+        windows = np.array(self.windows)[parts, self.meta[numbers, 1].astype(int)]
+        return torch.from_numpy(windows - np.array(FRAME_PX)).float()
 
     def contact(self, numbers):
         return self.take("contact", numbers).long()
@@ -164,7 +168,7 @@ def turned(images, k):
 
 
 # The GelSlim's window in the generator's image (128 x 128, rotated bubble), both fingers' in the frame: rows, then columns.
-WINDOW = (slice(50, 79), slice(62, 93))
+WINDOW = (slice(47, 76), slice(61, 92))
 
 
 @lru_cache

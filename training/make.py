@@ -38,8 +38,9 @@ BUNDLES = {"generator": ("generator_ldm", "condition_encoder.onnx", "--steps", 2
 class Writers:
     """Threads that each have the program write one shard after the other; those that are there are not written again."""
 
-    def __init__(self, program, folder, count):
-        self.program, self.folder, self.running, self.failed, self.stopped = program, folder, set(), "", False
+    def __init__(self, program, folder, count, words):
+        self.program, self.folder, self.words = program, folder, words
+        self.running, self.failed, self.stopped = set(), "", False
         shards = [(k / total, name, mix, seed, f"{k + 1}/{total}") for name, (mix, seed, total) in (HELD_OUT | MIXES).items()
                   for k in range(total)]
         self.shards, self.lock = iter(sorted(shards)), threading.Lock()
@@ -53,7 +54,7 @@ class Writers:
                 if self.stopped or self.failed or shard[0] is None:
                     return
                 grasps = PER_SHARD * int(share.partition("/")[2])
-                words = ["training-data", "simulator", "--mix", mix, "--seed", seed, "--grasps", grasps, "--per-shard", PER_SHARD,
+                words = ["training-data", "simulator", *self.words, "--mix", mix, "--seed", seed, "--grasps", grasps, "--per-shard", PER_SHARD,
                          "--shard", share, "--out", self.folder / name]
                 process = subprocess.Popen([self.program, *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                            text=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})
@@ -141,6 +142,8 @@ def parser():
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program, which writes the shards")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="threads of a training on the processor")
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--lab", action="store_true",
+                        help="the lab's own tools and sensors, as measured on real pairs, in the place of the built-in ones")
     return parser
 
 
@@ -152,7 +155,8 @@ def main():
     torch.set_num_threads(args.threads if on_processor else 1)
     kept = args.out / "make.json"
     spent = json.loads(kept.read_text()) if kept.exists() else {"writing": 0.0}
-    writers = Writers(args.touch2touch, args.out / "data", cores if on_processor else max(1, cores - 1))
+    writers = Writers(args.touch2touch, args.out / "data", cores if on_processor else max(1, cores - 1),
+                      ["--lab"] if args.lab else [])
     try:
         writers.wait(begun + 60 * (WRITING * minutes - spent["writing"]) if on_processor else begun)
         if on_processor:

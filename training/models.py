@@ -88,7 +88,7 @@ def raster(n, x0, x1, y0, y1):
 
 
 # The bubble's view and what the GelSlim sees of it, in pixels of the rotated bubble image (data.FRAME_PX): x, then y.
-VIEW, SEEN = (0.0, 175.0, 0.0, 140.0), (84.5, 127.0, 54.0, 86.0)
+VIEW, SEEN = (0.0, 175.0, 0.0, 140.0), (83.5, 126.0, 50.4, 82.4)
 
 
 class ConditionEncoder(nn.Module):

@@ -27,6 +27,7 @@ pub mod label;
 mod linear;
 pub mod manual;
 pub mod markers;
+pub mod measured;
 pub mod mesh;
 pub mod metrics;
 pub mod moments;

@@ -33,6 +33,12 @@ impl TriMesh {
         (0..self.triangles.len()).map(|i| triangle_area(self.corners(i))).sum()
     }
 
+    /// Volume of the solid that it bounds, cubic meters; negative if the triangles face inwards.
+    pub fn volume(&self) -> f64 {
+        let corners = (0..self.triangles.len()).map(|i| self.corners(i));
+        corners.map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum()
+    }
+
     /// True where every edge belongs to exactly two triangles, once in each direction.
     pub fn is_watertight(&self) -> bool {
         let mut edges: Vec<(u32, u32)> = Vec::with_capacity(self.triangles.len() * 3);

@@ -15,9 +15,9 @@
 
 mod condition;
 mod config;
-mod depth_camera;
+pub(crate) mod depth_camera;
 mod faults;
-mod gelslim;
+pub(crate) mod gelslim;
 mod grasp;
 mod membrane;
 mod rig;

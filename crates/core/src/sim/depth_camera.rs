@@ -109,7 +109,7 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
 /// * the noise of the one reference frame, the same in every image of a sensor: grain and speckles, because the
 ///   texture printed on the membrane disturbs the camera;
 /// * flying pixels between foreground and background at depth steps; dropped pixels, which read 0.
-pub(super) fn measure(
+pub(crate) fn measure(
     reference: &DepthMap,
     depth: &DepthMap,
     config: &BubbleConfig,

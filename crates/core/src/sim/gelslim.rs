@@ -85,7 +85,7 @@ impl Gel {
 }
 
 /// Gaussian blur as three box blurs along each axis; the border repeats.
-fn blur(field: &mut Field, sigma: f64) {
+pub(crate) fn blur(field: &mut Field, sigma: f64) {
     let radius = ((sigma * sigma + 0.25).sqrt() - 0.5).round() as usize;
     if radius == 0 {
         return;
@@ -113,7 +113,7 @@ fn blur(field: &mut Field, sigma: f64) {
 }
 
 /// The slope of a field at every node, meters per meter.
-fn slopes(field: &Field, step: f64) -> [Field; 2] {
+pub(crate) fn slopes(field: &Field, step: f64) -> [Field; 2] {
     let (columns, rows) = (field.columns, field.rows);
     let mut out = [Field::filled(columns, rows, 0.0), Field::filled(columns, rows, 0.0)];
     let scale = (0.5 / step) as f32;
