@@ -27,10 +27,15 @@ pub enum ToolError {
 }
 
 /// A tool's CAD model with the distances to its silhouette and its surface, built once and shared.
+///
+/// The fingers close on the tool from both sides, so its middle lies between them wherever the CAD model was drawn: here x is
+/// measured from the middle.
 #[derive(Clone, Debug)]
 pub struct ToolModel {
-    /// The model, meters, object frame.
+    /// The model, meters, object frame with x from the middle between the two sides that the fingers hold.
     pub mesh: TriMesh,
+    /// Place of that middle along x in the object frame of the file, meters.
+    pub middle_x_m: f64,
     /// Distance to its silhouette along the closing axis.
     pub field: DistanceField,
     /// Distance to its surface.
@@ -44,11 +49,16 @@ impl ToolModel {
     ///
     /// # Errors
     /// [`ToolError`] if the mesh is empty or damaged, or its size cannot be meters (with the scale that would be).
-    pub fn new(mesh: TriMesh) -> Result<Self, ToolError> {
+    pub fn new(mut mesh: TriMesh) -> Result<Self, ToolError> {
         let field = DistanceField::from_mesh(&mesh)?;
+        let mut surface = mesh.sample_surface_with_normals(SURFACE_POINTS, SURFACE_SEED);
+        let middle_x_m = middle_x(&mesh, &surface);
+        if middle_x_m != 0.0 {
+            mesh.vertices.iter_mut().for_each(|v| v.x -= middle_x_m);
+            surface.iter_mut().for_each(|(p, _)| p.x -= middle_x_m);
+        }
         let distance = MeshDistance::new(&mesh)?;
-        let surface = mesh.sample_surface_with_normals(SURFACE_POINTS, SURFACE_SEED);
-        Ok(Self { mesh, field, distance, surface, derived: Derived::default() })
+        Ok(Self { mesh, middle_x_m, field, distance, surface, derived: Derived::default() })
     }
 
     /// [`SURFACE_POINTS`] points of the surface with the normals of their triangles, meters, object frame.
@@ -63,6 +73,25 @@ impl ToolModel {
     pub fn derived<T: Any + Send + Sync>(&self, make: impl FnOnce(&Self) -> T) -> Arc<T> {
         self.derived.cell().get_or_init(|| Arc::new(make(self))).clone()
     }
+}
+
+/// Middle of the extent along x of what the fingers hold: of the surface around the object's origin, else of all of it. 0 if it
+/// is nearer to 0 than the rounding of a file.
+fn middle_x(mesh: &TriMesh, surface: &[(DVec3, DVec3)]) -> f64 {
+    /// Half the side of the square that is held, meters.
+    const HELD_M: f64 = 0.015;
+    const ROUNDING_M: f64 = 1e-6;
+    let points = || mesh.vertices.iter().chain(surface.iter().map(|(p, _)| p)).filter(|p| p.is_finite());
+    let extent = |held: &dyn Fn(&DVec3) -> bool| {
+        let x = points().filter(|p| held(p)).map(|p| p.x);
+        x.fold([f64::INFINITY, f64::NEG_INFINITY], |[lo, hi], x| [lo.min(x), hi.max(x)])
+    };
+    let [mut lo, mut hi] = extent(&|p| p.y.abs() < HELD_M && p.z.abs() < HELD_M);
+    if lo > hi {
+        [lo, hi] = extent(&|_| true);
+    }
+    let middle = 0.5 * (lo + hi);
+    if middle.is_finite() && middle.abs() > ROUNDING_M { middle } else { 0.0 }
 }
 
 /// One value of each type, each made once, shared by clones of the tool.
@@ -94,6 +123,18 @@ mod tests {
 
     #[derive(Debug, PartialEq)]
     struct Count(usize);
+
+    #[test]
+    fn a_model_drawn_beside_the_grasp_plane_is_as_one_about_it() {
+        let mut beside = cross();
+        beside.vertices.iter_mut().for_each(|v| v.x -= 0.004);
+        let (model, centered) = (ToolModel::new(beside.clone()).unwrap(), ToolModel::new(cross()).unwrap());
+        assert_eq!(centered.middle_x_m, 0.0);
+        assert!((model.middle_x_m + 0.004).abs() < 1e-9);
+        for (a, b) in model.mesh.vertices.iter().zip(&centered.mesh.vertices) {
+            assert!(a.abs_diff_eq(*b, 1e-9));
+        }
+    }
 
     #[test]
     fn what_is_derived_is_made_once_for_each_type_on_any_thread() {

@@ -35,7 +35,7 @@ impl Pose {
     /// `grasp_from_object` (4, 4) float64, meters: maps a point of the CAD model to the grasp frame.
     #[getter]
     fn matrix<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        transform(py, &self.result.grasp_from_object.to_affine())
+        transform(py, &self.result.grasp_from_cad())
     }
 
     /// In-hand angle as the lab reports it (of `object_from_grasp`), radians.

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use glam::DAffine3;
 use serde::Serialize;
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
@@ -131,8 +132,8 @@ const CONVENTION: &str = "grasp_from_object moves points of the CAD model (meter
                           (x, y, z, 1). theta_deg, y_mm and z_mm are those of object_from_grasp, about +x from y towards z, \
                           as the lab reports them.";
 
-fn matrix(pose: PlanarPose) -> Matrix {
-    let columns = glam::DMat4::from(pose.to_affine()).transpose().to_cols_array_2d();
+fn matrix(motion: DAffine3) -> Matrix {
+    let columns = glam::DMat4::from(motion).transpose().to_cols_array_2d();
     // No minus before a zero.
     columns.map(|row| row.map(|v| v + 0.0))
 }
@@ -216,7 +217,7 @@ fn points(parts: &PairParts<'_>) -> Vec<PlyPoint> {
 fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<String> {
     let found = pose.grasp_from_object;
     let truth = parts.truth.map(|truth| Truth {
-        grasp_from_object: matrix(truth),
+        grasp_from_object: matrix(pose.grasp_from_cad_at(truth)),
         numbers: numbers(truth),
         error_deg: angle_error(found.theta_rad, truth.theta_rad).to_degrees(),
         error_mm: mm((found.y_m - truth.y_m).hypot(found.z_m - truth.z_m)),
@@ -229,8 +230,8 @@ fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<Str
         registration: parts.registration.to_string(),
         mask: parts.mask,
         convention: CONVENTION,
-        grasp_from_object: matrix(found),
-        object_from_grasp: matrix(found.inverse()),
+        grasp_from_object: matrix(pose.grasp_from_cad()),
+        object_from_grasp: matrix(pose.grasp_from_cad().inverse()),
         numbers: numbers(found),
         truth,
         angle_sd_deg: pose.angle_sd_rad().map(f64::to_degrees),
@@ -263,7 +264,10 @@ mod tests {
         let masks = imprints.clone().map(|i| i.map(|i| threshold(&i, 0.005)));
         let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
         let clouds = clouds(&sample, &of).unwrap();
-        let tool = ToolModel::new(spec.mesh()).unwrap();
+        // The lab's models lie 4 mm beside the grasp plane.
+        let mut model = spec.mesh();
+        model.vertices.iter_mut().for_each(|v| v.x -= 0.004);
+        let tool = ToolModel::new(model.clone()).unwrap();
         let (registration, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
         let found = pose(&clouds.contact_points(), &tool, &*registration.method(), Ask::default(), truth).unwrap();
         let parts = PairParts {
@@ -307,7 +311,7 @@ mod tests {
         let back = stl::read(&files[2]).unwrap().mesh;
         assert_eq!(back.triangles.len(), tool.mesh.triangles.len());
         for i in 0..back.triangles.len() {
-            for (found, corner) in back.corners(i).into_iter().zip(tool.mesh.corners(i)) {
+            for (found, corner) in back.corners(i).into_iter().zip(model.corners(i)) {
                 assert!((found - by_rows(corner)).length() < 1e-7);
             }
         }

@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use glam::{DAffine3, DVec3};
+
 use crate::error::TaskError;
 use crate::job::JobCx;
 use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
@@ -17,6 +19,8 @@ use touch2touch_core::verdict::Verdict;
 pub struct PoseResult {
     /// The tool in the hand.
     pub grasp_from_object: PlanarPose,
+    /// Place along x, in the CAD model's file, of the middle that `grasp_from_object` measures x from, meters.
+    pub middle_x_m: f64,
     /// The angle that the lab reports: of `object_from_grasp`, radians.
     pub angle_rad: f64,
     /// The true angle in the same sense, where known.
@@ -43,6 +47,16 @@ impl PoseResult {
     /// Pose the other way round; its angle is the number that the lab reports.
     pub fn object_from_grasp(&self) -> PlanarPose {
         self.grasp_from_object.inverse()
+    }
+
+    /// Motion that takes points of the CAD model, as its file has them, to the grasp frame.
+    pub fn grasp_from_cad(&self) -> DAffine3 {
+        self.grasp_from_cad_at(self.grasp_from_object)
+    }
+
+    /// [`PoseResult::grasp_from_cad`] at another pose of the same tool.
+    pub fn grasp_from_cad_at(&self, grasp_from_object: PlanarPose) -> DAffine3 {
+        grasp_from_object.to_affine() * DAffine3::from_translation(DVec3::new(-self.middle_x_m, 0.0, 0.0))
     }
 
     /// Standard deviation of the angle, radians, where the evidence was asked for.
@@ -87,6 +101,7 @@ pub fn pose<'a>(
     let truth_rad = truth.map(|t| t.inverse().theta_rad);
     Ok(PoseResult {
         grasp_from_object: report.grasp_from_object,
+        middle_x_m: tool.middle_x_m,
         angle_rad,
         truth_rad,
         error_rad: truth_rad.map(|t| units::angle_error(angle_rad, t)),
