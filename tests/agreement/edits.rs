@@ -21,7 +21,7 @@ pub(super) fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     for corner in [[60.5, 25.0], [50.0, 70.0]] {
         studio.send(LabelsCommand::Corner(corner).into());
     }
-    studio.send(LabelsCommand::EndStroke.into());
+    studio.send(LabelsCommand::Close.into());
     studio.send(prefer(|s| s.mask.tool = MaskTool::Wand).into());
     studio.send(begin([87.0, 70.0], true).into());
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());

@@ -490,10 +490,19 @@ impl eframe::App for StudioApp {
                 || cx.shared.dialogs.is_path_box_open()
                 || cx.state.document.question.is_some();
             let state = cx.state;
+            let export = &state.export;
+            let place = shortcuts::Place {
+                covered,
+                dialog: export.asking
+                    || export.asking_masks
+                    || export.importing.is_some()
+                    || cx.shared.dialogs.is_waiting(),
+                labeling: state.is_labeling(),
+            };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
             let keys = &state.settings.keys;
             let pressed =
-                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, covered, possible) };
+                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, place, possible) };
             for action in pressed {
                 if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;
