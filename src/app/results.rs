@@ -44,6 +44,7 @@ pub(crate) mod sample;
 pub(crate) mod scores;
 pub(crate) mod seeds;
 pub(crate) mod shown;
+mod table;
 pub(crate) mod thumbnail;
 pub(crate) mod tool;
 pub(crate) mod train_plan;
