@@ -11,6 +11,7 @@ use touch2touch::app::action::Action;
 use touch2touch::app::apply::apply;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
+use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::TaskKind;

@@ -196,16 +196,22 @@ fn layouts_prefixes_order_and_duplicates() {
 fn a_number_of_numpy_costs_the_true_pose_alone_and_three_digits_are_said() {
     let dir = tempfile::tempdir().unwrap();
     write_pair(dir.path(), Layout::Train, "pattern_31_rod", 7, &touch(0.0)).unwrap();
-    let [_, bubble] = pair_paths(dir.path(), Layout::Train, "pattern_31_rod", 7);
+    let [gelslim, bubble] = pair_paths(dir.path(), Layout::Train, "pattern_31_rod", 7);
     let whole = std::fs::read(&bubble).unwrap();
     let key = b"X\x05\0\0\0theta";
     let numpy = b"cnumpy.core.multiarray\nscalar\nU\x02f8U\x08\0\0\0\0\0\0\xe0?\x86RX\x06\0\0\0tensor";
     std::fs::write(&bubble, with_pickle(&whole, key, &[key.as_slice(), numpy].concat())).unwrap();
     let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
     let [note] = &sample.notes[..] else { panic!("{:?}", sample.notes) };
-    assert!(note.what.contains("numpy") && note.what.contains("the true pose is unknown"), "{}", note.what);
+    assert!(note.what.contains("numpy") && note.what.contains("this file says no true pose"), "{}", note.what);
     assert!(note.hint.contains("torch.as_tensor"), "{}", note.hint);
-    assert!(sample.grasp_from_object.is_none() && sample.pad(lab::RIGHT).unwrap().depth().is_some());
+    // The other half of the pair says it as well.
+    assert!(sample.grasp_from_object.is_some() && sample.pad(lab::RIGHT).unwrap().depth().is_some());
+    let other = std::fs::read(&gelslim).unwrap();
+    std::fs::write(&gelslim, with_pickle(&other, key, &[key.as_slice(), numpy].concat())).unwrap();
+    let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
+    assert!(sample.grasp_from_object.is_none() && sample.pad(lab::RIGHT).unwrap().color().is_some());
+    std::fs::write(&gelslim, other).unwrap();
     std::fs::write(&bubble, with_pickle(&whole, b"FloatStorage", b"BFloat16Storage")).unwrap();
     let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
     assert!(sample.notes[0].what.contains("stored as bfloat16"), "{:?}", sample.notes);

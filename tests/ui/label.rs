@@ -186,7 +186,10 @@ fn keys_close_a_polygon_and_take_its_corners_back() {
     assert_eq!(set(&rig), Some(3), "Backspace takes a corner back");
     key(&mut rig, Modifiers::CTRL, Key::Z);
     assert_eq!(set(&rig), Some(2), "so does Ctrl+Z");
-    corners[2..].iter().for_each(|at| click(&mut rig, *at));
+    for (at, expected) in corners[2..].iter().zip([3, 4]) {
+        click(&mut rig, *at);
+        assert_eq!(set(&rig), Some(expected), "{:?}", rig.harness.state().state().log.entries.back());
+    }
     key(&mut rig, Modifiers::CTRL, Key::Enter);
     rig.settle();
     let pair = rig.harness.state().state().pair_name().to_owned();

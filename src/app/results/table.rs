@@ -17,6 +17,15 @@ fn table_key(state: &State) -> Option<TableKey> {
     Some(TableKey(key_of(state, &evaluation_setup(state)?)?))
 }
 
+/// The table, where it is looked at. What is being scored is shown when all of it is there.
+pub(crate) fn want_table(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if state.selection.panes.contains(&Pane::Results) && state.tasks.of_kind(TaskKind::Evaluate).is_none() {
+        let Some(key) = table_key(state) else { return };
+        wants.ask_unless(state.table.looked_up.as_ref() == Some(&key), key);
+    }
+}
+
 impl Computes for TableKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Option<Arc<Evaluation>>>> {
         let (services, setup) = (services.clone(), evaluation_setup(state)?);
@@ -27,15 +36,6 @@ impl Computes for TableKey {
         }))
     }
 
-    fn wanted(wants: &mut Demands<'_>) {
-        let state = wants.state;
-        // What is being scored is shown when all of it is there.
-        if state.selection.panes.contains(&Pane::Results) && state.tasks.of_kind(TaskKind::Evaluate).is_none() {
-            let Some(key) = table_key(state) else { return };
-            wants.ask_unless(state.table.looked_up.as_ref() == Some(&key), key);
-        }
-    }
-
     fn arrived(&self, state: &mut State, found: &Arc<Option<Arc<Evaluation>>>) {
         if table_key(state).as_ref() != Some(self) {
             return;
@@ -44,7 +44,7 @@ impl Computes for TableKey {
         // What could not be kept is in the table of this run alone.
         let more = |found: &&Arc<Evaluation>| {
             let shown = state.table.result.as_ref();
-            shown.is_none_or(|shown| shown.setup != found.setup || shown.pairs <= found.pairs)
+            shown.is_none_or(|shown| shown.setup != found.setup || shown.scored <= found.scored)
         };
         if let Some(found) = found.as_ref().as_ref().filter(more) {
             state.table.result = Some(found.clone());

@@ -210,18 +210,17 @@ impl StudioApp {
             }
             _ => true,
         });
-        if commands
-            .iter()
-            .any(|c| matches!(c, Command::Labels(LabelsCommand::Undo) | Command::Labels(LabelsCommand::Redo)))
-        {
-            // The pen is not to be followed into another state.
-            self.lift_pen();
-        }
+        let travels = |c: &Command| matches!(c, Command::Labels(LabelsCommand::Undo | LabelsCommand::Redo));
+        let travels = commands.iter().any(travels);
         if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
         }
         let before = self.state.settings.workspace;
         requests.extend(self.runtime.tick(&mut self.state, commands));
+        if travels && !self.state.document.has_open_polygon() {
+            // The pen is not to be followed into another state.
+            self.lift_pen();
+        }
         if self.state.settings.workspace != before {
             // The pen is not to be followed into another workspace.
             self.lift_pen();

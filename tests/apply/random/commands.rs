@@ -346,7 +346,7 @@ fn evaluation() -> Evaluation {
         notes: Vec::new(),
         findings: Vec::new(),
         skipped: Vec::new(),
-        pairs: 0,
+        scored: 0,
         of: 0,
         complete: true,
         setup: Setup::default(),

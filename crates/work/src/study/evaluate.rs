@@ -120,7 +120,7 @@ pub struct Evaluation {
     /// Grasps and tools that were left out, and why.
     pub skipped: Vec<Skipped>,
     /// Grasps in the table.
-    pub pairs: usize,
+    pub scored: usize,
     /// Pairs of the data set.
     pub of: usize,
     /// True where everything asked for was scored; false if stopped early.
@@ -181,7 +181,7 @@ pub fn kept(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result
     let planned = ids().count();
     work.iter_mut().for_each(|tool| tool.ids.retain(|id| book.is_whole(*id)));
     let table = score(dataset, setup, opened, (&work, &book), true, &JobCx::unwatched())?;
-    Ok(Some(Evaluation { complete: table.pairs == planned, ..table }))
+    Ok(Some(Evaluation { complete: table.scored == planned, ..table }))
 }
 
 /// Scores the grasps of `work` whose figures are not kept; `as_kept` leaves those that are as they are.
@@ -267,6 +267,15 @@ fn score(
     notes.append(&mut models.missing(setup, &dataset.rig, scale));
     notes.append(&mut models.masks_made_otherwise());
     notes.extend(evaluation::few_features(&scores, &groups));
+    let methods = 0..if as_kept { scores.len() } else { 0 };
+    let other_range: usize = methods
+        .map(|method| work.iter().map(|tool| tool::of_other_range(book, method, &tool.ids)).sum::<usize>())
+        .sum();
+    if other_range > 0 {
+        notes.push(format!(
+            "The SSIM of {other_range} grasps is in the range of another selection of pairs: evaluate again to have it in this one's"
+        ));
+    }
     Ok(Evaluation {
         dataset: dataset.title.clone(),
         rows,
@@ -276,7 +285,7 @@ fn score(
         notes,
         findings: findings.into_list(),
         skipped,
-        pairs: scores.iter().map(|s| s.grasps.len()).max().unwrap_or_default(),
+        scored: scores.iter().map(|s| s.grasps.len()).max().unwrap_or_default(),
         of: dataset.index.pairs.len(),
         complete: done == total && !cx.cancel.is_cancelled(),
         setup: setup.clone(),

@@ -35,8 +35,12 @@ pub fn rows(evaluation: &Evaluation, published: bool) -> Vec<Row> {
 impl Evaluation {
     /// The size of the table: whose pairs are in it, and how many of them.
     pub fn size(&self) -> String {
-        let Self { pairs, of, dataset, .. } = self;
-        if pairs == of { format!("All {of} pairs of {dataset}") } else { format!("{pairs} of {of} pairs of {dataset}") }
+        let Self { scored, of, dataset, .. } = self;
+        if scored == of {
+            format!("All {of} pairs of {dataset}")
+        } else {
+            format!("{scored} of {of} pairs of {dataset}")
+        }
     }
 }
 

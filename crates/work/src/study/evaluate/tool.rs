@@ -516,6 +516,13 @@ fn span(image: &Grid<f32>) -> Option<[f32; 2]> {
     (low <= high).then_some([low, high])
 }
 
+/// How many of the known figures of some grasps of a tool have their SSIM in a range that is not that of these grasps.
+pub(super) fn of_other_range(book: &KeptScores, method: usize, ids: &[PairId]) -> usize {
+    let known = book.of(method, ids);
+    let range = width(known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten()));
+    known.iter().filter(|(_, entry)| !entry.is_of_range(range)).count()
+}
+
 /// Largest minus smallest value of some images.
 fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
     let [low, high] = spans.fold([f32::INFINITY, f32::NEG_INFINITY], |a, b| [a[0].min(b[0]), a[1].max(b[1])]);

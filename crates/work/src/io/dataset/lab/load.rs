@@ -80,7 +80,7 @@ fn optional<T>(
 }
 
 fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, PtError> {
-    let without = "the true pose is unknown";
+    let without = "this file says no true pose";
     let mut values = [0.0; 3];
     for (value, key) in values.iter_mut().zip(["theta", "x", "y"]) {
         match optional(dict, dict.scalar(key), without, notes)? {
