@@ -172,6 +172,7 @@ pub fn main() -> ExitCode {
 /// A program of verbs: what it does, its exit code and what it says of errors.
 pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
     output::start_log();
+    touch2touch_work::job::bound_threads();
     touch2touch_work::infer::sandbox::by_this_program();
     match run() {
         Ok(true) => ExitCode::SUCCESS,

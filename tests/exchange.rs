@@ -272,7 +272,7 @@ fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
     let gray = |value: u8| Grid::filled(175, 140, value);
     images::write_gray8(&files[0], &gray(7)).unwrap();
     images::write_gray8(&files[1], &Grid::filled(17, 14, 255u8)).unwrap();
-    images::write_rgb8(&files[2], &Grid::filled(175, 140, [0.0; 3])).unwrap();
+    images::write_rgb8(&files[2], &Grid::from_fn(175, 140, |x, _| [x as f32, 0.0, 0.0])).unwrap();
     images::write_gray8(&files[3], &Grid::from_fn(175, 140, |x, _| if x < 9 { 1 } else { 255u8 })).unwrap();
     std::fs::write(&files[4], "no picture").unwrap();
     images::write_gray8(&folder.join("train/elsewhere_right.png"), &gray(0)).unwrap();

@@ -16,7 +16,7 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, known};
+use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, export, kept, known};
 use touch2touch_work::infer::bundle::Origin;
 use touch2touch_work::infer::store::Store;
 use touch2touch_work::io::dataset::Dataset;
@@ -107,9 +107,30 @@ fn a_second_evaluation_computes_nothing_and_says_the_same() {
         text(&still)
     };
     assert_eq!(without_time(&more), without_time(&anew));
+    // The table of what is there is the same, and that of a part says so.
+    let dataset = Dataset::open(&data).unwrap();
+    let there = kept(&dataset, &setup(), &models(&cache)).unwrap().unwrap();
+    assert_eq!((without_time(&there), there.scored, there.of, there.complete), (without_time(&anew), 6, 6, true));
+    assert!(there.size().starts_with("All 6 pairs of "), "{}", there.size());
+    let part = folder.path().join("part");
+    let two = Setup { pairs: Some([PairId(0), PairId(3)].into()), ..setup() };
+    assert!(kept(&dataset, &setup(), &models(&part)).unwrap().is_none());
+    run(&data, &two, &part);
+    let there = kept(&dataset, &setup(), &models(&part)).unwrap().unwrap();
+    assert_eq!((there.scored, there.of, there.complete), (2, 6, false));
+    let out = folder.path().join("out");
+    export(&there, true, &out).unwrap();
+    let read = |name: &str| std::fs::read_to_string(out.join(name)).unwrap();
+    for name in ["evaluation.md", "evaluation.tex"] {
+        assert!(read(name).contains("2 of 6 pairs of "), "{name}");
+    }
+    assert!(read("evaluation.csv").lines().nth(1).unwrap().contains(",6,"), "{}", read("evaluation.csv"));
+    assert!(read("evaluation.json").contains("\"of\": 6"));
     // And back to the smaller set.
     let (again, fresh) = run(&data, &few, &cache);
     assert_eq!((fresh, text(&again)), (0, text(&cold)));
+    let there = kept(&dataset, &setup(), &models(&cache)).unwrap().unwrap();
+    assert!(there.notes.iter().any(|note| note.contains("the range of another selection")), "{:?}", there.notes);
 
     // What is there is told without computing, and under a copy's names as well.
     let dataset = Dataset::open(&data).unwrap();
@@ -155,7 +176,9 @@ fn an_evaluation_is_compared_with_an_earlier_file_on_the_same_grasps() {
     assert_eq!(group.figures["psnr_db"].value, 0.0);
     let figure = |evaluation: &Evaluation, key| evaluation.rows[1].groups[0].named(key).map(|e| e.value);
     let angle = figure(&other, "angle_deg").zip(figure(&first, "angle_deg")).map(|(to, from)| to - from);
-    assert_eq!(group.figures.get("angle_deg").map(|d| d.value), angle);
+    // A mean of differences and a difference of means: the same but for the last digit.
+    let apart = group.figures.get("angle_deg").zip(angle).map(|(difference, angle)| (difference.value - angle).abs());
+    assert!(apart.is_some_and(|apart| apart < 1e-12), "{apart:?}");
     // What cannot be compared is refused.
     let why = other.against(&write_report(&first, false)).unwrap_err();
     assert!(why.hint.is_some_and(|hint| hint.contains("--pairs")));
@@ -164,12 +187,12 @@ fn an_evaluation_is_compared_with_an_earlier_file_on_the_same_grasps() {
 }
 
 /// The studio as it stands when nothing is left to compute.
-fn studio(data: &Path, home: &Path, commands: Vec<Command>) -> State {
+fn studio(data: &Path, home: &Path, pane: Pane, commands: Vec<Command>) -> State {
     let services = LiveServices::with_config_folder(Some(home.to_owned()));
     let (mut state, mut runtime) = (State::default(), Runtime::inline(Arc::new(services)));
     runtime.start(&mut state, Some(Place::Path(data.to_owned())));
     runtime.settle(&mut state);
-    runtime.tick(&mut state, vec![ViewCommand::ShowPanes([Pane::Table].into()).into()]);
+    runtime.tick(&mut state, vec![ViewCommand::ShowPanes([pane].into()).into()]);
     runtime.settle(&mut state);
     runtime.tick(&mut state, commands);
     runtime.settle(&mut state);
@@ -181,12 +204,14 @@ fn the_studio_shows_the_scores_of_the_last_time_at_once() {
     let folder = tempfile::tempdir().unwrap();
     let (data, home) = (folder.path().join("data"), folder.path().join("home"));
     write(&data, 0..1);
-    assert!(studio(&data, &home, Vec::new()).table.scores.sources.is_empty());
-    let made = studio(&data, &home, vec![EvaluateCommand::All.into()]);
+    assert!(studio(&data, &home, Pane::Table, Vec::new()).table.scores.sources.is_empty());
+    let made = studio(&data, &home, Pane::Table, vec![EvaluateCommand::All.into()]);
     let table = made.table.result.as_ref().expect("a table as well");
     assert_eq!((table.complete, table.setup.grasps_per_tool), (true, None));
-    let again = studio(&data, &home, Vec::new());
-    assert!(again.table.result.is_none());
+    let again = studio(&data, &home, Pane::Table, Vec::new());
+    assert!(again.table.result.is_none(), "nobody looks at it");
+    let looked = studio(&data, &home, Pane::Results, Vec::new()).table.result.expect("the same table");
+    assert_eq!((&looked.rows, looked.complete, looked.size()), (&table.rows, true, table.size()));
     let values = |state: &State| {
         let sources = state.table.scores.sources.iter();
         let of = |pair: u32| sources.clone().map(move |s| Metric::iter().map(|f| s.value(PairId(pair), f)).collect());

@@ -215,6 +215,7 @@ fn script(folder: &Path, seed: u64) -> Vec<Vec<Command>> {
                         act.push(Command::Labels(LabelsCommand::Corner(to)));
                     }
                 }
+                act.push(Command::Labels(LabelsCommand::Close));
                 act.push(Command::Labels(LabelsCommand::EndStroke));
                 act
             }

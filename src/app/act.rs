@@ -130,6 +130,12 @@ fn follow(state: &State) -> Option<Command> {
     when(folder, FollowCommand::Set(state.library.follow.is_none()))
 }
 
+/// Takes the last corner of the open polygon back, or else the last change of what is on screen.
+fn undo(state: &State) -> Option<Command> {
+    let done = state.history.next_undo(state.pair_name(), &results::mask_places(state)).is_some();
+    when(done || state.document.stroke.is_some(), LabelsCommand::Undo)
+}
+
 /// True where the mask of the active finger was corrected.
 fn is_corrected(state: &State) -> bool {
     let finger = state.selection.finger;
@@ -150,6 +156,12 @@ fn next_shift(state: &State) -> Option<Command> {
 fn cancel(state: &State) -> Option<Command> {
     if state.document.stroke.is_some() {
         does(LabelsCommand::CancelStroke)
+    } else if state.export.importing.is_some() {
+        does(ExportCommand::AskImport(None))
+    } else if state.export.asking_masks {
+        does(ExportCommand::AskMasks(false))
+    } else if state.export.asking {
+        does(ExportCommand::Ask(false))
     } else if results::proposes(state) {
         does(ViewCommand::Propose(false))
     } else if let Some(command) = escape(state) {
@@ -167,8 +179,11 @@ fn cancel(state: &State) -> Option<Command> {
     }
 }
 
-/// Accepts the proposal that is shown, or else the pose in hand.
+/// Closes the open polygon, or else accepts the proposal that is shown, or else the pose in hand.
 fn accept_shown(state: &State) -> Option<Command> {
+    if state.document.has_open_polygon() {
+        return does(LabelsCommand::Close);
+    }
     if results::proposes(state) {
         return editable(state, LabelsCommand::AcceptProposal);
     }

@@ -133,7 +133,7 @@ macro_rules! actions {
             state => opened(state, ViewCommand::Ui(UiRequest::PickScores));
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
-        CancelJobs, Generate, "Cancel", "Stops what is running; gives up a stroke, rejects a proposal", [plain(K::Escape)],
+        CancelJobs, Generate, "Cancel", "Closes a form, gives up a stroke, rejects a proposal; then stops what is running", [plain(K::Escape)],
             state => cancel(state);
         NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)],
             state => next_shift(state);
@@ -146,7 +146,7 @@ macro_rules! actions {
             _ => does(prefer(|s| s.mask.tool = MaskTool::Eraser));
         Lasso, Mask, "Lasso", "Adds what a drawn line encloses; the right button removes", [plain(K::L)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Lasso));
-        Polygon, Mask, "Polygon", "Adds what lines between clicks enclose; a double click ends it, the right button removes", [plain(K::P)],
+        Polygon, Mask, "Polygon", "Adds what lines between clicks enclose; Enter or the first corner closes it, Backspace takes a corner back, the right button removes", [plain(K::P)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Polygon));
         RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Rectangle));
@@ -200,8 +200,8 @@ macro_rules! actions {
             state => editable(state, LabelsCommand::TakeOver);
         ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
-        Undo, Mask, "Undo", "Takes back the last change of what is on screen", [ctrl(K::Z)],
-            state => when(state.history.next_undo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Undo);
+        Undo, Mask, "Undo", "Takes back the last change of what is on screen, or the last corner of the open polygon", [ctrl(K::Z)],
+            state => undo(state);
         Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)],
             state => when(state.history.next_redo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Redo);
         TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [],
@@ -259,7 +259,7 @@ macro_rules! actions {
             state => nudge(state, PoseAxis::Theta, 1.0);
         IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
-        Accept, Pose, "Accept", "Makes the proposal that is shown the mask, or stores the pose set by hand with the pair", [plain(K::Enter)],
+        Accept, Pose, "Accept", "Closes the open polygon, makes the proposal that is shown the mask, or stores the pose set by hand with the pair", [plain(K::Enter)],
             state => accept_shown(state);
         RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up", [],
             state => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand);

@@ -22,6 +22,7 @@ pub fn demands(state: &State) -> Vec<Request> {
     results::want_seeds(&mut wants);
     results::want_thumbnails(&mut wants);
     results::want_scores(&mut wants);
+    results::want_table(&mut wants);
     results::want_label_stats(&mut wants);
     results::want_about(&mut wants);
     neighbors(&mut wants);

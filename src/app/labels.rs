@@ -51,8 +51,10 @@ pub enum LabelsCommand {
     StrokeTo([f32; 2]),
     /// A corner of a drawing that is made of clicks, pixels as of [`Self::StrokeTo`].
     Corner([f32; 2]),
-    /// Pointer up, or the last corner.
+    /// Pointer up. A polygon that is still open is given up.
     EndStroke,
+    /// Closes the open polygon.
+    Close,
     /// Gives the stroke up.
     CancelStroke,
     /// Cleans the mask in force up.
@@ -111,6 +113,7 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         }
         LabelsCommand::StrokeTo(at_px) => stroke_to(state, at_px),
         LabelsCommand::EndStroke => end_stroke(state, effects),
+        LabelsCommand::Close => close(state, effects),
         LabelsCommand::CancelStroke => cancel_stroke(state),
         LabelsCommand::Corner(at_px) => corner(state, at_px),
         LabelsCommand::CleanUp(clean_up) => {
@@ -251,7 +254,29 @@ fn redraw(state: &mut State, from: usize) {
     state.document.stroke = Some(stroke);
 }
 
+/// Ends what is being drawn. A polygon that nobody closed is given up: an area that was not finished is no mask.
 pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
+    if state.document.has_open_polygon() {
+        cancel_stroke(state);
+        let hint = "Enter or a click on its first corner closes a polygon.".to_owned();
+        return state.log.push(Level::Warning, "The open polygon was given up", None, Some(hint));
+    }
+    finish(state, effects);
+}
+
+fn close(state: &mut State, effects: &mut Vec<Effect>) {
+    let Some(stroke) = state.document.stroke.as_mut().filter(|stroke| stroke.drawing.is_by_clicks()) else { return };
+    if stroke.drawing.close() {
+        redraw(state, 0);
+        finish(state, effects);
+    } else {
+        let hint = "Click the next corner, or give it up with Escape.".to_owned();
+        state.log.push(Level::Warning, "A polygon has at least three corners", None, Some(hint));
+    }
+}
+
+/// Makes what was drawn a change of the document.
+fn finish(state: &mut State, effects: &mut Vec<Effect>) {
     let doc = &mut state.document;
     let Some(stroke) = doc.stroke.take() else { return };
     let Stroke { pair, place, source, drawing, pose, before, start, .. } = stroke;
@@ -306,12 +331,17 @@ fn change(
     effects: &mut Vec<Effect>,
 ) -> Option<Cow<'static, str>> {
     let labels = state.document.pair(pair).cloned().unwrap_or_default();
+    // What is typed and what is accepted beside it is seen where it is done.
+    let seen = matches!(edit, LabelEdit::Note(_) | LabelEdit::AcceptPose(..) | LabelEdit::WithdrawPose(_));
     match label_edit::edit(&labels, edit) {
         Ok(edited) => {
             let Edited { deed, change } = edited?;
             let name = deed.name.clone();
             state.history.make(&mut state.document, Gesture::forth(pair, name.clone(), &change, revision));
             save_pair(state, pair, deed, effects);
+            if !seen && !state.is_labeling() {
+                state.log.changed(format!("The labels of {pair} were changed: {name}"), pair);
+            }
             Some(name)
         }
         Err(err) => {
@@ -437,6 +467,9 @@ fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {
+    if says_open_polygon(state) {
+        return;
+    }
     end_stroke(state, effects);
     let pair = state.pair_name().to_owned();
     if state.document.review(&pair) == review || !check_editable(state, "Review state") {
@@ -449,6 +482,16 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
     } else {
         change(state, &pair, LabelEdit::Review(review), None, effects);
     }
+}
+
+/// True where a polygon is open, which is said: a pair is not judged with a shape that is half drawn.
+pub(super) fn says_open_polygon(state: &mut State) -> bool {
+    let open = state.document.has_open_polygon();
+    if open {
+        let hint = "Close it with Enter or a click on its first corner, or give it up with Escape.".to_owned();
+        state.log.push(Level::Warning, "A polygon is still open: nothing was marked", None, Some(hint));
+    }
+    open
 }
 
 /// The automatic masks of the measured imprints on screen that nobody corrected: whoever marks the pair done has found them right.
@@ -503,7 +546,10 @@ pub(super) fn set_accepted(
 }
 
 fn undo(state: &mut State, effects: &mut Vec<Effect>) {
-    if state.document.stroke.is_some() {
+    if let Some(stroke) = &mut state.document.stroke {
+        if stroke.drawing.take_corner_back() {
+            return redraw(state, 0);
+        }
         return cancel_stroke(state);
     }
     let (pair, shown) = (state.pair_name().to_owned(), results::mask_places(state));
@@ -563,7 +609,9 @@ pub(super) fn saved(state: &mut State) {
 }
 
 fn save_all(state: &mut State, effects: &mut Vec<Effect>) {
-    end_stroke(state, effects);
+    if !state.document.has_open_polygon() {
+        end_stroke(state, effects);
+    }
     let unsaved: Vec<String> = state.document.unsaved.iter().cloned().collect();
     for name in unsaved {
         save_again(state, &name, Operation::named("saved again"), effects);

@@ -149,6 +149,7 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
         LibraryCommand::NextWorst => select_next_worst(state, effects),
         LibraryCommand::NextUncertain => select_next_uncertain(state, effects),
+        LibraryCommand::DoneAndNext if labels::says_open_polygon(state) => {}
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
             state.document.since_repeat += 1;
@@ -384,6 +385,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     let resumed = state.library.open.is_none() && last.place.as_ref() == Some(&place);
     state.results = Results::default();
     state.table.result = None;
+    state.table.looked_up = None;
     state.table.scores = Arc::default();
     state.table.rows = None;
     state.library.brush = None;

@@ -44,6 +44,7 @@ pub(crate) mod sample;
 pub(crate) mod scores;
 pub(crate) mod seeds;
 pub(crate) mod shown;
+mod table;
 pub(crate) mod thumbnail;
 pub(crate) mod tool;
 pub(crate) mod train_plan;
@@ -105,6 +106,7 @@ pub use seeds::{ensemble, seed_imprint, seed_poses, seed_recipes, seeds_running}
 pub(crate) use seeds::{seed_pose_absent, want_seeds};
 pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
+pub(crate) use table::want_table;
 pub use thumbnail::thumbnail;
 pub(crate) use thumbnail::want_thumbnails;
 pub use tool::{tool, tool_name};

@@ -22,7 +22,7 @@ pub mod view;
 pub mod workbench;
 
 use super::keys::{ImprintSource, PairKey, TouchKey};
-use super::pane::Demand;
+use super::pane::{Demand, Pane, Workspace};
 use about::AboutState;
 use adapt::AdaptState;
 use dial::DialState;
@@ -110,6 +110,11 @@ impl State {
     /// The selected pair's entry.
     pub fn entry(&self) -> Option<&PairEntry> {
         self.library.entry(self.selection.pair?)
+    }
+
+    /// True where masks are drawn: in their workspace, and wherever their tools are on screen.
+    pub fn is_labeling(&self) -> bool {
+        self.settings.workspace == Workspace::Label || self.selection.panes.contains(&Pane::Masks)
     }
 
     /// The selected pair's name; empty if there is none.

@@ -14,7 +14,7 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, export, rows};
+use touch2touch_work::evaluate::{self, Evaluation, Report, Setup, evaluate, export, rows};
 use touch2touch_work::infer::bundle::{Bundle, Found, Origin, find_all};
 use touch2touch_work::infer::features::Preparation;
 use touch2touch_work::io::atomic;
@@ -129,9 +129,9 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
         export(&evaluation, args.paper, folder)?;
     }
     let texts = [
-        (&args.markdown, evaluation::markdown(&rows)),
-        (&args.csv, evaluation::csv(&rows)),
-        (&args.latex, evaluation::latex(&rows)),
+        (&args.markdown, evaluate::markdown(&evaluation, args.paper)),
+        (&args.csv, evaluate::csv(&evaluation, args.paper)),
+        (&args.latex, evaluate::latex(&evaluation, args.paper)),
     ];
     for (file, text) in texts {
         if let Some(file) = file {
@@ -151,7 +151,7 @@ fn write(file: &Path, text: &str) -> anyhow::Result<()> {
 }
 
 fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
-    let mut text = format!("{}\n\n{}", evaluation.dataset, evaluation::text(rows));
+    let mut text = format!("{}\n\n{}", evaluation.size(), evaluation::text(rows));
     text += &evaluation::differences_text(&evaluation.differences);
     text += &format!("- {}\n", evaluation.conventions);
     for note in &evaluation.notes {

@@ -21,7 +21,7 @@ pub(super) fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     for corner in [[60.5, 25.0], [50.0, 70.0]] {
         studio.send(LabelsCommand::Corner(corner).into());
     }
-    studio.send(LabelsCommand::EndStroke.into());
+    studio.send(LabelsCommand::Close.into());
     studio.send(prefer(|s| s.mask.tool = MaskTool::Wand).into());
     studio.send(begin([87.0, 70.0], true).into());
     studio.send(LabelsCommand::StrokeTo([99.0, 70.0]).into());
@@ -34,7 +34,7 @@ pub(super) fn a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb() {
     assert_eq!(stored(), drawn, "on the disk");
     let begun = ["label", path, "--pair", &name, "--finger", "right", "--mask", "threshold"];
     json(&[&begun[..], &["--remove-mask"]].concat(), home.path());
-    let polygon = r#"{"tool": "polygon", "paint": "contact", "points": [[20, 20], [60.5, 25], [50, 70], [50, 70]]}"#;
+    let polygon = r#"{"tool": "polygon", "paint": "contact", "points": [[20, 20], [60.5, 25], [50, 70]]}"#;
     let wand = r#"{"tool": "wand", "tolerance_m": 0.0004, "paint": "free", "points": [[87, 70], [99, 70]]}"#;
     let draw = ["--draw", polygon, "--draw", wand, "--clean", "smooth=1.5"];
     json(&[&begun[..], &draw[..]].concat(), home.path());

@@ -361,6 +361,7 @@ fn every_tool_draws_and_undo_takes_it_back() {
             bench.send(LabelsCommand::StrokeTo(at));
             bench.send(LabelsCommand::Corner(at));
         }
+        bench.send(LabelsCommand::Close);
         bench.send(LabelsCommand::EndStroke);
         assert_ne!(mask(&bench, lab::RIGHT), before, "{name}");
         assert_eq!(
@@ -375,6 +376,77 @@ fn every_tool_draws_and_undo_takes_it_back() {
     bench.send(LabelsCommand::StrokeTo([12.0, 9.0]));
     bench.send(LabelsCommand::CancelStroke);
     assert_eq!(mask(&bench, lab::RIGHT), before);
+}
+
+#[test]
+fn a_polygon_counts_once_it_is_closed() {
+    let mut bench = bench();
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
+    bench.send(prefer(|s| s.mask.tool = MaskTool::Polygon));
+    bench.settle();
+    let before = mask(&bench, lab::RIGHT);
+    let corners = [[10.0, 8.0], [18.0, 8.0], [18.0, 13.0]];
+    let draw = |bench: &mut Bench, count: usize| {
+        begin(bench, lab::RIGHT, corners[0]);
+        for at in &corners[1..count] {
+            bench.send(LabelsCommand::Corner(*at));
+        }
+        // The pointer is elsewhere when it is closed: that is no corner.
+        bench.send(LabelsCommand::StrokeTo([1.0, 13.0]));
+    };
+    let set = |bench: &Bench| bench.state.document.stroke.as_ref().map(|s| s.drawing.points.len() - 1);
+    let last_said = |bench: &Bench| bench.state.log.entries.back().unwrap().text.clone();
+    // Two corners enclose nothing.
+    draw(&mut bench, 2);
+    bench.send(LabelsCommand::Close);
+    assert_eq!((set(&bench), last_said(&bench).as_str()), (Some(2), "A polygon has at least three corners"));
+    bench.send(LabelsCommand::Undo);
+    assert_eq!(set(&bench), Some(1));
+    bench.send(LabelsCommand::Undo);
+    assert_eq!((set(&bench), mask(&bench, lab::RIGHT)), (None, before.clone()));
+    // Neither done nor saved nor left is closed.
+    draw(&mut bench, 3);
+    bench.send(LibraryCommand::DoneAndNext);
+    bench.send(LabelsCommand::SetReview(Review::Done));
+    bench.send(LabelsCommand::Save);
+    bench.settle();
+    assert_eq!((set(&bench), bench.state.selection.pair), (Some(3), Some(PairId(0))));
+    assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
+    assert!(bench.state.log.entries.iter().any(|e| e.text.contains("nothing was marked")));
+    bench.send(LibraryCommand::Step(1));
+    assert_eq!(last_said(&bench), "The open polygon was given up");
+    bench.send(LibraryCommand::Step(-1));
+    bench.settle();
+    assert_eq!(mask(&bench, lab::RIGHT), before);
+    assert!(bench.services.source.labels.lock().unwrap().values().all(|labels| labels.masks.is_empty()));
+    // Closed, it is its corners.
+    draw(&mut bench, 3);
+    bench.send(LabelsCommand::Close);
+    let drawn = mask(&bench, lab::RIGHT);
+    assert!(drawn.get(17, 9) == Some(&true) && drawn.get(11, 12) == before.get(11, 12), "{drawn:?}");
+    bench.send(LibraryCommand::DoneAndNext);
+    bench.settle();
+    let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
+    assert_eq!((saved.review, saved.masks.values().any(|hand| *hand.mask == drawn)), (Review::Done, true));
+}
+
+#[test]
+fn a_change_of_labels_says_itself_where_no_mask_tool_is_on_screen() {
+    let mut bench = bench();
+    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
+    bench.settle();
+    let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.changed.is_some()).count();
+    bench.send(LabelsCommand::AdoptAutomatic);
+    assert_eq!(said(&bench), 0, "the mask is there to be seen");
+    bench.send(panes(&[Pane::Measured]));
+    bench.send(LabelsCommand::SetNote("tool_a/data_0".into(), "typed".into()));
+    assert_eq!(said(&bench), 0, "so is what is typed");
+    bench.send(LabelsCommand::SetReview(Review::Flagged));
+    let last = bench.state.log.entries.back().unwrap().clone();
+    assert_eq!(last.changed.as_deref(), Some("tool_a/data_0"));
+    assert!(last.text.starts_with("The labels of tool_a/data_0 were changed: "), "{}", last.text);
+    bench.send(LabelsCommand::SetReview(Review::Flagged));
+    assert_eq!(said(&bench), 1, "what changes nothing says nothing");
 }
 
 #[test]

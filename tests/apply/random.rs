@@ -8,12 +8,16 @@ use std::collections::BTreeMap;
 use proptest::prelude::*;
 use strum::IntoEnumIterator;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane};
+use touch2touch::app::apply::apply;
+use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
+use touch2touch::app::services::Services as _;
+use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::state::State;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::grid::Mask;
 
-use self::commands::command;
+use self::commands::{change, command};
 use super::double::{Bench, SIMULATED};
 use super::panes;
 
@@ -112,6 +116,22 @@ proptest! {
             prop_assert!(history.redo(document, name, &places).is_some());
         }
         prop_assert_eq!(said(document), end);
+    }
+}
+
+proptest! {
+    #[test]
+    fn every_choice_of_every_pane_survives_a_restart(changes in proptest::collection::vec(change(), 1..20)) {
+        let folder = tempfile::tempdir().unwrap();
+        let services = LiveServices::with_config_folder(Some(folder.path().to_owned()));
+        let mut state = State::default();
+        for change in changes {
+            apply(&mut state, SettingsCommand::Change(change).into());
+        }
+        services.save_settings(&state.settings).unwrap();
+        let (settings, problem) = services.load_settings();
+        prop_assert_eq!(problem, None);
+        prop_assert_eq!(settings, state.settings);
     }
 }
 

@@ -133,6 +133,21 @@ fn a_closed_or_full_standard_output_is_no_panic() {
 }
 
 #[test]
+fn more_threads_than_a_system_starts_are_not_started() {
+    let dir = tempfile::tempdir().unwrap();
+    let set = dir.path().join("set");
+    assert!(simulate(&set, &["--grasps", "1"]).status.success());
+    let out = Command::new(env!("CARGO_BIN_EXE_touch2touch"))
+        .args(["doctor", set.to_str().unwrap(), "--json"])
+        .env("RAYON_NUM_THREADS", "100000")
+        .env("TOUCH2TOUCH_CACHE", dir.path())
+        .output()
+        .unwrap();
+    assert!(json(&out)["pairs"].as_u64().is_some_and(|pairs| pairs > 0), "{}", error_text(&out));
+    assert!(error_text(&out).contains("256 are used"), "{}", error_text(&out));
+}
+
+#[test]
 fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
     let dir = tempfile::tempdir().unwrap();
     for (words, nearest) in [

@@ -12,6 +12,7 @@ use touch2touch_work::io::images;
 use touch2touch_work::io::pt::{PtItem, Tensor, read_dict, write_dict};
 use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair};
 
+use super::pt::with_pickle;
 use super::{touch, touch_file};
 
 fn names(dataset: &Dataset) -> Vec<&str> {
@@ -191,6 +192,62 @@ fn layouts_prefixes_order_and_duplicates() {
 }
 
 #[cfg(unix)]
+#[test]
+fn a_number_of_numpy_costs_the_true_pose_alone_and_three_digits_are_said() {
+    let dir = tempfile::tempdir().unwrap();
+    write_pair(dir.path(), Layout::Train, "pattern_31_rod", 7, &touch(0.0)).unwrap();
+    let [gelslim, bubble] = pair_paths(dir.path(), Layout::Train, "pattern_31_rod", 7);
+    let whole = std::fs::read(&bubble).unwrap();
+    let key = b"X\x05\0\0\0theta";
+    let numpy = b"cnumpy.core.multiarray\nscalar\nU\x02f8U\x08\0\0\0\0\0\0\xe0?\x86RX\x06\0\0\0tensor";
+    std::fs::write(&bubble, with_pickle(&whole, key, &[key.as_slice(), numpy].concat())).unwrap();
+    let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
+    let [note] = &sample.notes[..] else { panic!("{:?}", sample.notes) };
+    assert!(note.what.contains("numpy") && note.what.contains("this file says no true pose"), "{}", note.what);
+    assert!(note.hint.contains("torch.as_tensor"), "{}", note.hint);
+    // The other half of the pair says it as well.
+    assert!(sample.grasp_from_object.is_some() && sample.pad(lab::RIGHT).unwrap().depth().is_some());
+    let other = std::fs::read(&gelslim).unwrap();
+    std::fs::write(&gelslim, with_pickle(&other, key, &[key.as_slice(), numpy].concat())).unwrap();
+    let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
+    assert!(sample.grasp_from_object.is_none() && sample.pad(lab::RIGHT).unwrap().color().is_some());
+    std::fs::write(&gelslim, other).unwrap();
+    std::fs::write(&bubble, with_pickle(&whole, b"FloatStorage", b"BFloat16Storage")).unwrap();
+    let sample = Dataset::open(dir.path()).unwrap().load(PairId(0)).unwrap();
+    assert!(sample.notes[0].what.contains("stored as bfloat16"), "{:?}", sample.notes);
+}
+
+/// Where names in other letters are other files.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_second_model_of_a_tool_is_named_and_the_same_one_is_always_used() {
+    let dir = tempfile::tempdir().unwrap();
+    write_pair(dir.path(), Layout::Train, "pattern_31_rod", 7, &touch(0.0)).unwrap();
+    let folder = dir.path().join("tools_stls");
+    std::fs::create_dir(&folder).unwrap();
+    for name in ["pattern_31_rod.STL", "pattern_31_rod.stl", "pattern_31_rod.Stl"] {
+        std::fs::write(folder.join(name), name).unwrap();
+    }
+    let dataset = Dataset::open(dir.path()).unwrap();
+    assert_eq!(dataset.tool_mesh_file("pattern_31_rod").unwrap().file_name().unwrap(), "pattern_31_rod.stl");
+    let mut said: Vec<String> = dataset.problems.iter().map(|p| p.file.display().to_string()).collect();
+    said.sort();
+    assert!(said.len() == 2 && said[0].ends_with(".STL") && said[1].ends_with(".Stl"), "{said:?}");
+    assert!(dataset.problems.iter().all(|p| p.what.ends_with("pattern_31_rod.stl is used")), "{:?}", dataset.problems);
+}
+
+/// As above.
+#[cfg(target_os = "linux")]
+#[test]
+fn sensors_declared_under_a_name_in_other_letters_are_said_not_to_be_read() {
+    let dir = tempfile::tempdir().unwrap();
+    images::write_rgb8(&dir.path().join("a_gelslim.png"), &Grid::from_fn(64, 48, |x, _| [x as f32; 3])).unwrap();
+    std::fs::write(dir.path().join("Rig.json"), "{}").unwrap();
+    let dataset = Dataset::open(dir.path()).unwrap();
+    let [said] = &dataset.problems[..] else { panic!("{:?}", dataset.problems) };
+    assert!(said.file.ends_with("Rig.json") && said.hint.contains("rename it to rig.json"), "{said:?}");
+}
+
 #[test]
 fn links_are_followed_and_loops_end() {
     let dir = tempfile::tempdir().unwrap();

@@ -7,10 +7,13 @@ use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::resample;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
+use touch2touch_core::sim::{self, SimConfig};
 use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::io::doctor::{DoctorReport, examine};
+use touch2touch_work::io::images;
 use touch2touch_work::io::pt::read_text_lists;
 use touch2touch_work::io::simulated::{Layout, WriteError, write_pair, write_tools};
 
@@ -92,6 +95,26 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
         }),
         "not the scale 0..255",
     );
+}
+
+#[test]
+fn exchanged_colors_of_pictures_are_named() {
+    // Pairs as a program saves them that stretches the difference around gray.
+    let said = |exchanged: bool| {
+        let dir = tempfile::tempdir().unwrap();
+        for (number, tool) in catalog::tools().iter().take(3).enumerate() {
+            let touch = sim::simulate(tool, sim::random_grasp(number as u64), number as u64, &SimConfig::default());
+            let touch = touch.pad(lab::RIGHT).unwrap();
+            let difference = resample::bilinear_rgb(&touch.color().unwrap().difference, 128, 128);
+            let tile = difference.map(|[r, g, b]| if exchanged { [*b, *g, *r] } else { [*r, *g, *b] });
+            let tile = tile.map(|pixel| pixel.map(|v| 120.0 + v));
+            images::write_rgb8(&dir.path().join(format!("{number}_gelslim.png")), &tile).unwrap();
+        }
+        doctor(dir.path()).problems.iter().map(|p| p.what.clone()).collect::<Vec<_>>()
+    };
+    let names = |said: &[String]| said.iter().any(|what| what.contains("red and blue are exchanged in all 3 pairs"));
+    assert!(names(&said(true)), "{:?}", said(true));
+    assert!(!names(&said(false)), "{:?}", said(false));
 }
 
 #[test]

@@ -97,6 +97,98 @@ fn damaged_files_are_errors_at_every_length() {
     assert!(matches!(read_dict(dir.path()), Err(PtError::NotADict { .. })));
 }
 
+/// The archive `bytes` as `torch.save` writes it to a file of this name: everything in a folder of the name, no sizes before
+/// the values, and at the end both kinds of end records, where nothing in the short one points to the long one.
+fn as_torch_writes(bytes: &[u8], name: &str) -> Vec<u8> {
+    let mut from = zip::ZipArchive::new(std::io::Cursor::new(bytes)).unwrap();
+    let (mut out, mut directory) = (Vec::new(), Vec::new());
+    let count = from.len() as u64;
+    for index in 0..from.len() {
+        let mut entry = from.by_index(index).unwrap();
+        let path = entry.name().unwrap().replacen("archive", name, 1);
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        let size = (content.len() as u32).to_le_bytes();
+        let crc = entry.crc32().to_le_bytes();
+        let at = (out.len() as u32).to_le_bytes();
+        let length = (path.len() as u16).to_le_bytes();
+        // Bit 3: the sizes follow the values; bit 11: the name is UTF-8.
+        let common: &[u8] = &[0, 0, 8, 8, 0, 0, 0, 0, 0x3f, 0xea];
+        out.extend([b"PK\x03\x04", common, &[0; 12], &length, &[0; 2], path.as_bytes(), &content].concat());
+        out.extend([b"PK\x07\x08", &crc[..], &size, &size].concat());
+        directory.extend([b"PK\x01\x02\0\0", common, &crc, &size, &size, &length, &[0; 12], &at].concat());
+        directory.extend(path.as_bytes());
+    }
+    let (start, size) = (out.len() as u64, directory.len() as u64);
+    out.extend(directory);
+    let end = out.len() as u64;
+    out.extend([b"PK\x06\x06", &44u64.to_le_bytes()[..], &[0x1e, 3, 0x2d, 0], &[0; 8]].concat());
+    out.extend([count, count, size, start].into_iter().flat_map(u64::to_le_bytes));
+    out.extend([b"PK\x06\x07", &[0; 4][..], &end.to_le_bytes(), &1u32.to_le_bytes()].concat());
+    out.extend([b"PK\x05\x06", &[0; 4][..]].concat());
+    out.extend([count as u16, count as u16].into_iter().flat_map(u16::to_le_bytes));
+    out.extend([size as u32, start as u32].into_iter().flat_map(u32::to_le_bytes));
+    out.extend([0, 0]);
+    out
+}
+
+/// The archive with other bytes in the first place of its pickle that has these.
+pub(super) fn with_pickle(bytes: &[u8], from: &[u8], to: &[u8]) -> Vec<u8> {
+    let mut old = zip::ZipArchive::new(std::io::Cursor::new(bytes)).unwrap();
+    let mut new = zip::ZipWriter::new(std::io::Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored);
+    for index in 0..old.len() {
+        let mut entry = old.by_index(index).unwrap();
+        let name = entry.name().unwrap().into_owned();
+        let mut content = Vec::new();
+        std::io::Read::read_to_end(&mut entry, &mut content).unwrap();
+        if name.ends_with("data.pkl") {
+            let at = content.windows(from.len()).position(|window| window == from).expect("the bytes are there");
+            content.splice(at..at + from.len(), to.iter().copied());
+        }
+        new.start_file(name, options).unwrap();
+        std::io::Write::write_all(&mut new, &content).unwrap();
+    }
+    new.finish().unwrap().into_inner()
+}
+
+#[test]
+fn bfloat16_is_read_and_a_view_that_goes_backwards_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.pt");
+    // Two values of 16 bits lie in one of 32: the upper half is that value rounded, the lower one is 0.
+    write_dict(&path, &[("x", Tensor::f32(&[4], vec![1.5, -2.0, 9.0, 9.0]).into())]).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    std::fs::write(&path, with_pickle(&bytes, b"FloatStorage", b"BFloat16Storage")).unwrap();
+    assert_eq!(read_dict(&path).unwrap().tensor("x").unwrap(), Tensor::f32(&[4], vec![0.0, 1.5, 0.0, -2.0]));
+    // torch knows no such view, but a program could write one.
+    write_dict(&path, &[("x", Tensor::u8(&[2, 2], vec![1, 2, 3, 4]).into())]).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    let backwards = with_pickle(&bytes, b"(J\x02\0\0\0J\x01\0\0\0t\x89", b"(J\xfe\xff\xff\xffJ\x01\0\0\0t\x89");
+    std::fs::write(&path, backwards).unwrap();
+    let error = read_dict(&path).unwrap_err().to_string();
+    assert!(error.contains("stride") && error.contains("own.pt"), "{error}");
+}
+
+#[test]
+fn a_file_of_torch_opens_whatever_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.pt");
+    write_dict(&path, &sample_items()).unwrap();
+    let bytes = std::fs::read(&path).unwrap();
+    for letter in ["a", "_", "\u{e9}", "\u{89e6}", "\u{1f91a}"] {
+        for letters in 1..=60 {
+            let name = letter.repeat(letters);
+            std::fs::write(&path, as_torch_writes(&bytes, &name)).unwrap();
+            let dict = read_dict(&path).unwrap_or_else(|err| panic!("{name}: {err}"));
+            let theta = dict.scalar("theta").unwrap_or_else(|err| panic!("{name}: {err}"));
+            assert_eq!(theta, -0.107_569_456_100_463_87, "{name}");
+            assert_eq!(dict.f32s("bubble_imprint", &[&[2, 1, 3, 4]]).unwrap().len(), 24, "{name}");
+            assert_eq!(dict.scalar("scale").unwrap(), 0.1, "{name}");
+        }
+    }
+}
+
 fn sample_items() -> Vec<(&'static str, PtItem)> {
     let numbers: Vec<f32> = (0..24).map(|i| (i as f32).sin() * 1e-3).collect();
     vec![

@@ -2,7 +2,7 @@
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, pos2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{CameraPreset, LabelsCommand, LibraryCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{CameraPreset, ExportCommand, LabelsCommand, LibraryCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::results;
@@ -158,6 +158,89 @@ fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
             assert_eq!(points(&rig), Some(expected), "{before:?}");
         }
     }
+}
+
+#[test]
+fn keys_close_a_polygon_and_take_its_corners_back() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    rig.send(prefer(|s| s.workspace = Workspace::Label));
+    with_nothing_automatic(&mut rig);
+    let picture = rig.harness.get_by_label("Measured imprint right").rect();
+    let corners = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]].map(|[x, y]| inside(picture, x, y));
+    let set = |rig: &Rig| rig.harness.state().state().document.stroke.as_ref().map(|s| s.drawing.points.len() - 1);
+    let click = |rig: &mut Rig, at| {
+        rig.button(at, true);
+        rig.button(at, false);
+    };
+    let key = |rig: &mut Rig, modifiers, key| {
+        rig.harness.key_press_modifiers(modifiers, key);
+        rig.harness.step();
+        rig.harness.step();
+    };
+    let empty = rig.mask(lab::RIGHT);
+    key(&mut rig, Modifiers::NONE, Key::P);
+    corners.iter().for_each(|at| click(&mut rig, *at));
+    assert_eq!(set(&rig), Some(4));
+    key(&mut rig, Modifiers::NONE, Key::Backspace);
+    assert_eq!(set(&rig), Some(3), "Backspace takes a corner back");
+    key(&mut rig, Modifiers::CTRL, Key::Z);
+    assert_eq!(set(&rig), Some(2), "so does Ctrl+Z");
+    for (at, expected) in corners[2..].iter().zip([3, 4]) {
+        click(&mut rig, *at);
+        assert_eq!(set(&rig), Some(expected), "{:?}", rig.harness.state().state().log.entries.back());
+    }
+    key(&mut rig, Modifiers::CTRL, Key::Enter);
+    rig.settle();
+    let pair = rig.harness.state().state().pair_name().to_owned();
+    assert_eq!((set(&rig), rig.harness.state().state().document.review(&pair)), (Some(4), Review::Todo));
+    assert!(rig.harness.query_all_by_label_contains("A polygon is still open").next().is_some());
+    key(&mut rig, Modifiers::NONE, Key::Enter);
+    rig.settle();
+    assert_eq!((set(&rig), rig.harness.state().state().pair_name()), (None, pair.as_str()));
+    assert!(count(&rig.mask(lab::RIGHT)) > count(&empty) + 2000, "Enter closes it");
+    // Then another one can be begun, and Ctrl+Z takes back what the first one drew once this one is given up.
+    click(&mut rig, corners[0]);
+    assert_eq!(set(&rig), Some(1));
+    key(&mut rig, Modifiers::NONE, Key::Escape);
+    key(&mut rig, Modifiers::CTRL, Key::Z);
+    rig.settle();
+    assert_eq!((set(&rig), rig.mask(lab::RIGHT)), (None, empty));
+}
+
+#[test]
+fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_once() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    rig.send(prefer(|s| s.hint_dismissed = true));
+    let reviewed = |rig: &Rig| {
+        let state = rig.harness.state().state();
+        state.document.review(state.pair_name())
+    };
+    let letters = [Key::T, Key::H, Key::K, Key::Delete];
+    for (workspace, asking) in [(Workspace::Inspect, false), (Workspace::Inspect, true), (Workspace::Label, true)] {
+        rig.send(prefer(move |s| s.workspace = workspace));
+        rig.send(ExportCommand::Ask(asking));
+        rig.settle();
+        let before = rig.mask(lab::RIGHT);
+        for key in letters {
+            rig.harness.key_press(key);
+            rig.harness.step();
+        }
+        rig.settle();
+        assert_eq!((rig.mask(lab::RIGHT), reviewed(&rig)), (before, Review::Todo), "{workspace:?} {asking}");
+        rig.harness.key_press(Key::Escape);
+        rig.settle();
+        assert!(!rig.harness.state().state().export.asking, "Escape closes the form");
+    }
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
+    rig.send(LabelsCommand::SetReview(Review::Flagged));
+    rig.settle();
+    assert_eq!(reviewed(&rig), Review::Flagged);
+    rig.harness.get_by_label_contains("were changed: ");
+    rig.harness.get_by_label("Undo").click();
+    rig.settle();
+    assert_eq!(reviewed(&rig), Review::Todo);
+    assert!(rig.harness.query_by_label("Undo").is_none(), "it says so once");
 }
 
 #[test]

@@ -10,6 +10,20 @@ use super::error::TaskError;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::postprocess::ShiftMode;
 
+/// Most threads of this program that a setting of the system may ask for.
+const MOST_THREADS: usize = 256;
+
+/// Keeps the threads of parallel loops to a number that a system can start, whatever `RAYON_NUM_THREADS` asks for. To be called
+/// before the first of them.
+pub fn bound_threads() {
+    let asked = std::env::var("RAYON_NUM_THREADS").ok().and_then(|text| text.trim().parse::<usize>().ok());
+    if let Some(asked) = asked.filter(|asked| *asked > MOST_THREADS) {
+        log::warn!("RAYON_NUM_THREADS asks for {asked} threads; {MOST_THREADS} are used");
+        // Only an earlier loop can be in the way, and then its threads are there already.
+        rayon::ThreadPoolBuilder::new().num_threads(MOST_THREADS).build_global().ok();
+    }
+}
+
 /// A flag that tells a job to stop. Clones share it.
 #[derive(Clone, Debug, Default)]
 pub struct Cancel(Arc<AtomicBool>);

@@ -9,6 +9,14 @@ impl Action {
         pane.is_some_and(|pane| self.is_of_pane(pane)) || self.is_of_workspace(workspace)
     }
 
+    /// True where its letter means it only where masks are drawn: it changes labels, or what the tools do to them.
+    pub(crate) fn is_of_labeling(self) -> bool {
+        use Action as A;
+        let looks = matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
+            || matches!(self, A::Influence | A::Ghosts | A::Lens);
+        self.group() == Group::Mask && !looks
+    }
+
     fn is_of_workspace(self, workspace: Workspace) -> bool {
         match workspace {
             Workspace::Inspect => matches!(

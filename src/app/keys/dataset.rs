@@ -8,6 +8,7 @@ use super::super::scores::ScoreTable;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::about::Fact;
+use touch2touch_work::evaluate::Evaluation;
 use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::import::Import;
 use touch2touch_work::label_stats::LabelStats;
@@ -115,6 +116,14 @@ impl Key for ScoresKey {
     fn bytes(table: &ScoreTable) -> usize {
         table.bytes()
     }
+}
+
+/// Everything that decides the results table of the scores that are kept.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct TableKey(pub(crate) ScoresKey);
+
+impl Key for TableKey {
+    type Value = Option<Arc<Evaluation>>;
 }
 
 /// The plan of an export, of what is drawn and marked now.

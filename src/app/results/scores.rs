@@ -41,12 +41,16 @@ pub(crate) fn setup_of_all(state: &State) -> Option<Setup> {
 
 /// The recipe of the scores in force.
 pub(crate) fn scores_key(state: &State) -> Option<ScoresKey> {
+    key_of(state, &setup_of_all(state)?)
+}
+
+/// The recipe of what a setup scores.
+pub(super) fn key_of(state: &State, setup: &Setup) -> Option<ScoresKey> {
     let open = state.library.open.as_ref().filter(|open| open.source.as_dataset().is_some())?;
-    let setup = setup_of_all(state)?;
     Some(ScoresKey {
         dataset: open.seq,
         pairs: open.index().pairs.len(),
-        setup: serde_json::to_string(&setup).ok()?,
+        setup: serde_json::to_string(setup).ok()?,
         round: state.table.round,
     })
 }

@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use serde_json::Value;
+
 use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::services::Opened;
@@ -354,7 +356,13 @@ impl Services for LiveServices {
         let Some(folder) = &self.config_folder else { return Ok(()) };
         let file = folder.join(SETTINGS_FILE);
         let fail = |err: std::io::Error| TaskError::new(WHAT, format!("{err} ({})", file.display()));
-        let text = serde_json::to_vec_pretty(settings).map_err(|err| fail(err.into()))?;
+        // A path that is no text cannot be written; it must not keep everything else from being written.
+        let mut settings = settings.clone();
+        let is_text = |place: &Place| !matches!(place, Place::Path(path) if path.to_str().is_none());
+        settings.recent.retain(is_text);
+        settings.last.place = settings.last.place.filter(is_text);
+        settings.bundle_folders.retain(|folder| folder.to_str().is_some());
+        let text = serde_json::to_vec_pretty(&settings).map_err(|err| fail(err.into()))?;
         std::fs::create_dir_all(folder).map_err(fail)?;
         atomic::write_bytes(&file, &text).map_err(fail)
     }
@@ -377,19 +385,20 @@ impl LiveServices {
                 return (Settings::default(), Some(TaskError::new("The preferences could not be read", why)));
             }
         };
+        let bad = folder.join(BAD_SETTINGS_FILE);
         match parse_settings(&bytes) {
             Ok((settings, refused)) => {
                 let problem = (!refused.is_empty()).then(|| {
-                    TaskError::new(
-                        "Some keys have their defaults",
-                        format!("{} ({})", refused.join("; "), file.display()),
-                    )
-                    .with_hint("The shortcut sheet sets them")
+                    let why = format!("{} ({})", refused.join("; "), file.display());
+                    let kept = match std::fs::copy(&file, &bad) {
+                        Ok(_) => format!("The file as it was is kept as {}", bad.display()),
+                        Err(err) => format!("The file as it was could not be kept: {err}"),
+                    };
+                    TaskError::new("Some preferences have their defaults", why).with_hint(kept)
                 });
                 (settings.validated(), problem)
             }
             Err(why) => {
-                let bad = folder.join(BAD_SETTINGS_FILE);
                 let kept = match std::fs::rename(&file, &bad) {
                     Ok(()) => format!("They are kept in {}.", bad.display()),
                     Err(err) => format!("They could not be set aside: {err}."),
@@ -402,25 +411,55 @@ impl LiveServices {
     }
 }
 
-/// The settings, and which keys of theirs could not be used.
+/// The settings, and which of them could not be used.
 fn parse_settings(bytes: &[u8]) -> Result<(Settings, Vec<String>), String> {
-    let value: serde_json::Value = serde_json::from_slice(bytes).map_err(|err| err.to_string())?;
-    let version = value.get("version").and_then(serde_json::Value::as_u64);
+    let mut value: Value = serde_json::from_slice(bytes).map_err(|err| err.to_string())?;
+    let version = value.get("version").and_then(Value::as_u64);
     if version != Some(SETTINGS_VERSION.into()) {
         return Err(format!(
             "they are of version {}, this program writes version {SETTINGS_VERSION}",
             version.map_or_else(|| "unknown".into(), |v| v.to_string())
         ));
     }
-    let refused = value.get("keys").map_or_else(Vec::new, |keys| Bindings::read(keys).1);
+    let mut refused = value.get("keys").map_or_else(Vec::new, |keys| Bindings::read(keys).1);
+    let fits = |value: Value| serde_json::from_value::<Settings>(value).is_ok();
+    refused.extend(leave_out(&mut value, "", &fits).into_iter().map(|path| format!("{path} cannot be read")));
     Ok((serde_json::from_value(value).map_err(|err| err.to_string())?, refused))
+}
+
+/// Leaves out the parts of a value that make it unfit, each as small as can be, and returns their paths: that of the value
+/// itself where nothing else helps.
+fn leave_out(value: &mut Value, path: &str, fits: &dyn Fn(Value) -> bool) -> Vec<String> {
+    if fits(value.clone()) {
+        return Vec::new();
+    }
+    let mut out = Vec::new();
+    if let Value::Object(parts) = value {
+        let dot = if path.is_empty() { "" } else { "." };
+        parts.retain(|key, part| {
+            let alone = |part| fits(Value::Object([(key.clone(), part)].into_iter().collect()));
+            let unfit = leave_out(part, &format!("{path}{dot}{key}"), &alone);
+            out.extend(unfit);
+            alone(part.clone())
+        });
+    }
+    if let Value::Array(parts) = value {
+        let mut at = 0;
+        parts.retain_mut(|part| {
+            let alone = |part| fits(Value::Array(vec![part]));
+            out.extend(leave_out(part, &format!("{path}[{at}]"), &alone));
+            at += 1;
+            alone(part.clone())
+        });
+    }
+    if fits(value.clone()) { out } else { vec![path.to_owned()] }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::app::action::Action;
-    use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource};
+    use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource, Versus, Workspace};
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
@@ -431,6 +470,7 @@ mod tests {
     use touch2touch_work::io::masks::MaskStore;
     use touch2touch_work::labels::ImprintOf;
     use touch2touch_work::labels::{DrawnMask, MaskPlace, Revision};
+    use touch2touch_work::subject::Subject;
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
@@ -544,7 +584,7 @@ mod tests {
         services.save_settings(&settings).unwrap();
         assert_eq!(services.load_settings(), (settings, None));
         let file = folder.path().join("new").join(SETTINGS_FILE);
-        for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"version": 1, "theme": "plaid"}"#] {
+        for bad in ["", "[1, 2", r#"{"version": 999}"#, r#"{"theme": "light"}"#] {
             std::fs::write(&file, bad).unwrap();
             let (settings, problem) = services.load_settings();
             assert_eq!(settings, Settings::default(), "{bad}");
@@ -561,6 +601,26 @@ mod tests {
         assert_eq!((settings.ui_zoom, settings.keys.text(Action::Save).as_str()), (2.0, "F8"));
         assert!(problem.unwrap().why.starts_with("fly: there is no such action ("));
         assert!(file.exists());
+        // A field that cannot be read falls back alone, and the file as it was is kept.
+        let one = r#"{"version": 1, "theme": "plaid", "ui_zoom": 2.0, "recent": ["demo", 7, {"path": "/data/x"}],
+            "versus": {"inspect": {"a": "measured", "b": "prediction:bundle=a, b"}, "label": {"a": "stored"}},
+            "mask": {"radius_px": "wide", "clean_mm": 2.0}, "last": {"cameras": ["one"], "pair": "data_6"}}"#;
+        std::fs::write(&file, one).unwrap();
+        let (settings, problem) = services.load_settings();
+        let problem = problem.unwrap();
+        assert!(problem.hint.unwrap().contains(BAD_SETTINGS_FILE));
+        let fields = ["last.cameras", "mask.radius_px", "recent[1]", "theme", "versus.inspect.b"];
+        let fields = fields.map(|field| format!("{field} cannot be read")).join("; ");
+        assert_eq!(problem.why, format!("{fields} ({})", file.display()));
+        assert_eq!(std::fs::read_to_string(file.with_file_name(BAD_SETTINGS_FILE)).unwrap(), one);
+        let mut want = Settings { ui_zoom: 2.0, ..Settings::default() };
+        want.recent = vec![Place::Demo, Place::Path("/data/x".into())];
+        want.mask.clean_mm = 2.0;
+        want.last.pair = "data_6".into();
+        let versus = |a| Versus { a, ..Versus::default() };
+        want.versus.insert(Workspace::Inspect, versus(Subject::Measured));
+        want.versus.insert(Workspace::Label, versus(Subject::Stored));
+        assert_eq!(settings, want);
         // What earlier versions wrote opens: the color map under its old name, the numbers of masks beside the tools.
         let old = r#"{"version": 1, "colour_map": "gray", "mask": {"source": "top_percent", "top_percent": 3.0}}"#;
         std::fs::write(&file, old).unwrap();

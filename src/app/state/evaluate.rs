@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::super::keys::TableKey;
 use super::super::scores::{ScoreTable, SourceScores};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Condition, Metric, Row, paper_rows};
@@ -24,6 +25,8 @@ pub struct TableState {
     pub published: bool,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
+    /// The recipe by which kept scores were looked up for it last.
+    pub(in crate::app) looked_up: Option<TableKey>,
     /// The scores that are kept of the open data set.
     pub scores: Arc<ScoreTable>,
     /// Scores that were felt elsewhere and opened, of the open data set.
@@ -42,9 +45,10 @@ impl Default for TableState {
     fn default() -> Self {
         Self {
             left_out: BTreeSet::new(),
-            grasps_per_tool: Some(4),
+            grasps_per_tool: None,
             published: false,
             result: None,
+            looked_up: None,
             scores: Arc::default(),
             rows: None,
             round: 0,

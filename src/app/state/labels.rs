@@ -162,6 +162,11 @@ impl Document {
         own.filter_map(|name| Some((name.clone(), self.finished(name)?))).collect()
     }
 
+    /// True where a polygon is being drawn that is not closed.
+    pub fn has_open_polygon(&self) -> bool {
+        self.stroke.as_ref().is_some_and(|stroke| stroke.drawing.is_by_clicks())
+    }
+
     /// The labels of a pair without the stroke that is still being drawn: it may be given up.
     pub(in crate::app) fn finished(&self, name: &str) -> Option<PairLabels> {
         let mut labels = self.labels.get(name)?.clone();

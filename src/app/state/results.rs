@@ -91,6 +91,8 @@ macro_rules! table {
         Basin(BasinKey) in basins, 32 * MIB;
         /// The scores that are kept of all pairs.
         Scores(ScoresKey) in scores, 64 * MIB;
+        /// The results table of the scores that are kept.
+        Table(TableKey);
         /// A small picture of a pair's measured imprint (right finger, else left).
         Thumbnail(ThumbnailKey) in thumbnails, 32 * MIB;
         }

@@ -581,7 +581,7 @@ impl MaskTool {
         let row = |name, action, draws, hint| ToolRow { name, action, draws, hint };
         let brush = Some(DrawTool::Brush { radius_px: mask.radius_px });
         let wand = Some(DrawTool::Wand { tolerance_m: mask.wand_m });
-        let corner = "Corner by corner; the first closes it";
+        let corner = "Corner by corner; Enter or the first closes it";
         match self {
             Self::Brush => row("Brush", Action::Brush, brush, ""),
             Self::Eraser => row("Eraser", Action::Eraser, brush, ""),

@@ -172,6 +172,8 @@ pub struct Entry {
     pub hint: Option<String>,
     /// The place that was written to, if it says so.
     pub place: Option<PathBuf>,
+    /// The pair whose labels it says were changed: that can be taken back.
+    pub changed: Option<String>,
     /// The number of times that the line came in a row.
     pub count: u32,
 }
@@ -202,7 +204,16 @@ impl Log {
             return;
         }
         self.last += 1;
-        self.entries.push_back(Entry { number: self.last, level, text, detail, hint, place: None, count: 1 });
+        self.entries.push_back(Entry {
+            number: self.last,
+            level,
+            text,
+            detail,
+            hint,
+            place: None,
+            changed: None,
+            count: 1,
+        });
         if self.entries.len() > MAX_ENTRIES {
             self.entries.pop_front();
         }
@@ -217,6 +228,14 @@ impl Log {
     pub fn saved(&mut self, text: impl Into<String>, place: PathBuf) {
         self.info(text);
         self.place_last(place);
+    }
+
+    /// Adds a notice of a change to the labels of a pair.
+    pub(in crate::app) fn changed(&mut self, text: impl Into<String>, pair: &str) {
+        self.info(text);
+        if let Some(entry) = self.entries.back_mut() {
+            entry.changed = Some(pair.to_owned());
+        }
     }
 
     /// Says of the last line which place it is about.

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use eframe::egui::{self, Align, Color32, Layout, Panel, RichText, ScrollArea, Ui};
 
+use crate::app::action::Action;
 use crate::app::command::{Pane, TasksCommand};
 use crate::app::tasks::{Entry, Level};
 use crate::ui::parts::cx::Cx;
@@ -76,7 +77,7 @@ pub(crate) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
     let (state, now) = (cx.state, ui.input(|i| i.time));
     let came = &mut cx.shared.notes;
     let mut unseen = Vec::new();
-    for entry in state.log.unseen().filter(|e| e.level >= Level::Warning || e.place.is_some()) {
+    for entry in state.log.unseen().filter(|e| e.level >= Level::Warning || e.place.is_some() || e.changed.is_some()) {
         let (since, pair) = *came.entry(entry.number).or_insert((now, state.selection.pair));
         let stays = entry.level == Level::Error;
         if stays || (now - since < STAYS_S && (pair.is_none() || pair == state.selection.pair)) {
@@ -101,6 +102,14 @@ pub(crate) fn notices(cx: &mut Cx<'_>, ui: &mut Ui) {
                     }
                     if let Some(place) = &entry.place {
                         links(cx, ui, place);
+                    }
+                    // Only the last change can be taken back first.
+                    let last_change = unseen.iter().rev().find(|e| e.changed.is_some()).map(|e| e.number);
+                    let here = entry.changed.as_deref() == Some(cx.state.pair_name());
+                    let undo = Action::Undo.command(cx.state).filter(|_| here && last_change == Some(entry.number));
+                    if undo.is_some() && ui.button("Undo").on_hover_text("Takes this change back").clicked() {
+                        cx.act(Action::Undo);
+                        cx.push(TasksCommand::LogSeen(entry.number));
                     }
                     ui.with_layout(Layout::left_to_right(Align::Center), |ui| line(cx.p, ui, entry));
                 });

@@ -80,7 +80,7 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "Grasps of each tool, spread evenly; the paper has 46. Default 4";
+        let tip = "Grasps of each tool, spread evenly; the paper has 46. All is the default; few are a quick look";
         response.response.accessible_name("Grasps per tool").on_hover_text(tip);
         let tip = "The table compares generators as they are meant to be used; the steps and the seed of the pane \
                    Generate are for the other panes. `evaluate --steps N --seed N` gives all of them the same";
@@ -116,6 +116,7 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     let all = columns(rows);
     let narrow = ui.available_width() < NARROW;
     let shown: Vec<&Column> = all.iter().copied().filter(|c| !narrow || !MINOR.contains(&c.heading)).collect();
+    ui.label(RichText::new(result.size()).color(cx.p.strong));
     ScrollArea::vertical().auto_shrink(false).id_salt("results").show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
         let mut groups: Vec<Group> = result.groups.clone();

@@ -104,6 +104,11 @@ impl Dialogs {
         }
     }
 
+    /// True where the system's dialog is open, or is about to be.
+    pub(crate) fn is_waiting(&self) -> bool {
+        self.waiting
+    }
+
     /// True where the path box is open.
     pub(crate) fn is_path_box_open(&self) -> bool {
         self.path_box.is_some()

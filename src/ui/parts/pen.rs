@@ -2,8 +2,8 @@
 
 use crate::app::settings::prefer;
 use eframe::egui::{
-    Align2, Color32, CursorIcon, Event, FontId, Modifiers, Painter, PointerButton, Pos2, Response, Stroke, Ui, Vec2,
-    vec2,
+    Align2, Color32, CursorIcon, Event, FontId, Key, Modifiers, Painter, PointerButton, Pos2, Response, Stroke, Ui,
+    Vec2, vec2,
 };
 
 use super::cx::Cx;
@@ -84,11 +84,19 @@ pub(crate) fn follow<K: Copy + PartialEq>(
                 } else if *held == Some(here) && tool == MaskTool::Polygon {
                     if closes(cx, easel, pos) {
                         *held = None;
-                        cx.push(LabelsCommand::EndStroke);
+                        cx.push(LabelsCommand::Close);
                     } else {
                         cx.push(LabelsCommand::Corner(at_px));
                     }
                 }
+            }
+            Event::Key { key: Key::Backspace, pressed: true, modifiers, .. }
+                if *held == Some(here)
+                    && tool == MaskTool::Polygon
+                    && modifiers.is_none()
+                    && !ui.ctx().egui_wants_keyboard_input() =>
+            {
+                cx.push(LabelsCommand::Undo);
             }
             Event::PointerMoved(pos) if *held == Some(here) => {
                 cx.push(LabelsCommand::StrokeTo(easel.map.to_image(pos)));

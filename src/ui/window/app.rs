@@ -210,18 +210,17 @@ impl StudioApp {
             }
             _ => true,
         });
-        if commands
-            .iter()
-            .any(|c| matches!(c, Command::Labels(LabelsCommand::Undo) | Command::Labels(LabelsCommand::Redo)))
-        {
-            // The pen is not to be followed into another state.
-            self.lift_pen();
-        }
+        let travels = |c: &Command| matches!(c, Command::Labels(LabelsCommand::Undo | LabelsCommand::Redo));
+        let travels = commands.iter().any(travels);
         if commands.iter().any(|c| matches!(c, Command::Settings(SettingsCommand::ResetSettings))) {
             self.trees.clear();
         }
         let before = self.state.settings.workspace;
         requests.extend(self.runtime.tick(&mut self.state, commands));
+        if travels && !self.state.document.has_open_polygon() {
+            // The pen is not to be followed into another state.
+            self.lift_pen();
+        }
         if self.state.settings.workspace != before {
             // The pen is not to be followed into another workspace.
             self.lift_pen();
@@ -490,10 +489,19 @@ impl eframe::App for StudioApp {
                 || cx.shared.dialogs.is_path_box_open()
                 || cx.state.document.question.is_some();
             let state = cx.state;
+            let export = &state.export;
+            let place = shortcuts::Place {
+                covered,
+                dialog: export.asking
+                    || export.asking_masks
+                    || export.importing.is_some()
+                    || cx.shared.dialogs.is_waiting(),
+                labeling: state.is_labeling(),
+            };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
             let keys = &state.settings.keys;
             let pressed =
-                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, covered, possible) };
+                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, place, possible) };
             for action in pressed {
                 if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;

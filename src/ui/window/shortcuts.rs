@@ -24,21 +24,31 @@ fn key_named(key: EKey) -> Option<Key> {
     Key::iter().find(|known| key_of(*known) == key)
 }
 
+/// The place at which keys arrive.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Place {
+    /// True where something covers the panes: keys are its own, Escape closes it and nothing else.
+    pub covered: bool,
+    /// True where a form or a dialog is open beside the panes: of the keys without Ctrl, Escape alone is an action's.
+    pub dialog: bool,
+    /// True where masks are drawn: only there single letters change labels.
+    pub labeling: bool,
+}
+
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
 ///
 /// The key of an action that is not `possible` now is left to what else wants it (Enter to a focused button).
-/// While something covers the panes (`covered`) they are its own: Escape closes it and nothing else.
 pub(crate) fn pressed(
     ctx: &egui::Context,
     keys: &Bindings,
-    covered: bool,
+    place: Place,
     possible: impl Fn(Action) -> bool,
 ) -> Vec<Action> {
     let pressed = |e: &egui::Event| matches!(e, egui::Event::Key { pressed: true, .. } | egui::Event::Copy);
     if !ctx.input(|input| input.events.iter().any(pressed)) {
         return Vec::new();
     }
-    let typing = covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
+    let typing = place.covered || ctx.egui_wants_keyboard_input() || egui::Popup::is_any_open(ctx);
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
@@ -52,6 +62,12 @@ pub(crate) fn pressed(
                 continue;
             }
             if typing && s.key.is_for_text() {
+                continue;
+            }
+            if place.dialog && !s.ctrl && !s.key.is_function() && s.key != Key::Escape {
+                continue;
+            }
+            if !place.labeling && !s.ctrl && !s.alt && action.is_of_labeling() {
                 continue;
             }
             let mut hit = false;
@@ -104,14 +120,40 @@ mod tests {
     }
 
     fn press(keys: &Bindings, key: EKey, modifiers: Modifiers) -> Vec<Action> {
+        press_at(Place { labeling: true, ..Place::default() }, keys, key, modifiers)
+    }
+
+    fn press_at(place: Place, keys: &Bindings, key: EKey, modifiers: Modifiers) -> Vec<Action> {
         let ctx = egui::Context::default();
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
-        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), keys, false, |_| true)));
+        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), keys, place, |_| true)));
         // No picture is made, so nobody uploads its textures.
         output.textures_delta.clear();
         got
+    }
+
+    #[test]
+    fn no_letter_changes_labels_where_no_mask_is_drawn_and_none_acts_under_a_dialog() {
+        let keys = Bindings::default();
+        let mut letters = 0;
+        for action in Action::iter() {
+            for s in keys.all(action).into_iter().filter(|s| !s.ctrl && !s.key.is_function()) {
+                let mut m = modifiers(s);
+                m.shift |= s.key.is_shifted();
+                let at = |place| press_at(place, &keys, key_of(s.key), m);
+                let elsewhere = if action.is_of_labeling() && !s.alt { vec![] } else { vec![action] };
+                letters += usize::from(elsewhere.is_empty());
+                assert_eq!(at(Place::default()), elsewhere, "{s}");
+                let escape = if s.key == Key::Escape { vec![action] } else { vec![] };
+                assert_eq!(at(Place { dialog: true, labeling: true, ..Place::default() }), escape, "{s}");
+            }
+        }
+        assert!(letters > 20, "{letters} letters are of labeling");
+        for action in [Action::AdoptAutomatic, Action::FillHoles, Action::ClearMask, Action::ResetMask, Action::Flag] {
+            assert!(action.is_of_labeling(), "{action:?}");
+        }
     }
 
     #[test]

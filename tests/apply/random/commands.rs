@@ -151,7 +151,7 @@ fn subject() -> impl Strategy<Value = Subject> {
         "prediction",
         "prediction:seed=7",
         "prediction:bundle=gen,steps=3,shift=raw",
-        "prediction:bundle=missing",
+        "prediction:bundle=\"not there, really\"",
         "mean:seeds=2",
         "stored",
     ];
@@ -221,7 +221,7 @@ fn mask() -> impl Strategy<Value = MaskSettings> {
 }
 
 /// Something that a person changes about the preferences.
-fn change() -> impl Strategy<Value = Change> {
+pub(super) fn change() -> impl Strategy<Value = Change> {
     let range = (number(), number(), any::<bool>());
     let range = range.prop_map(|(min_m, max_m, locked)| ColorRange { min_m, max_m, locked });
     let person = select(vec![String::new(), " Anna ".into(), "x".repeat(200)]);
@@ -346,6 +346,8 @@ fn evaluation() -> Evaluation {
         notes: Vec::new(),
         findings: Vec::new(),
         skipped: Vec::new(),
+        scored: 0,
+        of: 0,
         complete: true,
         setup: Setup::default(),
         runtime: String::new(),
@@ -503,6 +505,7 @@ draws! {
         })),
         6 StrokeTo(position()),
         6 EndStroke,
+        2 Close,
         1 CancelStroke,
         2 Corner(position()),
         4 CleanUp((any_of::<CleanKind>(), number()).prop_map(|(kind, size)| CleanUp { kind, size_mm: size.into() })),

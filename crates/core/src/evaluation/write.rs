@@ -185,8 +185,8 @@ pub fn latex(rows: &[Row]) -> String {
 }
 
 /// One line per method and column group with every figure and its interval.
-pub fn csv(rows: &[Row]) -> String {
-    let mut out = String::from("method,published,group,tools,grasps,images,without_pose");
+pub fn csv(rows: &[Row], of: usize) -> String {
+    let mut out = String::from("method,published,group,tools,grasps,data_set_pairs,images,without_pose");
     for name in COLUMNS.iter().map(|c| c.key) {
         out += &format!(",{name},{name}_low,{name}_high");
     }
@@ -195,8 +195,9 @@ pub fn csv(rows: &[Row]) -> String {
         for f in row.groups.iter().filter(|f| f.grasps > 0) {
             let method = row.method.replace('"', "\"\"");
             let group = f.group.short();
+            let of = if row.published { String::new() } else { of.to_string() };
             out += &format!(
-                "\"{method}\",{},{group},{},{},{},{}",
+                "\"{method}\",{},{group},{},{},{of},{},{}",
                 row.published, f.tools, f.grasps, f.images, f.without_pose
             );
             for column in COLUMNS {
@@ -246,7 +247,7 @@ mod tests {
         // Braces close, and every bare percent sign would begin a comment.
         assert_eq!(latex.matches('{').count(), latex.matches('}').count());
         assert_eq!(latex.matches('%').count(), latex.matches("\\%").count());
-        let csv = csv(&rows);
+        let csv = csv(&rows, 288);
         assert_eq!(csv.lines().count(), 1 + 2 * rows.len());
         assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,828,0,26.1,,"), "{csv}");
         let commas = |line: &str| line.replace("with, signs", "").matches(',').count();

@@ -173,6 +173,26 @@ impl Drawing {
         }
     }
 
+    /// Takes the last corner back; false where it was the first one, with which it began.
+    pub fn take_corner_back(&mut self) -> bool {
+        let (corners, by_clicks) = (self.points.len().saturating_sub(1), self.is_by_clicks());
+        let more = by_clicks && corners > 1;
+        if more {
+            self.points.remove(corners - 1);
+        }
+        more
+    }
+
+    /// Closes what is made of clicks: the corner that follows the pointer is none. False, and nothing changed, where fewer
+    /// than three corners were set.
+    pub fn close(&mut self) -> bool {
+        let closes = self.is_by_clicks() && self.points.len() > 3;
+        if closes {
+            self.points.pop();
+        }
+        closes
+    }
+
     /// The wand's tolerance as it was dragged, meters.
     pub fn tolerance_m(&self) -> Option<f32> {
         let DrawTool::Wand { tolerance_m } = self.tool else { return None };

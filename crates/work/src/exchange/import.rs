@@ -147,7 +147,8 @@ fn go(dataset: &Dataset, setup: &ImportSetup, write: bool, cx: &JobCx) -> Result
     if found.stopped && found.total() == 0 {
         cx.check(WHAT)?;
     }
-    found.complete = !found.stopped && found.unmatched.is_empty() && found.refused.is_empty();
+    let looked_at = found.total() + found.same + found.kept + found.judged;
+    found.complete = !found.stopped && looked_at > 0 && found.unmatched.is_empty() && found.refused.is_empty();
     Ok(found)
 }
 

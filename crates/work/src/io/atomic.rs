@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 use std::fs::{File, TryLockError};
-use std::io;
+use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Mutex, Once};
 use std::time::Duration;
 
 use tempfile::NamedTempFile;
@@ -32,7 +32,7 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
     sweep_once(folder);
     let mut temporary = temporary(folder)?;
     content(temporary.as_file_mut())?;
-    temporary.as_file().sync_all()?;
+    flushed(temporary.as_file().sync_all())?;
     temporary.persist(path).map_err(|err| err.error)?;
     // The rename itself is in the folder; not every system can flush a folder, and the content is safe already.
     #[cfg(unix)]
@@ -40,6 +40,24 @@ pub fn write(path: &Path, content: impl FnOnce(&mut File) -> io::Result<()>) -> 
         folder.sync_all().ok();
     }
     Ok(())
+}
+
+/// What flushing a file came to. Some mounts (network shares, folders of a virtual machine) cannot flush: what was written is
+/// kept there as well as they keep anything, and the log says so once.
+///
+/// # Errors
+/// Any other failure: the disk has not taken it.
+pub(super) fn flushed(result: io::Result<()>) -> io::Result<()> {
+    static SAID: Once = Once::new();
+    match result {
+        Err(err) if matches!(err.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported) => {
+            SAID.call_once(|| {
+                log::warn!("this disk cannot flush files ({err}): a power cut may lose what was saved last")
+            });
+            Ok(())
+        }
+        other => other,
+    }
 }
 
 /// [`write()`] with the bytes at hand.
@@ -131,6 +149,16 @@ mod tests {
         assert_eq!(std::fs::read(&target).unwrap(), b"mine");
         assert_eq!(std::fs::read(&link).unwrap(), b"new");
         assert!(!std::fs::symlink_metadata(&link).unwrap().is_symlink());
+    }
+
+    #[test]
+    fn a_disk_that_cannot_flush_takes_what_is_written_and_one_that_fails_does_not() {
+        for kind in [ErrorKind::InvalidInput, ErrorKind::Unsupported] {
+            assert!(flushed(Err(kind.into())).is_ok());
+        }
+        for kind in [ErrorKind::StorageFull, ErrorKind::Other, ErrorKind::QuotaExceeded] {
+            assert_eq!(flushed(Err(kind.into())).unwrap_err().kind(), kind);
+        }
     }
 
     #[test]

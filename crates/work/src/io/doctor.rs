@@ -110,6 +110,7 @@ impl FewInvalid {
 #[derive(Default)]
 struct Turned {
     pairs: usize,
+    mirrored: usize,
     first: Option<(Turn, PathBuf)>,
 }
 
@@ -117,12 +118,27 @@ impl Turned {
     fn add(&mut self, dataset: &Dataset, id: PairId, laid: Turn) {
         if laid != Turn::default() {
             self.pairs += 1;
+            self.mirrored += usize::from(laid.mirrored);
             self.first.get_or_insert_with(|| (laid, dataset.pair_files(id).first().cloned().unwrap_or_default()));
         }
     }
 
     fn problem(self, examined: usize) -> Option<Problem> {
         let (laid, file) = self.first?;
+        // Exchanged colors look like a mirror. Pictures made for training are mirrored now and then, not all of them.
+        if self.mirrored == examined && examined > 1 {
+            return Some(Problem {
+                file,
+                what: format!(
+                    "red and blue are exchanged in all {examined} pairs, or all of them are mirrored, as this one ({laid}); \
+                     the light's colors tell"
+                ),
+                hint:
+                    "OpenCV has pixels as blue, green, red: write them as red, green, blue; pictures that are mirrored \
+                       are read upright as they are"
+                        .into(),
+            });
+        }
         Some(Problem {
             file,
             what: format!(

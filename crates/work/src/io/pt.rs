@@ -132,6 +132,12 @@ impl PtDict {
         keys
     }
 
+    /// The keys, among these, whose values are stored as bfloat16, which has three digits.
+    pub(crate) fn coarse<'a>(&self, keys: &[&'a str]) -> Vec<&'a str> {
+        let coarse = |key: &&str| self.reader.get(key).is_some_and(|tensor| tensor.dtype() == DType::BF16);
+        keys.iter().copied().filter(coarse).collect()
+    }
+
     /// The shape of the tensor under `key`, if there is one.
     pub fn shape(&self, key: &str) -> Option<&[usize]> {
         self.reader.get(key).map(pytorch_reader::Tensor::shape)

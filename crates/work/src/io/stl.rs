@@ -1,5 +1,8 @@
 //! STL meshes: binary and text, with equal corners welded so that edges can be followed.
 
+mod other;
+mod speck;
+
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
@@ -138,6 +141,8 @@ pub struct StlFile {
     pub degenerate: usize,
     /// The factor that would bring the mesh to meters, where its size says that it is in another unit.
     pub suggested_scale: Option<f64>,
+    /// Faults of the file that it was read in spite of.
+    pub mended: Vec<String>,
 }
 
 /// Most bytes of a model: five million triangles. Welding takes about five times as much memory.
@@ -147,77 +152,113 @@ const RECORD: usize = 50;
 
 /// Reads a binary or text STL.
 ///
-/// Corners with the same coordinates become one vertex; triangles without area are dropped and counted.
+/// Corners with the same coordinates become one vertex; triangles without area are dropped and counted; a speck far from the
+/// rest is left out and named.
 ///
 /// # Errors
 /// [`MeshError`].
 pub fn read(path: &Path) -> Result<StlFile, MeshError> {
     let bytes =
         super::files::read(path, MAX_BYTES).map_err(|source| MeshError::Io { file: path.to_owned(), source })?;
-    weld(path, corners(path, &bytes)?)
+    let mut mended = Vec::new();
+    let corners = corners(path, &bytes, &mut mended)?;
+    let mut file = weld(path, corners)?;
+    mended.extend(speck::leave_out(&mut file.mesh));
+    file.suggested_scale = suggested_scale(&file.mesh);
+    Ok(StlFile { mended, ..file })
 }
 
-fn corners(path: &Path, bytes: &[u8]) -> Result<Vec<[[f32; 3]; 3]>, MeshError> {
-    let not_stl = |reason: &str| MeshError::NotStl { file: path.to_owned(), reason: reason.into() };
+type Corners = Vec<[[f32; 3]; 3]>;
+
+fn corners(path: &Path, bytes: &[u8], mended: &mut Vec<String>) -> Result<Corners, MeshError> {
+    let not_stl = |reason: String| MeshError::NotStl { file: path.to_owned(), reason };
     let count = bytes.get(80..HEADER).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
     let expected = |n: u32| HEADER as u64 + RECORD as u64 * u64::from(n);
     // Some binary files also start with "solid": the length decides.
     if let Some(n) = count.filter(|&n| expected(n) == bytes.len() as u64) {
-        let mut out = Vec::with_capacity(n as usize);
-        for record in bytes[HEADER..].chunks_exact(RECORD) {
-            let value = |i: usize| {
-                let at = 12 + 4 * i;
-                f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
-            };
-            out.push(std::array::from_fn(|c| std::array::from_fn(|k| value(3 * c + k))));
-        }
-        return Ok(out);
+        return Ok(records(bytes, n as usize));
     }
-    let start = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(0);
-    if bytes[start..].len() >= 5 && bytes[start..start + 5].eq_ignore_ascii_case(b"solid") {
-        let text = std::str::from_utf8(bytes).map_err(|_| not_stl("it starts like a text STL but is not text"))?;
-        return text_corners(text).map_err(|reason| not_stl(&reason));
+    // Text has no zero bytes, in whatever letters it is written; the numbers of a binary file do.
+    let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
+    let solid = text.get(..5).is_some_and(|word| word.eq_ignore_ascii_case(b"solid"));
+    if solid && !text.iter().take(1024).any(|&byte| byte == 0) {
+        return text_corners(&String::from_utf8_lossy(text), mended).map_err(not_stl);
     }
-    match count {
-        Some(n) => Err(MeshError::Truncated {
-            file: path.to_owned(),
-            triangles: n,
-            expected: expected(n),
-            found: bytes.len() as u64,
-        }),
-        None => Err(not_stl("the file is shorter than an STL header")),
+    if let Some(what) = other::named(bytes) {
+        return Err(not_stl(what.into()));
     }
+    let Some(n) = count else { return Err(not_stl("the file is shorter than an STL header".into())) };
+    let (there, behind) = ((bytes.len() - HEADER) / RECORD, (bytes.len() - HEADER) % RECORD);
+    let said = n as usize;
+    let off_by_one = said.abs_diff(there) == 1 || said == 0;
+    if behind == 0 && there > 0 && off_by_one {
+        mended.push(format!("its head announces {said} triangles and {there} follow: all {there} are read"));
+        return Ok(records(bytes, there));
+    }
+    // More behind the model than in it is no model with something behind it.
+    let left = bytes.len() as u64 - expected(said.min(there) as u32);
+    if said > 0 && said <= there && left < expected(n) {
+        let s = if left == 1 { "" } else { "s" };
+        mended.push(format!("{left} byte{s} behind the last triangle left out"));
+        return Ok(records(bytes, said));
+    }
+    Err(MeshError::Truncated { file: path.to_owned(), triangles: n, expected: expected(n), found: bytes.len() as u64 })
 }
 
-fn text_corners(text: &str) -> Result<Vec<[[f32; 3]; 3]>, String> {
+/// The triangles of a binary file that has so many.
+fn records(bytes: &[u8], count: usize) -> Corners {
+    let triangle = |record: &[u8]| {
+        let value = |i: usize| {
+            let at = 12 + 4 * i;
+            f32::from_le_bytes([record[at], record[at + 1], record[at + 2], record[at + 3]])
+        };
+        std::array::from_fn(|c| std::array::from_fn(|k| value(3 * c + k)))
+    };
+    bytes[HEADER..].chunks_exact(RECORD).take(count).map(triangle).collect()
+}
+
+fn text_corners(text: &str, mended: &mut Vec<String>) -> Result<Corners, String> {
     let mut out = Vec::new();
     let mut open: Vec<[f32; 3]> = Vec::with_capacity(3);
-    let mut ended = false;
-    for (number, line) in text.lines().enumerate() {
+    let (mut in_facet, mut ended) = (false, false);
+    // Old Macs ended lines with CR alone.
+    let lines = text.split(if text.contains('\n') { '\n' } else { '\r' });
+    for (number, line) in lines.enumerate() {
         let mut words = line.split_ascii_whitespace();
-        match words.next().map(str::to_ascii_lowercase).as_deref() {
-            Some("vertex") => {
+        let mut word = words.next().unwrap_or_default().to_ascii_lowercase();
+        if word == "end" {
+            word += &words.next().unwrap_or_default().to_ascii_lowercase();
+        }
+        match word.as_str() {
+            "facet" => in_facet = true,
+            "vertex" => {
                 let mut corner = [0f32; 3];
                 for value in &mut corner {
+                    // Fortran writes 1.0D-02.
+                    let number_of = |word: &str| word.replace(['d', 'D'], "e").parse().ok();
                     *value = words
                         .next()
-                        .and_then(|w| w.parse().ok())
+                        .and_then(number_of)
                         .ok_or_else(|| format!("line {} is not a corner", number + 1))?;
                 }
                 open.push(corner);
             }
-            Some("endfacet") => {
+            "endfacet" => {
                 let triangle = <[[f32; 3]; 3]>::try_from(open.as_slice())
                     .map_err(|_| format!("the facet ending at line {} has {} corners", number + 1, open.len()))?;
                 out.push(triangle);
                 open.clear();
+                in_facet = false;
             }
-            Some("endsolid") => ended = true,
+            "endsolid" => ended = true,
             _ => {}
         }
     }
-    if !ended || !open.is_empty() {
-        return Err("the text ends before \"endsolid\"".into());
+    if in_facet || !open.is_empty() {
+        return Err("the text ends within a facet".into());
+    }
+    if !ended {
+        mended.push("the text ends without \"endsolid\": its end may be missing".into());
     }
     Ok(out)
 }
@@ -249,8 +290,7 @@ fn weld(path: &Path, corners: Vec<[[f32; 3]; 3]>) -> Result<StlFile, MeshError> 
     if mesh.triangles.is_empty() {
         return Err(MeshError::Empty { file: path.to_owned(), dropped: degenerate });
     }
-    let suggested_scale = suggested_scale(&mesh);
-    Ok(StlFile { mesh, degenerate, suggested_scale })
+    Ok(StlFile { mesh, degenerate, suggested_scale: None, mended: Vec::new() })
 }
 
 /// The factor that brings a model to meters whose size says that it is in another unit.
@@ -316,7 +356,7 @@ mod tests {
         let file = read(&path).unwrap();
         assert_eq!((file.mesh.triangles.len(), file.degenerate), (1, 1));
         for (bad, word) in [
-            (format!("solid a\n{good}"), "endsolid"),
+            (format!("solid a\n{good}facet\nvertex 1 2 3\n"), "within a facet"),
             ("solid a\nfacet\nvertex 1 2\nendfacet\nendsolid".into(), "line 3"),
             ("solid a\nfacet\nvertex 1 2 3\nendfacet\nendsolid".into(), "1 corners"),
             (format!("solid a\n{flat}endsolid"), "no triangle"),
@@ -327,6 +367,103 @@ mod tests {
             std::fs::write(&path, bad).unwrap();
             let text = read(&path).unwrap_err().to_string();
             assert!(text.contains(word) && text.contains("t.stl"), "{text}");
+        }
+    }
+
+    /// A binary file with this head, so many triangles announced, and bytes behind them.
+    fn binary(head: &str, announced: u32, behind: &[u8]) -> Vec<u8> {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        write(&path, &tetrahedron(0.03)).unwrap();
+        let mut bytes = std::fs::read(&path).unwrap();
+        bytes[..head.len()].copy_from_slice(head.as_bytes());
+        bytes[80..84].copy_from_slice(&announced.to_le_bytes());
+        [&bytes, behind].concat()
+    }
+
+    /// The tetrahedron as text, with other words in the place of some.
+    fn text(replace: &[(&str, &str)]) -> Vec<u8> {
+        let mesh = tetrahedron(0.03);
+        let facet = |index| {
+            let corner = |c: DVec3| format!("vertex {:.5e} {:.5e} {:.5e}\n", c.x, c.y, c.z);
+            let corners: String = mesh.corners(index).map(corner).concat();
+            format!("facet normal 0 0 0\nouter loop\n{corners}endloop\nendfacet\n")
+        };
+        let mut text = format!("solid bar\n{}endsolid bar\n", (0..4).map(facet).collect::<String>());
+        for (from, to) in replace {
+            assert!(text.contains(from), "{from}");
+            text = text.replace(from, to);
+        }
+        text.into_bytes()
+    }
+
+    #[test]
+    fn what_other_programs_write_is_read_and_what_was_mended_is_said() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        let far = |mesh: &TriMesh| {
+            let mut out = mesh.clone();
+            out.vertices.extend([[10., 10., 10.], [10.002, 10., 10.], [10., 10.002, 10.]].map(DVec3::from_array));
+            out.triangles.push([4, 5, 6]);
+            write(&path, &out).unwrap();
+            std::fs::read(&path).unwrap()
+        };
+        let latin = [&text(&[])[..6], b"Schl\xfcssel \xb9\xa4\xbe\xdf", &text(&[])[9..]].concat();
+        let files: [(&str, Vec<u8>, Option<&str>); 14] = [
+            ("sound", binary("bar", 4, b""), None),
+            ("one byte behind", binary("bar", 4, b"\0"), Some("1 byte behind")),
+            ("two bytes behind", binary("bar", 4, b"\0\0"), Some("2 bytes behind")),
+            ("solid in the head", binary("solid part", 4, b"\0"), Some("1 byte behind")),
+            ("count of zero", binary("bar", 0, b""), Some("announces 0 triangles and 4 follow")),
+            ("one too many", binary("bar", 5, b""), Some("announces 5")),
+            ("one too few", binary("bar", 3, b""), Some("announces 3")),
+            ("text", text(&[]), None),
+            ("end solid", text(&[("endsolid", "end solid"), ("endfacet", "end facet")]), None),
+            ("no end", text(&[("endsolid bar\n", "")]), Some("without \"endsolid\"")),
+            ("CR alone", text(&[("\n", "\r")]), None),
+            ("Fortran", text(&[("e-2", "D-02")]), None),
+            ("other letters", latin, None),
+            ("UTF-8 mark", [b"\xef\xbb\xbf", text(&[]).as_slice()].concat(), None),
+        ];
+        let sound = tetrahedron(0.03);
+        for (what, bytes, note) in files {
+            std::fs::write(&path, bytes).unwrap();
+            let file = read(&path).unwrap_or_else(|err| panic!("{what}: {err}"));
+            assert_eq!((file.mesh.triangles.len(), file.mesh.vertices.len()), (4, 4), "{what}");
+            assert!((file.mesh.area() - sound.area()).abs() < 1e-7 && file.suggested_scale.is_none(), "{what}");
+            assert_eq!(file.mended.len(), usize::from(note.is_some()), "{what}: {:?}", file.mended);
+            assert!(file.mended.iter().all(|said| said.contains(note.unwrap())), "{what}: {:?}", file.mended);
+        }
+        let speck = far(&sound);
+        std::fs::write(&path, speck).unwrap();
+        let file = read(&path).unwrap();
+        assert_eq!((file.mesh.triangles.len(), file.mesh.vertices.len(), file.suggested_scale), (4, 4, None));
+        assert!(file.mended[0].contains("1 triangle") && file.mended[0].contains("left out"), "{:?}", file.mended);
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_called_by_its_name() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.stl");
+        let long = |head: &str| [head.as_bytes(), &b" \n# filler".repeat(60)].concat();
+        for (bytes, word) in [
+            (b"version https://git-lfs.github.com/spec/v1\noid sha256:00\nsize 3\n".to_vec(), "git lfs pull"),
+            (b"\x1f\x8b\x08\0\0\0\0\0".to_vec(), "gzip"),
+            (long("<!DOCTYPE html><html>"), "web page"),
+            (long("  <html>"), "web page"),
+            (long("ply\nformat ascii 1.0"), "PLY"),
+            (long("# Blender\nmtllib a.mtl\nv 0 0 0\nv 1 0 0\n"), "OBJ"),
+            (long("v 0 0 0\nv 1 0 0\nf 1 2 3"), "OBJ"),
+            (b"PK\x03\x04\x14\0".to_vec(), "zip"),
+            (long("ISO-10303-21;\nHEADER;"), "STEP"),
+        ] {
+            std::fs::write(&path, &bytes).unwrap();
+            let error = read(&path).unwrap_err();
+            let said = error.to_string();
+            assert!(
+                matches!(error, MeshError::NotStl { .. }) && said.contains(word) && said.contains("t.stl"),
+                "{said}"
+            );
         }
     }
 

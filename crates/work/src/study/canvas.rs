@@ -107,6 +107,8 @@ pub fn svg<D: Drawing>(drawing: &D) -> anyhow::Result<String> {
     let mut out = String::new();
     let [width, height] = drawing.size();
     draw(SVGBackend::with_string(&mut out, (width, height)), 1.0, drawing)?;
+    // XML has no place for control letters, which a name may hold.
+    out.retain(|letter| !letter.is_control() || letter == '\n');
     // Behind the opening tag, and so below everything else.
     let at = out.find("<svg").and_then(|from| Some(from + out[from..].find('>')? + 1)).context("no SVG was drawn")?;
     let RGBColor(r, g, b) = drawing.ground();
@@ -193,7 +195,7 @@ mod tests {
         fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
             paper.line(&[[0.0, 20.0], [60.0, 20.0]], RED, 4.0)?;
             paper.area.draw(&Circle::new((paper.px(30.0), paper.px(8.0)), paper.wide(5.0), BLUE.filled()))?;
-            paper.text([5.0, 26.0], &paper.letters(11.0, BLACK), "a<b")
+            paper.text([5.0, 26.0], &paper.letters(11.0, BLACK), "a<\u{b}b")
         }
     }
 

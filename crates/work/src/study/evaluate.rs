@@ -34,7 +34,7 @@ use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
-pub use export::{Report, export, rows};
+pub use export::{Report, csv, export, latex, markdown, rows};
 
 /// Name of the task in errors.
 const WHAT: &str = "Evaluate";
@@ -119,6 +119,10 @@ pub struct Evaluation {
     pub findings: Vec<Finding>,
     /// Grasps and tools that were left out, and why.
     pub skipped: Vec<Skipped>,
+    /// Grasps in the table.
+    pub scored: usize,
+    /// Pairs of the data set.
+    pub of: usize,
     /// True where everything asked for was scored; false if stopped early.
     pub complete: bool,
     /// Settings of the evaluation.
@@ -144,16 +148,53 @@ pub fn evaluate(
     models: &models::Models,
     cx: &JobCx,
 ) -> Result<Evaluation, TaskError> {
-    let start = Instant::now();
     cx.progress(0, 0, "loading the models");
     let sheets = models.sheets().clone();
-    let mut models = Models::open(setup, dataset, models)?;
+    let models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
-    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
-    if total == 0 {
+    if work.iter().all(|tool| tool.ids.is_empty()) {
         return Err(TaskError::new(WHAT, "the data set has no pairs"));
     }
     let book = KeptScores::open(dataset, setup, &models, &sheets, &work, false);
+    score(dataset, setup, models, (&work, &book), false, cx)
+}
+
+/// The table of the grasps whose figures are kept by every method that has any, without computing any; `None` where there
+/// are none. A generator of which nothing is kept gets no row.
+///
+/// # Errors
+/// If a bundle cannot be opened.
+pub fn kept(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Option<Evaluation>, TaskError> {
+    let opened = Models::open(setup, dataset, models)?;
+    let mut work = load::plan(dataset, setup);
+    let book = KeptScores::open(dataset, setup, &opened, models.sheets(), &work, true);
+    let ids = || work.iter().flat_map(|tool| tool.ids.iter().copied());
+    let first = opened.before_generators();
+    let known = |at: &usize| ids().any(|id| book.has(first + at, id));
+    let bundles: Vec<Origin> = (0..setup.bundles.len()).filter(known).map(|at| setup.bundles[at].clone()).collect();
+    if bundles.len() < setup.bundles.len() && !bundles.is_empty() {
+        return kept(dataset, &Setup { bundles, ..setup.clone() }, models);
+    }
+    if bundles.is_empty() || !ids().any(|id| book.is_whole(id)) {
+        return Ok(None);
+    }
+    let planned = ids().count();
+    work.iter_mut().for_each(|tool| tool.ids.retain(|id| book.is_whole(*id)));
+    let table = score(dataset, setup, opened, (&work, &book), true, &JobCx::unwatched())?;
+    Ok(Some(Evaluation { complete: table.scored == planned, ..table }))
+}
+
+/// Scores the grasps of `work` whose figures are not kept; `as_kept` leaves those that are as they are.
+fn score(
+    dataset: &Dataset,
+    setup: &Setup,
+    mut models: Models,
+    (work, book): (&[ToolWork], &KeptScores),
+    as_kept: bool,
+    cx: &JobCx,
+) -> Result<Evaluation, TaskError> {
+    let start = Instant::now();
+    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
     let missing = |tool: &ToolWork| ToolWork {
         tool: tool.tool.clone(),
         ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
@@ -172,7 +213,7 @@ pub fn evaluate(
     let mut whole = work.iter();
     load::ahead(dataset, setup, &todo, cx, |batch| {
         let name = batch.work.tool.as_deref().unwrap_or("pictures");
-        let mut tool = tool::Tool::new(dataset, batch.work, &book, &mut skipped);
+        let mut tool = tool::Tool::new(dataset, batch.work, book, &mut skipped);
         for cases in batch.cases {
             if cx.cancel.is_cancelled() {
                 break;
@@ -194,7 +235,8 @@ pub fn evaluate(
         }
         let ids = whole.next().map_or(&[][..], |tool| &tool.ids);
         let mut again = |at: usize, ids: &[PairId]| tool::again(dataset, setup, &mut models.methods[at], ids, cx);
-        let entries = tool.finish(ids, &mut again, &mut scores, &mut skipped);
+        let again: Option<tool::MakeAgain<'_>> = if as_kept { None } else { Some(&mut again) };
+        let entries = tool.finish(ids, again, &mut scores, &mut skipped);
         // Of each grasp once, whatever the number of methods.
         let mut noted = BTreeSet::new();
         for (at, entry) in entries {
@@ -225,6 +267,15 @@ pub fn evaluate(
     notes.append(&mut models.missing(setup, &dataset.rig, scale));
     notes.append(&mut models.masks_made_otherwise());
     notes.extend(evaluation::few_features(&scores, &groups));
+    let methods = 0..if as_kept { scores.len() } else { 0 };
+    let other_range: usize = methods
+        .map(|method| work.iter().map(|tool| tool::of_other_range(book, method, &tool.ids)).sum::<usize>())
+        .sum();
+    if other_range > 0 {
+        notes.push(format!(
+            "The SSIM of {other_range} grasps is in the range of another selection of pairs: evaluate again to have it in this one's"
+        ));
+    }
     Ok(Evaluation {
         dataset: dataset.title.clone(),
         rows,
@@ -234,6 +285,8 @@ pub fn evaluate(
         notes,
         findings: findings.into_list(),
         skipped,
+        scored: scores.iter().map(|s| s.grasps.len()).max().unwrap_or_default(),
+        of: dataset.index.pairs.len(),
         complete: done == total && !cx.cancel.is_cancelled(),
         setup: setup.clone(),
         runtime: format!("{}, {} thread(s), {} images at a time", models.engine(), threads(), setup.batch.max(1)),

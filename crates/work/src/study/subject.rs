@@ -13,7 +13,8 @@ pub const SEEDS: std::ops::RangeInclusive<usize> = 2..=16;
 /// Subject of a comparison, on either side of it: a rule that each pair resolves for itself.
 ///
 /// As text: `measured`, `prediction`, `mean`, `stored`; a prediction and a mean are followed by what differs from the
-/// settings, as in `prediction:bundle=fitted,seed=7,steps=50,shift=raw` or `mean:seeds=4`.
+/// settings, as in `prediction:bundle=fitted,seed=7,steps=50,shift=raw` or `mean:seeds=4`. A name with a comma stands in
+/// quotes: `prediction:bundle="trained at home, twice"`.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Subject {
@@ -165,7 +166,7 @@ impl std::fmt::Display for Subject {
         let change = self.change().cloned().unwrap_or_default();
         let parts = [
             seeds,
-            change.bundle.map(|bundle| format!("bundle={bundle}")),
+            change.bundle.map(|bundle| format!("bundle={}", quoted(bundle))),
             change.seed.map(|seed| format!("seed={seed}")),
             change.steps.map(|steps| format!("steps={steps}")),
             change.shift.map(|shift| format!("shift={}", shift.key())),
@@ -183,10 +184,13 @@ impl FromStr for Subject {
         use strum::IntoEnumIterator as _;
         let (name, rest) = text.split_once(':').unwrap_or((text, ""));
         let (mut change, mut seeds) = (RecipeChange::default(), None);
-        for part in rest.split(',').map(str::trim).filter(|part| !part.is_empty()) {
+        for part in parts(rest).map(str::trim).filter(|part| !part.is_empty()) {
             let (key, value) = part.split_once('=').ok_or_else(|| format!("\"{part}\" is not KEY=VALUE"))?;
             let wrong = || format!("{key} cannot be \"{value}\"");
             match key.trim() {
+                "bundle" if value.starts_with('"') => {
+                    change.bundle = Some(serde_json::from_str(value).map_err(|_| wrong())?);
+                }
                 "bundle" => change.bundle = Some(value.to_owned()),
                 "seed" => change.seed = Some(value.parse().map_err(|_| wrong())?),
                 "steps" => {
@@ -207,6 +211,23 @@ impl FromStr for Subject {
             _ => Err(format!("\"{name}\" is none of measured, prediction, mean, stored")),
         }
     }
+}
+
+/// The name as it is written: in quotes where it would not be read back without.
+fn quoted(name: String) -> String {
+    let plain = !name.is_empty() && name.trim() == name && !name.contains([',', '"']);
+    if plain { name } else { serde_json::Value::String(name).to_string() }
+}
+
+/// The parts of a text between commas; a comma in quotes belongs to its part.
+fn parts(text: &str) -> impl Iterator<Item = &str> {
+    let (mut in_quotes, mut escaped) = (false, false);
+    text.split(move |c| {
+        let comma = c == ',' && !in_quotes;
+        in_quotes ^= c == '"' && !escaped;
+        escaped = c == '\\' && in_quotes && !escaped;
+        comma
+    })
 }
 
 impl TryFrom<String> for Subject {
@@ -249,6 +270,12 @@ mod tests {
             assert!(!subject.label().is_empty());
         }
         assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(RecipeChange::default(), 8));
+        let names = ["trained, twice", "a \"b\", c", r"C:\models\", r"a\", "", " ", "a=b:c", "\u{89e6}, \n\""];
+        for bundle in names.map(|name| Some(name.to_owned())) {
+            let change = RecipeChange { bundle, seed: Some(7), ..RecipeChange::default() };
+            let subject = Subject::Predicted(change);
+            assert_eq!(subject.to_string().parse::<Subject>().unwrap(), subject);
+        }
     }
 
     #[test]
@@ -278,6 +305,7 @@ mod tests {
             ("prediction:seed", "KEY=VALUE"),
             ("prediction:colour=red", "none of bundle"),
             ("mean:seeds=99", "cannot be"),
+            ("prediction:bundle=\"a, b", "cannot be"),
         ] {
             let why = text.parse::<Subject>().unwrap_err();
             assert!(why.contains(word), "{text}: {why}");

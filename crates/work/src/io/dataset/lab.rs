@@ -396,10 +396,17 @@ impl Scanner {
         candidates.extend(root.parent().map(|p| p.join("tools_stls")));
         for folder in candidates {
             let Ok(entries) = std::fs::read_dir(&folder) else { continue };
-            for path in entries.flatten().map(|e| e.path()) {
-                let is_stl = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("stl"));
-                if let (true, Some(stem)) = (is_stl, path.file_stem()) {
-                    meshes.entry(stem.to_string_lossy().into_owned()).or_insert(path);
+            let mut models: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
+            models.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl")));
+            // Small letters first, whatever order the folder has.
+            models.sort_by(|a, b| b.cmp(a));
+            for path in models {
+                let Some(stem) = path.file_stem() else { continue };
+                let first = meshes.entry(stem.to_string_lossy().into_owned()).or_insert_with(|| path.clone());
+                if *first != path && first.parent() == path.parent() {
+                    let used = first.file_name().unwrap_or_default().to_string_lossy().into_owned();
+                    let what = format!("a second CAD model of the same name: {used} is used");
+                    self.problems.push(problem(path, what, "delete or rename the one that is not the tool's"));
                 }
             }
         }

@@ -15,6 +15,8 @@
 //! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colors tell
 //!   ([`touch2touch_core::upright`]), and both are laid upright again.
 
+mod lengths;
+
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -118,6 +120,11 @@ fn scan_as(folder: &Path, rig: Arc<Rig>) -> Option<Scan> {
         };
         let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
         let lower = name.to_ascii_lowercase();
+        if lower == RIG_JSON && name != RIG_JSON && !folder.join(RIG_JSON).exists() {
+            let what =
+                format!("the sensors are declared in {RIG_JSON} alone: this name has other letters and is not read");
+            problems.push(problem(&path, what, "rename it to rig.json"));
+        }
         let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
         if name.starts_with('.') {
             continue;
@@ -191,10 +198,24 @@ impl Pictures {
 
     /// A gray picture that lay this way in its file, upright.
     pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
+        Ok(self.tile_and_note(id, kind, laid)?.map(|(tile, _)| tile))
+    }
+
+    /// The picture of [`Self::tile`], and what to say of its file.
+    fn tile_and_note(
+        &self,
+        id: PairId,
+        kind: usize,
+        laid: Turn,
+    ) -> Result<Option<(Grid<f32>, Option<Problem>)>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
-        let tile = images::read_gray(path)?;
+        let (tile, note) = match images::read_depth(path)? {
+            Ok(values) => lengths::levels(path, &values)?,
+            Err(tile) => (tile, None),
+        };
         // Pairs are turned as squares; in another shape a quarter turn would not fit back.
-        Ok(Some(if tile.width() == tile.height() || laid.quarters.is_multiple_of(2) { laid.undo(&tile) } else { tile }))
+        let upright = tile.width() == tile.height() || laid.quarters.is_multiple_of(2);
+        Ok(Some((if upright { laid.undo(&tile) } else { tile }, note)))
     }
 
     /// The upright difference image, and how it lay where the colors tell.
@@ -241,7 +262,15 @@ impl Pictures {
             touch.set(color_id, ColorTouch { images: None, difference });
         }
         let laid = reading.map_or_else(Turn::default, |read| read.turn);
-        if let Some(tile) = self.tile(id, BUBBLE, laid)? {
+        for file in self.files(id) {
+            let behind = images::bytes_behind(&file);
+            if behind > 0 {
+                let what = format!("{behind} bytes stand behind the end of the JPEG");
+                notes.push(problem(file, what, "they are left out; write only the bytes that the encoder returned"));
+            }
+        }
+        if let Some((tile, note)) = self.tile_and_note(id, BUBBLE, laid)? {
+            notes.extend(note);
             let [w, h] = tile.size();
             let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
             if w < 16 || h < 16 {

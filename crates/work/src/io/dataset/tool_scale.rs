@@ -181,7 +181,7 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
         Some(scale) => (scale, "the caller".to_owned()),
         None => (ToolScale::beside(path)?.unwrap_or_default(), format!("{}", path.with_file_name(UNIT_FILE).display())),
     };
-    let stl::StlFile { mut mesh, degenerate, .. } = stl::read(path)?;
+    let stl::StlFile { mut mesh, degenerate, mended, .. } = stl::read(path)?;
     let size = mesh.bounds().map_or(0.0, |[lo, hi]| (hi - lo).max_element());
     let fitting = scale_to_meters(size);
     let not_a_tool = |unit: String| MeshError::NotATool { file: path.to_owned(), size, unit };
@@ -208,7 +208,14 @@ pub(crate) fn read_tool(path: &Path, scale: Option<ToolScale>) -> Result<ToolFil
             "they are left out; repair the mesh if edges look frayed",
         )
     });
-    Ok(ToolFile { mesh, notes: notes.into_iter().collect() })
+    let mended = mended.into_iter().map(|what| {
+        problem(
+            path,
+            format!("the CAD model: {what}"),
+            "it is used so; export it again from the CAD program if it looks wrong",
+        )
+    });
+    Ok(ToolFile { mesh, notes: notes.into_iter().chain(mended).collect() })
 }
 
 /// The mesh of [`read_tool`].

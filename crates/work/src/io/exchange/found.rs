@@ -122,8 +122,10 @@ fn mask_of(file: &Path, size: [usize; 2], values: impl Iterator<Item = f32> + Cl
 }
 
 fn picture(file: &Path) -> Result<Mask, ReadError> {
-    let gray = images::read_gray8(file).map_err(|err| ReadError::new(file, unplaced(&err, file), err.hint()))?;
-    mask_of(file, gray.size(), gray.as_slice().iter().map(|&v| f32::from(v)))
+    let levels = images::read_mask(file).map_err(|err| ReadError::new(file, unplaced(&err, file), err.hint()))?;
+    // 65,535 is to 16 bits what 255 is to 8.
+    let level = |&v: &u16| if v == u16::MAX { 255.0 } else { f32::from(v) };
+    mask_of(file, levels.size(), levels.as_slice().iter().map(level))
 }
 
 fn array(file: &Path) -> Result<Mask, ReadError> {

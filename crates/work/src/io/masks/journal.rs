@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use serde::Serialize;
 
 use super::{MaskStore, StoreError};
-use crate::io::{files, names};
+use crate::io::{atomic, files, names};
 
 /// The file that is locked while labels are written.
 const LOCK: &str = ".lock";
@@ -59,7 +59,7 @@ impl MaskStore {
             }
         }
         // One write, so that a crash can only cut this line short.
-        out.write_all(&bytes).and_then(|()| out.sync_data()).map_err(io)
+        out.write_all(&bytes).and_then(|()| atomic::flushed(out.sync_data())).map_err(io)
     }
 
     /// The lines of the journal of a pair; empty if there is none.

@@ -32,6 +32,33 @@ pub fn rows(evaluation: &Evaluation, published: bool) -> Vec<Row> {
     rows
 }
 
+impl Evaluation {
+    /// The size of the table: whose pairs are in it, and how many of them.
+    pub fn size(&self) -> String {
+        let Self { scored, of, dataset, .. } = self;
+        if scored == of {
+            format!("All {of} pairs of {dataset}")
+        } else {
+            format!("{scored} of {of} pairs of {dataset}")
+        }
+    }
+}
+
+/// The table as Markdown, its size above it.
+pub fn markdown(evaluation: &Evaluation, published: bool) -> String {
+    format!("{}\n\n{}", evaluation.size(), evaluation::markdown(&rows(evaluation, published)))
+}
+
+/// The table as LaTeX, its size in a comment above it.
+pub fn latex(evaluation: &Evaluation, published: bool) -> String {
+    format!("% {}\n{}", evaluation.size(), evaluation::latex(&rows(evaluation, published)))
+}
+
+/// The table as CSV, the pairs of the data set beside the grasps of a row.
+pub fn csv(evaluation: &Evaluation, published: bool) -> String {
+    evaluation::csv(&rows(evaluation, published), evaluation.of)
+}
+
 /// Writes `evaluation.csv`, `.md`, `.tex` and `.json` (with every grasp) into a folder, which is made if missing; returns it.
 ///
 /// # Errors
@@ -39,7 +66,6 @@ pub fn rows(evaluation: &Evaluation, published: bool) -> Vec<Row> {
 pub fn export(evaluation: &Evaluation, published: bool, folder: &Path) -> Result<PathBuf, TaskError> {
     let fail = |why: String| TaskError::new("Export the table", format!("{why} ({})", folder.display()));
     std::fs::create_dir_all(folder).map_err(|err| fail(err.to_string()))?;
-    let rows = rows(evaluation, published);
     let report = Report {
         evaluation,
         published: if published { paper_rows() } else { Vec::new() },
@@ -47,9 +73,9 @@ pub fn export(evaluation: &Evaluation, published: bool, folder: &Path) -> Result
     };
     let json = serde_json::to_vec_pretty(&report).map_err(|err| fail(err.to_string()))?;
     for (name, bytes) in [
-        ("evaluation.csv", evaluation::csv(&rows).into_bytes()),
-        ("evaluation.md", evaluation::markdown(&rows).into_bytes()),
-        ("evaluation.tex", evaluation::latex(&rows).into_bytes()),
+        ("evaluation.csv", csv(evaluation, published).into_bytes()),
+        ("evaluation.md", markdown(evaluation, published).into_bytes()),
+        ("evaluation.tex", latex(evaluation, published).into_bytes()),
         ("evaluation.json", json),
     ] {
         atomic::write_bytes(&folder.join(name), &bytes).map_err(|err| fail(err.to_string()))?;

@@ -92,6 +92,11 @@ fn found(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
 }
 
 impl Models {
+    /// Methods that come before the generators.
+    pub(super) fn before_generators(&self) -> usize {
+        self.methods.iter().take_while(|method| matches!(method, Method::Measured)).count()
+    }
+
     /// Finds everything that the setup names; [`Self::load`] loads it.
     pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
         let mut methods = Vec::new();

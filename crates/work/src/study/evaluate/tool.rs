@@ -281,11 +281,11 @@ impl<'a> Tool<'a> {
     }
 
     /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
-    /// order. What is new is kept in the book.
+    /// order. What is new is kept in the book. Without `again` what was known stays as it is.
     pub(super) fn finish(
         mut self,
         ids: &[PairId],
-        again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
+        mut again: Option<MakeAgain<'_>>,
         scores: &mut [Scores],
         skipped: &mut Vec<Skipped>,
     ) -> Vec<(usize, Entry)> {
@@ -297,9 +297,9 @@ impl<'a> Tool<'a> {
             let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
             let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
             let (mut kept, stale): (Vec<_>, Vec<_>) =
-                known.into_iter().partition(|(_, entry)| entry.is_of_range(range));
+                known.into_iter().partition(|(_, entry)| again.is_none() || entry.is_of_range(range));
             // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
-            let mut fresh = redone(stale, range, at, again);
+            let mut fresh = again.as_mut().map_or_else(Vec::new, |again| redone(stale, range, at, again));
             let class = self.class;
             let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, class, range)).collect();
             for one in done {
@@ -352,6 +352,9 @@ fn mask_iou(felt: &Felt, sample: &Sample) -> PerPad<f64> {
     found
 }
 
+/// Makes the images of some grasps by a method once more.
+pub(super) type MakeAgain<'a> = &'a mut dyn FnMut(usize, &[PairId]) -> Vec<Again>;
+
 /// The images of a grasp, made once more.
 pub(super) struct Again {
     id: PairId,
@@ -385,12 +388,7 @@ pub(super) fn again(dataset: &Dataset, setup: &Setup, method: &mut Method, ids: 
 }
 
 /// Known figures with their SSIM in another range. A grasp whose images cannot be made any more is left out.
-fn redone(
-    stale: Vec<(PairId, Entry)>,
-    range: f64,
-    at: usize,
-    again: &mut dyn FnMut(usize, &[PairId]) -> Vec<Again>,
-) -> Vec<(PairId, Entry)> {
+fn redone(stale: Vec<(PairId, Entry)>, range: f64, at: usize, again: MakeAgain<'_>) -> Vec<(PairId, Entry)> {
     if stale.is_empty() {
         return Vec::new();
     }
@@ -516,6 +514,13 @@ fn span(image: &Grid<f32>) -> Option<[f32; 2]> {
     let finite = image.as_slice().iter().copied().filter(|v| v.is_finite());
     let [low, high] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
     (low <= high).then_some([low, high])
+}
+
+/// How many of the known figures of some grasps of a tool have their SSIM in a range that is not that of these grasps.
+pub(super) fn of_other_range(book: &KeptScores, method: usize, ids: &[PairId]) -> usize {
+    let known = book.of(method, ids);
+    let range = width(known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten()));
+    known.iter().filter(|(_, entry)| !entry.is_of_range(range)).count()
 }
 
 /// Largest minus smallest value of some images.

@@ -30,6 +30,7 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     let mut poses: Vec<(&Path, [f64; 3])> = Vec::new();
     if let Some(path) = bubble_file {
         let dict = read_dict(path)?;
+        say_coarse(&dict, &mut notes);
         for (finger, touch) in fingers.iter_mut().zip(bubble_touches(&dict, &mut notes, &mut invalid)?) {
             finger.set(lab::BUBBLE_ID, touch);
         }
@@ -60,7 +61,7 @@ pub(super) fn pair(gelslim_file: Option<&Path>, bubble_file: Option<&Path>) -> R
     Ok(Loaded { sample, invalid: invalid.map(Some).into() })
 }
 
-/// A value that the sample can do without: absent is a note, wrong is an error.
+/// A value that the sample can do without: absent, or no tensor, is a note; wrong is an error.
 fn optional<T>(
     dict: &PtDict,
     result: Result<T, PtError>,
@@ -69,7 +70,8 @@ fn optional<T>(
 ) -> Result<Option<T>, PtError> {
     match result {
         Ok(value) => Ok(Some(value)),
-        Err(err @ PtError::MissingKey { .. }) => {
+        // What another program stored in its own way costs no more than itself.
+        Err(err @ (PtError::MissingKey { .. } | PtError::NotATensor { .. })) => {
             notes.push(problem(dict.file(), format!("{err}: {without}"), err.hint()));
             Ok(None)
         }
@@ -78,7 +80,7 @@ fn optional<T>(
 }
 
 fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, PtError> {
-    let without = "the true pose is unknown";
+    let without = "this file says no true pose";
     let mut values = [0.0; 3];
     for (value, key) in values.iter_mut().zip(["theta", "x", "y"]) {
         match optional(dict, dict.scalar(key), without, notes)? {
@@ -92,6 +94,19 @@ fn pose(dict: &PtDict, notes: &mut Vec<Problem>) -> Result<Option<[f64; 3]>, PtE
         }
     }
     Ok(Some(values))
+}
+
+/// Says which lengths are stored in three digits.
+fn say_coarse(dict: &PtDict, notes: &mut Vec<Problem>) {
+    let lengths = ["bubble_imprint", "bubble_depth_ref", "bubbles_tr_quat", "grasp_frame_quat", "K", "theta", "x", "y"];
+    let coarse = dict.coarse(&lengths);
+    if !coarse.is_empty() {
+        let what = format!(
+            "{} stored as bfloat16, which has three digits: imprints in steps of up to 0.06 mm, depths of 0.5 mm",
+            coarse.join(", ")
+        );
+        notes.push(problem(dict.file(), what, "save these tensors as float32, with .float() before torch.save"));
+    }
 }
 
 /// Splits a tensor of two fingers.
