@@ -12,6 +12,8 @@ use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sample::{ColorTouch, DepthTouch, Sample};
 use touch2touch_core::sim::{self, Grasp, Sensors, SimConfig};
 
+use crate::support::shared;
+
 fn bubble_of(sample: &Sample, finger: PadId) -> &DepthTouch {
     sample.pad(finger).and_then(|t| t.depth()).expect("both fingers have a bubble")
 }
@@ -112,7 +114,7 @@ fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
 /// The measured tools and the lab's published CAD models are the same solids.
 #[test]
 fn the_measured_tools_are_the_labs_own() {
-    let Some(folder) = crate::support::shared("lab-meshes") else { return };
+    let Some(folder) = shared("lab-meshes") else { return };
     for tool in measured::tools() {
         let ours = tool.mesh();
         let labs = touch2touch_work::io::stl::read(&folder.join(format!("{}.stl", tool.name))).unwrap().mesh;

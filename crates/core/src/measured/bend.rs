@@ -6,7 +6,8 @@
 
 use glam::DVec2;
 
-use super::shape::TOUCH_M;
+/// Places this close to an edge lie on the part, meters: vertices of the mesh are rounded.
+pub(super) const TOUCH_M: f64 = 1e-9;
 
 /// A rounded bend.
 #[derive(Clone, Copy, Debug)]

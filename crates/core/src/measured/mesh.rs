@@ -11,11 +11,11 @@ use super::shape::{Section, Solid, Stretch, Tool};
 use crate::mesh::TriMesh;
 
 /// Edge length of the grid that a mesh is cut from, meters. Straight lines are cut exactly at any.
-const STEP_M: f64 = 0.003;
+const STEP_M: f64 = 0.002_5;
 /// Triangles at the outline thinner than this are no part of the tool, meters.
 const SLIVER_M: f64 = 2e-6;
 /// Steps that a rounding is cut in, as sines of the angle from its middle.
-const ROUND: [f64; 5] = [0.258_819, 0.5, 0.707_107, 0.866_025, 0.965_926];
+const ROUND: [f64; 8] = [0.173_648, 0.342_020, 0.5, 0.642_788, 0.766_044, 0.866_025, 0.939_693, 0.984_808];
 
 /// A triangulation of a part of the plane.
 struct Sheet {
@@ -76,8 +76,9 @@ impl Tool {
         match self.section {
             Section::Bevel { width_m, .. } => sheet.split(&|p| solid.inset(p), &[width_m]),
             Section::Crown { bead_m } => {
+                // The last one is the foot of the bead: the crown begins a little lower.
                 let crown = ROUND.map(|share| half_width * (1.0 - share));
-                let bead = [0.5, 0.866_025, 1.0].map(|share| half_width - bead_m * share);
+                let bead = [0.382_683, 0.707_107, 0.923_880, 1.0, 1.02].map(|share| half_width - bead_m * share);
                 sheet.split(&|p| solid.inset(p), &[&crown[..], &bead[..]].concat());
             }
         }

@@ -6,10 +6,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::bend::Bend;
-
-/// Places this close to an edge lie on the part, meters: vertices of the mesh are rounded.
-pub(super) const TOUCH_M: f64 = 1e-9;
+use super::bend::{Bend, TOUCH_M};
 
 /// Cross-section of a tool's parts, from the wall to the middle of a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
