@@ -94,12 +94,12 @@ impl Membrane {
             stiffening: config.stiffening,
         };
         let mut near_tool = vec![false; columns * rows];
-        for k in 0..columns * rows {
+        for (k, near) in near_tool.iter_mut().enumerate() {
             let yz = origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * step;
             sheet.free[k] = ((yz - dome.center) / dome.semi).length_squared() < 1.0;
             let p = object_from_grasp.transform_yz(yz);
             let beside = tool.outline_distance(p);
-            near_tool[k] = beside < 1.5 * step.max_element();
+            *near = beside < 1.5 * step.max_element();
             if sheet.free[k] && beside < WIDER_M {
                 // A thin bead may fall between the nodes: the tool is a little wider for them.
                 let around = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|to| p + to * WIDER_M);

@@ -14,8 +14,9 @@ use crate::mesh::TriMesh;
 const STEP_M: f64 = 0.002_5;
 /// Triangles at the outline thinner than this are no part of the tool, meters.
 const SLIVER_M: f64 = 2e-6;
-/// Steps that a rounding is cut in, as sines of the angle from its middle.
-const ROUND: [f64; 8] = [0.173_648, 0.342_020, 0.5, 0.642_788, 0.766_044, 0.866_025, 0.939_693, 0.984_808];
+/// Angles from the middle of a rounding that it is cut at, degrees: of crowns and bends, and of beads.
+const ROUND_DEG: [f64; 8] = [10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0];
+const BEAD_DEG: [f64; 3] = [22.5, 45.0, 67.5];
 
 /// A triangulation of a part of the plane.
 struct Sheet {
@@ -44,7 +45,7 @@ impl Tool {
                     let ray = DVec2::from_angle(f64::from(degrees).to_radians());
                     sheet.split(&|p| ray.perp_dot(p - bend.center()), &[0.0]);
                 }
-                let mut levels = ROUND.map(|share| bend.radius_m * share).to_vec();
+                let mut levels = ROUND_DEG.map(|degrees| bend.radius_m * degrees.to_radians().sin()).to_vec();
                 levels.push(bend.radius_m);
                 sheet.split(&|p| p.distance(bend.center()), &levels);
             }
@@ -76,10 +77,11 @@ impl Tool {
         match self.section {
             Section::Bevel { width_m, .. } => sheet.split(&|p| solid.inset(p), &[width_m]),
             Section::Crown { bead_m } => {
-                // The last one is the foot of the bead: the crown begins a little lower.
-                let crown = ROUND.map(|share| half_width * (1.0 - share));
-                let bead = [0.382_683, 0.707_107, 0.923_880, 1.0, 1.02].map(|share| half_width - bead_m * share);
-                sheet.split(&|p| solid.inset(p), &[&crown[..], &bead[..]].concat());
+                let crown = ROUND_DEG.map(|degrees| half_width * (1.0 - degrees.to_radians().sin()));
+                let bead = BEAD_DEG.map(|degrees| half_width - bead_m * degrees.to_radians().sin());
+                // At the foot of the bead the crown begins a little lower.
+                let foot = [1.0, 1.02].map(|share| half_width - bead_m * share);
+                sheet.split(&|p| solid.inset(p), &[&crown[..], &bead[..], &foot[..]].concat());
             }
         }
         sheet.extrude(&solid, self.middle_x_m)
