@@ -15,7 +15,7 @@ use touch2touch_work::rows::RowScores;
 pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
 
 /// The table and how it is asked for.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct TableState {
     /// Generators that get no row, by bundle.
     pub left_out: BTreeSet<Arc<str>>,
@@ -39,24 +39,6 @@ pub struct TableState {
     pub chosen: ScoreChoice,
     /// The measure of uncertainty, where the list is ordered by that.
     pub uncertain_by: QueueBy,
-}
-
-impl Default for TableState {
-    fn default() -> Self {
-        Self {
-            left_out: BTreeSet::new(),
-            grasps_per_tool: None,
-            published: false,
-            result: None,
-            looked_up: None,
-            scores: Arc::default(),
-            rows: None,
-            round: 0,
-            next_look: 0,
-            chosen: ScoreChoice::default(),
-            uncertain_by: QueueBy::default(),
-        }
-    }
 }
 
 /// The score that the list is ordered, colored and filtered by.

@@ -354,7 +354,7 @@ mod tests {
     fn a_mask_is_the_same_however_it_is_stored() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("m.png");
-        let on = |i: usize| i % 3 == 0;
+        let on = |i: usize| i.is_multiple_of(3);
         let store = |pixel: &dyn Fn(bool) -> Vec<u8>, kind| {
             let bytes: Vec<u8> = (0..12).flat_map(|i| pixel(on(i))).collect();
             encode(&path, &bytes, [4, 3], kind).unwrap();

@@ -66,6 +66,9 @@ const COMMON_REFERENCE: &str = "reference";
 
 type Files = [Option<PathBuf>; KINDS];
 
+/// A gray picture (0..255), and what to say of its file.
+type NotedTile = (Grid<f32>, Option<Problem>);
+
 /// The files of a picture folder, in the order of the index.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
@@ -202,12 +205,7 @@ impl Pictures {
     }
 
     /// The picture of [`Self::tile`], and what to say of its file.
-    fn tile_and_note(
-        &self,
-        id: PairId,
-        kind: usize,
-        laid: Turn,
-    ) -> Result<Option<(Grid<f32>, Option<Problem>)>, LoadError> {
+    fn tile_and_note(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<NotedTile>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
         let (tile, note) = match images::read_depth(path)? {
             Ok(values) => lengths::levels(path, &values)?,

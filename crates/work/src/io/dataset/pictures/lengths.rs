@@ -3,9 +3,8 @@
 use std::path::Path;
 
 use super::super::{LoadError, problem};
-use super::ASSUMED_IMPRINT_RANGE_M;
+use super::{ASSUMED_IMPRINT_RANGE_M, NotedTile};
 use crate::io::images::PictureError;
-use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::Grid;
 
 /// Values of a picture that was stretched differ by at least half of what 16 bits hold.
@@ -28,7 +27,7 @@ struct Unit {
 ///
 /// # Errors
 /// [`PictureError::Kind`] where the values are lengths of which the unit is not known.
-pub(super) fn levels(path: &Path, picture: &Grid<u16>) -> Result<(Grid<f32>, Option<Problem>), LoadError> {
+pub(super) fn levels(path: &Path, picture: &Grid<u16>) -> Result<NotedTile, LoadError> {
     let [lo, hi] = ends(picture.as_slice().iter().copied());
     if hi - lo >= STRETCHED || hi == lo {
         return Ok((picture.map(|&v| f32::from(v) / 257.0), None));
