@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(latex.matches('%').count(), latex.matches("\\%").count());
         let csv = csv(&rows, 288);
         assert_eq!(csv.lines().count(), 1 + 2 * rows.len());
-        assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,828,0,26.1,,"), "{csv}");
+        assert!(csv.contains("\"odd \"\"name\"\" | with, signs\",true,unseen grasps,9,414,,828,0,26.1,,"), "{csv}");
         let commas = |line: &str| line.replace("with, signs", "").matches(',').count();
         assert!(csv.lines().all(|l| commas(l) == commas(csv.lines().next().unwrap())));
     }
