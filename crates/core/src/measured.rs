@@ -4,7 +4,7 @@
 //! membrane were guessed from pictures: registration and verdict are fitted to that membrane. Where they know this one, it
 //! takes the place of the other.
 //!
-//! What differs: half-round bars with a bead ([`tools()`]); a membrane that hangs in facets over a deep rim (`membrane`); a
+//! Differences: half-round bars with a bead ([`tools()`]); a membrane that hangs in facets over a deep rim (`membrane`); a
 //! GelSlim whose lens bends bars (`lens`), which leans away from the tool's tip; and where its window lies in the bubble's
 //! picture ([`WINDOWS_PX`]). The best touch of the same tool resembles a real imprint to 28.2 dB (best straight line, 64 px,
 //! no free shift; 28.2 on pairs that no constant was fitted to); the other simulator reaches 23.0.

@@ -1,4 +1,4 @@
-//! What the bubble's depth camera sees of a membrane.
+//! The bubble's depth camera before a membrane.
 
 use glam::{DAffine3, DVec2, DVec3};
 
