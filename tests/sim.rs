@@ -5,7 +5,6 @@ use std::sync::LazyLock;
 use glam::{DVec2, DVec3};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::grid::Grid;
-use touch2touch_core::measured;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::mesh::distance::MeshDistance;
 use touch2touch_core::rig::{PadId, lab};
@@ -89,7 +88,10 @@ fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
     let other = Sensors::OtherGelslims(5).config();
     assert_eq!(other.bubble, nominal.bubble);
     let (of, by) = (&other.gelslim, &drawn.gelslim);
-    assert_eq!((of.indentation_m, of.noise, of.decay_m), (nominal.gelslim.indentation_m, 2.4, nominal.gelslim.decay_m));
+    assert_eq!(
+        (of.indentation_m, of.noise, of.decay_m),
+        (nominal.gelslim.indentation_m, nominal.gelslim.noise, nominal.gelslim.decay_m)
+    );
     for c in 0..3 {
         let (base, far) = (nominal.gelslim.base[c], by.base[c]);
         assert!((of.base[c] - base - 2.0 * (far - base)).abs() < 1e-9 && of.base[c] != base);
@@ -111,11 +113,11 @@ fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
     assert_ne!(pads(&a).1, pads(&b).1);
 }
 
-/// The measured tools and the lab's published CAD models are the same solids.
+/// The catalog's tools and the lab's published CAD models are the same solids.
 #[test]
-fn the_measured_tools_are_the_labs_own() {
+fn the_tools_are_the_labs_own() {
     let Some(folder) = shared("lab-meshes") else { return };
-    for tool in measured::tools() {
+    for tool in catalog::tools() {
         let ours = tool.mesh();
         let labs = touch2touch_work::io::stl::read(&folder.join(format!("{}.stl", tool.name))).unwrap().mesh;
         let farthest = |from: &TriMesh, to: &TriMesh| {
@@ -135,14 +137,15 @@ fn the_measured_tools_are_the_labs_own() {
 #[test]
 fn contact_points_of_both_fingers_lie_on_the_tool() {
     for (tool, sample) in a_few() {
+        let solid = tool.solid();
         for finger in lab::PADS {
             let points = lifted(sample, finger);
             let mut distances: Vec<f64> =
-                contact_pixels(sample, finger).iter().map(|&p| tool.signed_distance(points[p]).abs()).collect();
+                contact_pixels(sample, finger).iter().map(|&p| solid.signed_distance(points[p]).abs()).collect();
             assert!(distances.len() > 150, "{}: only {} contact pixels", tool.name, distances.len());
             distances.sort_by(f64::total_cmp);
             let median = distances[distances.len() / 2];
-            assert!(median < 3e-4, "{} {}: median {median}", tool.name, finger.index());
+            assert!(median < 7e-4, "{} {}: median {median}", tool.name, finger.index());
             assert!(distances[distances.len() - 1] < 1.05e-3, "{} {}", tool.name, finger.index());
         }
     }
@@ -151,9 +154,10 @@ fn contact_points_of_both_fingers_lie_on_the_tool() {
 #[test]
 fn the_contact_mask_is_the_labs_signed_distance_rule() {
     for (tool, sample) in a_few() {
+        let solid = tool.solid();
         for finger in lab::PADS {
             let contact = &bubble_of(sample, finger).truth.as_ref().unwrap().contact;
-            let near = lifted(sample, finger).map(|&p| tool.signed_distance(p) <= 1e-3);
+            let near = lifted(sample, finger).map(|&p| solid.signed_distance(p) <= 1e-3);
             let both = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a && **b).count();
             let either = contact.as_slice().iter().zip(near.as_slice()).filter(|(a, b)| **a || **b).count();
             assert!(both as f64 / either as f64 > 0.98, "{} {}", tool.name, finger.index());
@@ -164,14 +168,14 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
 #[test]
 fn the_membrane_never_enters_the_tool() {
     for (tool, sample) in a_few() {
+        let (solid, object_from_grasp) = (tool.solid(), sample.grasp_from_object.unwrap().inverse());
         for finger in lab::PADS {
             let deepest =
-                lifted(sample, finger).as_slice().iter().map(|&p| tool.signed_distance(p)).fold(0.0, f64::min);
+                lifted(sample, finger).as_slice().iter().map(|&p| solid.signed_distance(p)).fold(0.0, f64::min);
             assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.index());
+            let membrane = sim::Membrane::press(&SimConfig::default().bubble, tool, object_from_grasp, finger);
+            assert!(membrane.worst_gap() < 1e-6);
         }
-        let membrane =
-            sim::Membrane::press(&SimConfig::default().bubble, tool, sample.grasp_from_object.unwrap().inverse());
-        assert!(membrane.worst_gap() < 1e-6);
     }
 }
 
@@ -180,7 +184,7 @@ fn the_membrane_never_enters_the_tool() {
 #[test]
 fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
     for (tool, sample) in a_few() {
-        let grasp_from_object = sample.grasp_from_object.unwrap();
+        let (solid, grasp_from_object) = (tool.solid(), sample.grasp_from_object.unwrap());
         for finger in lab::PADS {
             let camera = bubble_of(sample, finger).camera.as_ref().unwrap();
             let camera_from_grasp = camera.grasp_from_camera.inverse();
@@ -188,10 +192,10 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
             let (mut on, mut all) = (0, 0);
             for row in (0..lab::GELSLIM.height).step_by(8) {
                 for column in (0..lab::GELSLIM.width).step_by(8) {
-                    let yz = sim::gelslim_yz(finger, column as f64, row as f64);
+                    let yz = gelslim_yz(finger, column, row);
                     let object = grasp_from_object.inverse().transform_yz(yz);
-                    // the flat ridge only: the bevel is hidden on the side that faces away
-                    if tool.outline_distance(object) > -tool.bevel_width_m {
+                    // the ridge only: its flanks are hidden on the side that faces away
+                    if solid.height(object).is_none_or(|height| height < tool.half_thickness_m - 2e-4) {
                         continue;
                     }
                     let p = DVec3::new(-sim::outward(finger) * tool.half_thickness_m, yz.x, yz.y);
@@ -210,23 +214,32 @@ fn gelslim_contact_projects_to_the_ridges_of_the_imprint() {
     }
 }
 
-/// The color streaks appear where the ridges are, in both fingers' pictures.
+/// The (y, z) that a GelSlim's pixel looks at, meters.
+fn gelslim_yz(finger: PadId, column: usize, row: usize) -> DVec2 {
+    let lens = SimConfig::default().gelslim.lenses[finger.index()];
+    sim::gelslim_yz(finger, lens.flat(DVec2::new(column as f64, row as f64)))
+}
+
+/// The color streaks appear where the beads are, in both fingers' pictures.
 #[test]
-fn gelslim_streaks_frame_the_bars() {
-    for (tool, sample) in a_few() {
+fn gelslim_streaks_frame_the_beads() {
+    for (tool, sample) in a_few().iter().take(12) {
+        let solid = tool.solid();
         let object_from_grasp = sample.grasp_from_object.unwrap().inverse();
         for finger in lab::PADS {
             let difference = &gelslim_of(sample, finger).difference;
             let (mut near, mut far) = (Vec::new(), Vec::new());
             for row in 0..lab::GELSLIM.height {
                 for column in 0..lab::GELSLIM.width {
-                    let yz = sim::gelslim_yz(finger, column as f64, row as f64);
-                    let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
+                    let yz = gelslim_yz(finger, column, row);
+                    let height = solid.height(object_from_grasp.transform_yz(yz));
+                    let below = height.map_or(f64::INFINITY, |height| tool.half_thickness_m - height);
                     let [r, g, b] = difference[(column, row)];
                     let color = (r - g).abs() + (g - b).abs();
-                    if (-1e-3..0.0).contains(&s) {
+                    // Towards the tip the gel leans away from the tool.
+                    if (4e-4..1e-3).contains(&below) && yz.y < 2e-3 {
                         near.push(f64::from(color));
-                    } else if s > 4e-3 {
+                    } else if below > 3e-3 && yz.y > -2e-3 {
                         far.push(f64::from(color));
                     }
                 }
@@ -243,7 +256,7 @@ fn gelslim_streaks_frame_the_bars() {
 /// (bubble: about the row direction, apart from the cameras' different offsets).
 #[test]
 fn the_fingers_mirror_each_other() {
-    let sample = sim::simulate(&catalog::tools()[5], Grasp::default(), 1, &SimConfig::default());
+    let sample = sim::simulate(&catalog::tools()[5], Grasp::default(), 1, &mirrored());
     let object = |finger| lifted(&sample, finger);
     let (right, left) = (object(lab::RIGHT), object(lab::LEFT));
     // the same (y, z) has mirrored x: compare over a common grid of (y, z)
@@ -270,13 +283,20 @@ fn the_fingers_mirror_each_other() {
     assert!(at(&right, 20, 70).z > at(&right, 150, 70).z && at(&left, 20, 70).z > at(&left, 150, 70).z);
 }
 
+/// The nominal sensors with their bubbles opposite each other.
+fn mirrored() -> SimConfig {
+    let mut config = SimConfig::default();
+    config.bubble.rim_centers_m = [[0.0, -0.028]; 2];
+    config
+}
+
 /// Turning the grasp the other way is mirroring the tool: the simulator prefers no direction.
 #[test]
 fn opposite_angles_are_mirror_images() {
     let rod = &catalog::tools()[5];
     let at = |theta: f64| {
         let grasp = Grasp { theta_rad: theta, x_m: 0.0, y_m: 0.0 };
-        sim::Membrane::press(&SimConfig::default().bubble, rod, grasp.object_from_grasp())
+        sim::Membrane::press(&mirrored().bubble, rod, grasp.object_from_grasp(), lab::LEFT)
     };
     let (plus, minus) = (at(0.3), at(-0.3));
     for i in 0..400 {

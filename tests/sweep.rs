@@ -107,7 +107,7 @@ fn the_poses_are_those_of_the_results_table_bit_for_bit() {
 fn an_absurd_threshold_shows() {
     let folder = tempfile::tempdir().unwrap();
     let dataset = write(folder.path(), 3);
-    let setup = setup(&dataset, Dial::Threshold, "-5,5,50");
+    let setup = setup(&dataset, Dial::Threshold, "-5,9,50");
     let by_mask = Recipe { registration: Registration::DistanceField.into(), ..setup.recipe.clone() };
     let found = turned(&dataset, &SweepSetup { recipe: by_mask, ..setup });
     let series = &found.series[0];

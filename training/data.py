@@ -28,10 +28,10 @@ MASK_RANGE_M = (-0.0116, 0.0225)
 
 # Centers of what the GelSlims see in the raw bubble image, pixels: right, left finger (`crates/core/src/rig/lab.rs`), for shards
 # that do not say it.
-WINDOWS_PX = ((78.5, 74.0), (69.5, 73.0))
+WINDOWS_PX = ((64.5, 71.6), (74.8, 73.4))
 # Where a generator's picture has the window of either finger: nothing in a GelSlim image of an unknown sensor says which
 # finger it is of, so a network that drew each at its own place would have to draw the mean of both. In the middle of
-# the lab's two windows as measured (`crates/core/src/measured.rs`).
+# the two windows.
 FRAME_PX = (69.5, 72.6)
 
 

@@ -142,8 +142,6 @@ def parser():
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program, which writes the shards")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="threads of a training on the processor")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--lab", action="store_true",
-                        help="the lab's own tools and sensors, as measured on real pairs, in the place of the built-in ones")
     return parser
 
 
@@ -155,8 +153,7 @@ def main():
     torch.set_num_threads(args.threads if on_processor else 1)
     kept = args.out / "make.json"
     spent = json.loads(kept.read_text()) if kept.exists() else {"writing": 0.0}
-    writers = Writers(args.touch2touch, args.out / "data", cores if on_processor else max(1, cores - 1),
-                      ["--lab"] if args.lab else [])
+    writers = Writers(args.touch2touch, args.out / "data", cores if on_processor else max(1, cores - 1))
     try:
         writers.wait(begun + 60 * (WRITING * minutes - spent["writing"]) if on_processor else begun)
         if on_processor:

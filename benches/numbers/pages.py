@@ -46,7 +46,8 @@ def page(steps, kept, study):
             "Rows marked *published* are the paper's and its lab's, on real data: compare the order, not the decimals. All else is of "
             "simulated sensors unless it says real. What the columns mean: [words](glossary.md), `touch2touch evaluate --help`. "
             "OTHER are 40 grasps of an independent simulator and REAL 36 published real pairs, which are not part of the repository; "
-            "STUDY is the folder of `training.study`."]
+            "STUDY is the folder of `training.study`. **Sections made before 2026-11-28 are of the simulator and the models before**: "
+            "its tools and membrane were guessed from pictures, today's are measured."]
     for step in STEPS:
         body = table(step.name, steps)
         if body:

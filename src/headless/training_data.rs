@@ -44,9 +44,6 @@ pub(super) struct TrainingDataArgs {
     /// Of the simulator: the same seed writes the same touches.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Of the simulator: the lab's own tools and sensors, as measured on real pairs, in the place of the built-in ones.
-    #[arg(long, conflicts_with = "condition")]
-    lab: bool,
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
@@ -74,8 +71,8 @@ pub(super) fn run(args: &TrainingDataArgs) -> VerbResult {
     let setup = ShardSetup { pairs_per_shard: args.per_shard, share: args.shard };
     let (written, output) = if args.dataset.path() == Path::new(SIMULATOR) {
         let output = Output::new(args.common, "simulating", args.grasps);
-        let TrainingDataArgs { grasps, mix, condition, seed, lab, .. } = *args;
-        let source = TouchSource::Simulator { grasps, mix, condition, seed, lab };
+        let TrainingDataArgs { grasps, mix, condition, seed, .. } = *args;
+        let source = TouchSource::Simulator { grasps, mix, condition, seed };
         (write_shards(source, setup, &args.out, &output.job())?, output)
     } else {
         let dataset = args.dataset.open_with(args.tool.tool_scale)?;

@@ -48,7 +48,7 @@ fn m01_any_share_of_missing_pixels_is_borne() {
             let imprints = changed(case, |v, _| if rng.random_range(0..100) < percent { absent } else { v });
             let report = joint(&imprints, &case.masks);
             assert!(report.joint.unwrap().basis.has_membrane(), "{percent} % {absent}");
-            assert!(error_deg(&report) < 2.0, "{percent} % {absent}: {}", error_deg(&report));
+            assert!(error_deg(&report) < 3.0, "{percent} % {absent}: {}", error_deg(&report));
         }
     }
 }

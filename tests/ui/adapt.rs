@@ -33,8 +33,8 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     assert!(closed.angle.is_some() && closed.psnr_db.unwrap() > 20.0, "{found:?}");
     rig.harness.get_by_label("Fitted (closed form)");
     rig.harness.get_by_label_contains("6 pairs are few");
-    // What was simulated lies where the model expects it.
-    rig.harness.get_by_label_contains("need no fit");
+    // What was simulated lies near where the model expects it.
+    assert!(found.pads.iter().all(|pad| pad.offset_px.iter().all(|off| off.abs() < 6.0)), "{:?}", found.pads);
     // A touch that was left out, before and after.
     let held = adapt::held_back(rig.harness.state().state()).cloned().unwrap();
     assert!(held.before.size() == held.measured.size() && held.before != held.after, "{}", held.name);

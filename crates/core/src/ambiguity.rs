@@ -19,7 +19,7 @@ const DIRECTIONS: usize = 60;
 /// Distances by which the image is moved against itself, shares of its width: 3.4, 5.1 and 6.8 mm of a GelSlim's 18.
 const MOVES: [f64; 3] = [0.19, 0.285, 0.38];
 /// A change (0: none, 1: nothing in common) up to this counts as none.
-const UNCHANGED: f64 = 0.3;
+const UNCHANGED: f64 = 0.35;
 /// Signal below which nothing touches the gel, levels of 255 (root mean square).
 const TOUCHED: f64 = 1.5;
 

@@ -27,7 +27,6 @@ pub mod label;
 mod linear;
 pub mod manual;
 pub mod markers;
-pub mod measured;
 pub mod mesh;
 pub mod metrics;
 pub mod moments;

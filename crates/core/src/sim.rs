@@ -5,22 +5,24 @@
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!
-//! The model, and what it leaves out: the bubble's membrane solves the obstacle problem of an inflated elastic sheet
-//! (see `membrane`), so it tents between bars and bulges beside them; its camera looks obliquely, hides what lies
-//! behind a bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs. There is no friction
-//! between membrane and tool, no light bouncing in the gel and no lens distortion.
+//! The model, and what it leaves out: the bubble's membrane is a sheet under pressure that stiffens as it stretches (see
+//! `membrane`), so it spans between beads and falls off beside them; its camera looks obliquely, hides what lies behind a
+//! bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs, seen through a lens that bends lines.
+//! There is no friction between membrane and tool and no light bouncing in the gel.
 //!
-//! One pair (both fingers, both sensors) costs about 55 ms of one core in release, a fifth of it for the membrane.
+//! One pair (both fingers, both sensors) costs about 0.2 s of one core in release, most of it for the rays of the camera.
 //! `examples/contact_sheet.rs` draws the tiles of `docs/simulated_tiles.png`.
 
 mod condition;
 mod config;
-pub(crate) mod depth_camera;
+mod depth_camera;
 mod faults;
-pub(crate) mod gelslim;
+mod gelslim;
 mod grasp;
+mod lens;
 mod membrane;
 mod rig;
+mod sheet;
 mod spoil;
 mod training;
 
@@ -31,6 +33,7 @@ pub(crate) use config::{BubbleConfig, GelSlimConfig};
 pub use config::{Sensors, SimConfig};
 pub use faults::Fault;
 pub use grasp::{Grasp, grid_grasp, random_grasp};
+pub use lens::Lens;
 pub use membrane::{Dome, Membrane};
 pub(crate) use rig::INTRINSICS;
 pub use rig::{RANGE_M, gelslim_yz, grasp_from_camera, outward};
@@ -43,7 +46,7 @@ use super::rig::{PadId, lab};
 use super::sample::{DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
 
 /// Grid spacing of the membrane, meters.
-const MEMBRANE_STEP_M: f64 = 0.000_5;
+const MEMBRANE_STEP_M: f64 = 0.001;
 
 /// Both sensors' touch of `tool` held at `grasp`, for both fingers, with the truth.
 ///
@@ -61,27 +64,22 @@ pub(crate) fn simulate_apart(
     config: &SimConfig,
 ) -> Sample {
     let (gelslims, bubbles) = (gelslims.object_from_grasp(), bubbles.object_from_grasp());
-    // the tool and the rig mirror each other, so one membrane serves both fingers
-    let membrane = Membrane::press(&config.bubble, tool, bubbles);
     let pads = lab::PADS.map(|finger| {
         let felt = PadTouch::default()
             .with(lab::GELSLIM_ID, Some(gelslim::touch(&config.gelslim, tool, gelslims, finger, seed)));
+        let membrane = Membrane::press(&config.bubble, tool, bubbles, finger);
         Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
     });
     Sample { pads: pads.into(), grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
 }
 
-fn bubble_touch(
-    config: &BubbleConfig,
-    tool: &ToolSpec,
-    membrane: &Membrane<'_>,
-    finger: PadId,
-    seed: u64,
-) -> DepthTouch {
-    let nominal = grasp_from_camera(finger, tool.half_thickness_m);
+fn bubble_touch(config: &BubbleConfig, tool: &ToolSpec, membrane: &Membrane, finger: PadId, seed: u64) -> DepthTouch {
+    // The camera rides with the finger: pressed deeper it is nearer.
+    let nearer = outward(finger) * (config.press_m - config::NOMINAL_PRESS_M);
+    let nominal = DAffine3::from_translation(DVec3::X * nearer) * grasp_from_camera(finger, tool.half_thickness_m);
     let truly = nominal * calibration_error(config, finger, seed);
     let rays = depth_camera::Rays::new(finger, INTRINSICS, truly);
-    let depth_reference = depth_camera::dome_depth(&rays, membrane.dome());
+    let depth_reference = depth_camera::dome_depth(&rays, membrane.dome()).map(|z| z - config.reference_m as f32);
     let (depth, contact) = depth_camera::membrane_depth(&rays, membrane);
     let imprint = depth_camera::measure(&depth_reference, &depth, config, finger, seed);
     let mut truth = depth_reference.clone();

@@ -137,12 +137,20 @@ pub(in crate::agreement) fn the_seeds_of_a_random_recipe_have_one_mean_spread_an
             let truth = results::sample(state).ready().unwrap().grasp_from_object.map(|pose| pose.inverse().theta_rad);
             let words = recipe::in_force(state, ImprintSource::Predicted).words(Stage::Pose).list();
             let more = ["--imprint", "predicted", "--seeds", "3"].map(str::to_owned);
-            let said = both.of_pair(&["pose"], more.into_iter().chain(words)).unwrap();
+            let said = match both.of_pair(&["pose"], more.into_iter().chain(words)) {
+                Ok(said) => said,
+                // A mask that the CAD model gives may be refused, by both.
+                Err(why) if angles.iter().all(Option::is_none) => {
+                    assert!(why.contains("Contact mask"), "{why}");
+                    continue;
+                }
+                Err(why) => panic!("{why}, {recipe:?}"),
+            };
             for (part, shown) in fan(&angles, truth).as_object().unwrap() {
                 poses += same(shown, &said["cases"][0]["fan"][part], &format!("{part}, {recipe:?}"));
             }
         }
     }
     compared(&counts, 24_500);
-    assert!(poses >= 2 * (COUNT + 5), "{poses}");
+    assert!(poses >= COUNT + 5, "{poses}");
 }

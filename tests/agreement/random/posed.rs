@@ -21,7 +21,10 @@ fn with_poses(home: &Path) -> impl Iterator<Item = Both> {
 fn same_reason<T>(shown: Lookup<'_, T>, said: Result<Value, String>, what: &str) {
     let said = match said {
         Err(said) => said,
-        Ok(said) => said["cases"][0]["stop"].as_str().unwrap_or_default().to_owned(),
+        Ok(said) => {
+            let case = &said["cases"][0];
+            ["stop", "no_influence"].map(|key| case[key].as_str().unwrap_or_default()).join(" ")
+        }
     };
     match shown {
         Lookup::Failed(err) => assert!(said.contains(&err.why), "{what}: {} is shown, {said} is said", err.why),

@@ -1,8 +1,8 @@
 //! The membrane's image and the mask together: what the whole membrane says of the pose, and the mask where that is little.
 //!
 //! A mask is made by a threshold or a model and can be wrong where the tool is plain to see. The membrane's height needs
-//! no mask: over a tool it is a tent (the solution of an obstacle problem, see `tent`), which a pose only moves. Its image
-//! and the tent are compared in bands of lengths, because offsets and slow slopes (a camera that is off, the pressure) are
+//! no mask: over a tool it is a sheet (the solution of an obstacle problem, see `tent`), which a pose only moves. Its image
+//! and the sheet are compared in bands of lengths, because offsets and slow slopes (a camera that is off, the pressure) are
 //! not the tool, and pixel noise is not either. The mask stays as a second, weaker term: the weaker, the less noise the
 //! membrane has and the less the mask agrees with it.
 //!

@@ -1,15 +1,12 @@
 //! Things that are no tools of the lab's data set, for trials of a robot: a pencil, and a cup by its handle.
 //!
-//! They are not in [`tools()`](super::tools()), which training, tests and tables count on. Both are as thick along the
-//! closing axis as the lab's tools: thinner, and the two membranes would meet beside them, which the simulator does not
-//! know.
+//! They are not in [`tools()`](super::tools()), which training, tests and tables count on.
 
 use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
 
-use super::shape::{Bar, ToolSpec};
-use super::tool;
+use super::shape::{Bar, Section, ToolSpec};
 use crate::mesh::TriMesh;
 
 /// Place of the cup's axis along y, meters, object frame: its wall is farther from the grip than the membranes reach.
@@ -22,16 +19,27 @@ const HANDLE_M: f64 = 0.035;
 const HALF_GRIP_M: f64 = 0.02;
 /// Half the width of the handle's strap, meters.
 const HALF_STRAP_M: f64 = 0.0025;
+/// Half the thickness of both, meters.
+const HALF_THICKNESS_M: f64 = 0.0115;
+
+/// A tool of flat parts about the middle of the object frame.
+fn flat(name: &str, bars: Vec<Bar>, plates: Vec<Vec<DVec2>>, width_m: f64, depth_m: f64) -> ToolSpec {
+    ToolSpec {
+        name: name.to_owned(),
+        seen: false,
+        bars,
+        plates,
+        section: Section::Bevel { width_m, depth_m },
+        half_thickness_m: HALF_THICKNESS_M,
+        middle_x_m: 0.0,
+    }
+}
 
 /// A pencil: a rod of 7 mm, whose cone of 14 mm ends in a tip of 1 mm, 34.5 mm from the grip.
 pub fn pencil() -> ToolSpec {
-    let point = |y: f64, z: f64| DVec2::new(y, z) * 1e-3;
-    let core = vec![point(-3.0, -60.0), point(3.0, -60.0), point(3.0, 20.0), point(0.0, 34.0), point(-3.0, 20.0)];
-    ToolSpec {
-        bevel_width_m: 0.002,
-        bevel_depth_m: 0.002,
-        ..tool("pencil", false, vec![Bar { core, half_width_m: 0.0005 }])
-    }
+    let outline = [(-3.5, -60.5), (3.5, -60.5), (3.5, 20.0), (0.5, 34.5), (-0.5, 34.5), (-3.5, 20.0)];
+    let outline = outline.map(|(y, z)| DVec2::new(y, z) * 1e-3).to_vec();
+    flat("pencil", Vec::new(), vec![outline], 0.002, 0.002)
 }
 
 /// The handle that a cup is held by: a strap along the cup's axis, with an arm to the wall at each end.
@@ -39,9 +47,10 @@ pub fn pencil() -> ToolSpec {
 /// Held at the strap the cup's tilt is that of a bar between two arms, which the fingers feel; held by its round wall, only
 /// the rim would tell, which no finger is sure to meet.
 pub fn cup_handle() -> ToolSpec {
-    let strap = |from: [f64; 2], to: [f64; 2]| Bar { core: vec![from.into(), to.into()], half_width_m: HALF_STRAP_M };
-    let arm = |z: f64| strap([0.0, z], [HANDLE_M, z]);
-    tool("cup", false, vec![strap([0.0, -HALF_GRIP_M], [0.0, HALF_GRIP_M]), arm(-HALF_GRIP_M), arm(HALF_GRIP_M)])
+    let path = [(HANDLE_M, -HALF_GRIP_M), (0.0, -HALF_GRIP_M), (0.0, HALF_GRIP_M), (HANDLE_M, HALF_GRIP_M)];
+    let path = path.map(|(y, z)| DVec2::new(y, z)).to_vec();
+    let strap = Bar { path, half_width_m: HALF_STRAP_M, rounding_m: 0.0 };
+    flat("cup", vec![strap], Vec::new(), 0.00125, 0.0016)
 }
 
 /// True for the model of [`cup_handle`], however its vertices are ordered: a tool of its extent and its number of triangles.

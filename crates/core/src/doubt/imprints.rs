@@ -19,7 +19,7 @@ const LIES_ON: f64 = 0.5;
 /// Gain in mean likeness that a reading must have: what a sound data set gains by another reading is 0.01.
 const CLEARLY: f64 = 0.08;
 /// Gain that a reading of a CAD model must have: of one tool there may be a single pair.
-const CLEARLY_OF_TOOL: f64 = 0.15;
+const CLEARLY_OF_TOOL: f64 = 0.22;
 /// Pairs whose likeness is at least this are not tried with other CAD models.
 const GOOD: f64 = 0.65;
 /// Imprints of less mean likeness have nothing to do with their tools.

@@ -105,3 +105,17 @@ fn predictions_tell_the_fingers_of_the_images() {
     assert_eq!(swapped.iter().map(Doubt::read_as).collect::<Vec<_>>(), [Some(ReadAs::ImageSwapFingers)]);
     assert!(swapped[0].what.contains("3 of 3 pairs"), "{}", swapped[0].what);
 }
+
+#[test]
+#[ignore = "tmp"]
+fn tmp_scan() {
+    for (number, condition) in (0u64..).zip(Condition::iter()) {
+        let config = if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(number) };
+        for pairs in [1, 4, 8] {
+            let set = set(condition, pairs, &config);
+            let felt: Vec<Felt<'_>> =
+                set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample }).collect();
+            println!("{condition:?} {pairs}: {:?}", judge(&felt, &set.tools, None));
+        }
+    }
+}

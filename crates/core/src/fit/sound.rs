@@ -15,7 +15,7 @@ const GAINS: std::ops::RangeInclusive<f64> = 0.3..=3.0;
 /// The mean error of the angle may grow by this share of itself, and by [`ANGLE_RAD`] more, by chance alone.
 const ANGLE_SHARE: f64 = 0.25;
 /// See [`ANGLE_SHARE`]; radians.
-const ANGLE_RAD: f64 = 1.0 / 180.0 * std::f64::consts::PI;
+const ANGLE_RAD: f64 = 2.0 / 180.0 * std::f64::consts::PI;
 /// By chance a grasp may lose its pose, and this share of all may.
 const LOST_SHARE: f64 = 0.1;
 /// Share of the other measurements that a prediction's own one must be nearer than, on average; 0.5 is chance.

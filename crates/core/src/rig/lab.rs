@@ -31,10 +31,10 @@ pub static GELSLIM: Sensor = Sensor {
 };
 
 /// Directions of the GelSlim's red, green and blue LED in its picture, radians from +x (right) towards +y (down): green
-/// lights the wrist side, red and blue 120 degrees away.
-pub(crate) const GELSLIM_LED_ANGLE_RAD: [f64; 3] = [-1.12, std::f64::consts::PI, 1.05];
+/// lights the wrist side, red and blue some 120 degrees away.
+pub(crate) const GELSLIM_LED_ANGLE_RAD: [f64; 3] = [-0.94, 2.91, 0.87];
 /// Brightness change of the GelSlim's picture per unit of slope, per channel, 0..255 scale.
-pub(crate) const GELSLIM_LED_GAIN: [f64; 3] = [82.0, 39.0, 48.0];
+pub(crate) const GELSLIM_LED_GAIN: [f64; 3] = [64.0, 36.0, 42.0];
 
 /// The Soft Bubble: a depth camera behind an air-filled membrane.
 pub static BUBBLE: Sensor = Sensor {
@@ -48,9 +48,12 @@ pub static BUBBLE: Sensor = Sensor {
     rotation_deg: 180,
 };
 
-/// Centers of what the GelSlims see, in raw bubble pixels: right, left. Measured on published pairs of both images, good to a
-/// pixel; those that CTTP draws its rectangles with lie 5 to 8 px nearer the tip and up to 7 px higher.
-const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[78.5, 74.0], [69.5, 73.0]];
+/// Centers of what the GelSlims see, in raw bubble pixels: right, left. Measured on published pairs by registering the bead in
+/// the GelSlim's picture and the crests of the imprint to the same tool, good to half a pixel.
+///
+/// Right is the finger whose pictures have +y downwards. CTTP's rectangles, at (73.3, 67.0) and (62.6, 70.3), have the names
+/// the other way round.
+const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[64.5, 71.6], [74.8, 73.4]];
 
 /// The whole rig; the windows are as large as the GelSlim's view (18.0 x 13.5 mm) at the bubble's scale.
 pub(super) fn rig() -> Rig {

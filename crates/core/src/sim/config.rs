@@ -3,6 +3,7 @@
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
+use super::Lens;
 use crate::noise::{Noise, Stream};
 use crate::rig::lab;
 
@@ -15,6 +16,9 @@ pub struct SimConfig {
     pub gelslim: GelSlimConfig,
 }
 
+/// Press of the nominal bubble, at which its camera is as far from the tool as the rig says.
+pub(super) const NOMINAL_PRESS_M: f64 = 0.0129;
+
 /// A Soft Bubble and its depth camera. Lengths in meters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BubbleConfig {
@@ -22,12 +26,20 @@ pub struct BubbleConfig {
     pub press_m: f64,
     /// Height of the dome over its rim.
     pub dome_rise_m: f64,
+    /// Share by which the dome is fuller than a paraboloid.
+    pub dome_fullness: f64,
     /// Semi-axes of the rim along y and z.
     pub rim_semi_axes_m: [f64; 2],
-    /// Place of the rim's center along z.
-    pub rim_center_z_m: f64,
-    /// Share of the displaced air that stays in the bubble and makes the rest bulge, 0..1.
-    pub air_kept: f64,
+    /// Center of the rim, (y, z), of the right and of the left finger.
+    pub rim_centers_m: [[f64; 2]; 2],
+    /// Slope of the rim's plane along z.
+    pub rim_tilt: f64,
+    /// Pressure during the touch over the tension of the flat membrane, 1/m.
+    pub pressure_per_m: f64,
+    /// Growth of the tension with the stretch: 0 for a soap film, 1 for a linear membrane.
+    pub stiffening: f64,
+    /// Distance by which the reference image is nearer than the dome.
+    pub reference_m: f64,
     /// Deviation of the camera's noise in one frame.
     pub noise_m: f64,
     /// Deviation of the slow distortion of one frame.
@@ -55,11 +67,15 @@ pub struct BubbleConfig {
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {
-            press_m: 0.0123,
-            dome_rise_m: 0.0145,
-            rim_semi_axes_m: [0.046, 0.066],
-            rim_center_z_m: 0.006,
-            air_kept: 0.45,
+            press_m: NOMINAL_PRESS_M,
+            dome_rise_m: 0.0354,
+            dome_fullness: 0.03,
+            rim_semi_axes_m: [0.0626, 0.076],
+            rim_centers_m: [[-0.0025, -0.0282], [0.0021, -0.0286]],
+            rim_tilt: 0.177,
+            pressure_per_m: 56.0,
+            stiffening: 4.78,
+            reference_m: 0.0019,
             noise_m: 0.000_6,
             drift_m: 0.000_25,
             texture_m: 0.000_5,
@@ -86,6 +102,8 @@ pub struct GelSlimConfig {
     pub tilt_rad: f64,
     /// Tilt by which the gel presses less deep towards the tool's tip, radians.
     pub lean_rad: f64,
+    /// Tilt by which it presses deeper towards the top of the picture, radians.
+    pub roll_rad: f64,
     /// Length over which the gel rises beside a dent.
     pub decay_m: f64,
     /// Blur of the surface.
@@ -102,61 +120,69 @@ pub struct GelSlimConfig {
     pub saturation: f64,
     /// Darkening of steep slopes.
     pub shadow: f64,
-    /// Slow color change from touch to touch.
-    pub color_drift: f64,
+    /// Slow color change from touch to touch, per channel.
+    pub color_drift: [f64; 3],
+    /// The lens of the right and of the left finger.
+    pub lenses: [Lens; 2],
     /// Distance of the markers.
     pub marker_pitch_m: f64,
     /// Radius of a marker.
     pub marker_radius_m: f64,
-    /// Offset of the marker grid, in pitches.
-    pub marker_phase: [f64; 2],
-    /// Rotation of the marker grid, radians.
-    pub marker_angle_rad: f64,
-    /// Widening of the marker grid at the picture's edge, relative.
-    pub marker_fan: f64,
+    /// Offset of the marker grid from the lens's center, in pitches, right and left finger.
+    pub marker_phase: [[f64; 2]; 2],
+    /// Rotation of the marker grid, radians, right and left finger.
+    pub marker_angle_rad: [f64; 2],
     /// Share of the light that a marker takes, 0..1.
     pub marker_darkness: f64,
     /// Sideways movement per unit slope of the bulk.
     pub marker_push_m: f64,
     /// Smoothing of the bulk.
     pub spread_m: f64,
+    /// Way that the grip draws the gel towards the tip.
+    pub drag_m: f64,
+    /// Widening of the gel under the grip, relative.
+    pub dilation: f64,
     /// Deviation of the grasp's shear.
     pub shear_m: f64,
     /// Deviation of the grasp's twist, radians.
     pub twist_rad: f64,
-    /// Deviation of the camera's noise.
-    pub noise: f64,
+    /// Deviation of the camera's noise, per channel.
+    pub noise: [f64; 3],
     /// Seed of the sensor's fixed traits: one sensor has one.
     pub sensor_seed: u64,
 }
 
 impl Default for GelSlimConfig {
+    /// Measured on published pictures of the lab's two GelSlims.
     fn default() -> Self {
         Self {
-            indentation_m: 0.001,
-            indentation_spread: 0.08,
-            tilt_rad: 0.012,
-            lean_rad: 0.0,
-            decay_m: 0.000_8,
-            smoothing_m: 0.000_08,
+            indentation_m: 0.001_05,
+            indentation_spread: 0.12,
+            tilt_rad: 0.03,
+            lean_rad: 0.074,
+            roll_rad: 0.025,
+            decay_m: 0.000_65,
+            smoothing_m: 0.000_06,
             led_angle_rad: lab::GELSLIM_LED_ANGLE_RAD,
             led_gain: lab::GELSLIM_LED_GAIN,
             led_falloff: 0.16,
             base: [78.0, 102.0, 147.0],
             saturation: 150.0,
-            shadow: 14.0,
-            color_drift: 2.0,
+            shadow: 20.0,
+            color_drift: [2.5, 0.9, 2.2],
+            lenses: Lens::LAB,
             marker_pitch_m: 0.001_42,
             marker_radius_m: 0.000_135,
-            marker_phase: [0.2, 0.4],
-            marker_angle_rad: 0.01,
-            marker_fan: 0.10,
-            marker_darkness: 0.55,
-            marker_push_m: 0.000_65,
+            marker_phase: [[0.72, 0.03], [0.44, 0.07]],
+            marker_angle_rad: [0.023, -0.030],
+            marker_darkness: 0.32,
+            marker_push_m: 0.001_2,
             spread_m: 0.001_6,
-            shear_m: 0.000_12,
-            twist_rad: 0.012,
-            noise: 2.4,
+            drag_m: 0.000_15,
+            dilation: 0.026,
+            shear_m: 0.000_06,
+            twist_rad: 0.003,
+            noise: [2.7, 1.5, 1.9],
             sensor_seed: 1,
         }
     }
@@ -214,7 +240,7 @@ impl GelSlimConfig {
             base: each(self.base, drawn.base),
             marker_pitch_m: beyond(self.marker_pitch_m, drawn.marker_pitch_m),
             marker_radius_m: beyond(self.marker_radius_m, drawn.marker_radius_m),
-            marker_angle_rad: beyond(self.marker_angle_rad, drawn.marker_angle_rad),
+            marker_angle_rad: drawn.marker_angle_rad,
             marker_phase: drawn.marker_phase,
             sensor_seed: drawn.sensor_seed,
             ..self
@@ -232,21 +258,32 @@ impl SimConfig {
     pub fn randomised(seed: u64) -> Self {
         let mut noise = Noise::new(seed, Stream::Config, 0);
         let (b, g) = (BubbleConfig::default(), GelSlimConfig::default());
-        // Published imprints stay pushed in up to the wrist's edge of the picture and fall off in a sharp step at the tool's
-        // tip side: a longer dome than the nominal one, pressed deeper, whose middle lies nearer the wrist and whose rim
-        // nearer the tool. Its range is narrow, because a GelSlim image does not tell which bubble belongs to it: a wide
+        // The lab's grip varies by 1.3 mm; its bubble hardly. A GelSlim image does not tell which bubble belongs to it: a wide
         // range would only blur what is learnt.
-        let rim_center_z_m = noise.uniform(-0.026, -0.021);
-        let rim_semi_axes_m = [noise.uniform(0.051, 0.056), noise.uniform(0.084, 0.09)];
-        let lean_rad = noise.uniform(-0.015, 0.065);
-        let decay_m = noise.uniform(0.000_5, 0.001_6);
+        let press_m = b.press_m + noise.uniform(-0.0022, 0.0022);
+        let rim_centers_m = b.rim_centers_m.map(|center| center.map(|c| c + noise.uniform(-0.001, 0.001)));
+        let lean_rad = noise.uniform(0.03, 0.11);
+        let smoothing_m = noise.uniform(0.000_03, 0.000_12);
+        let lenses = g.lenses.map(|lens| {
+            let second = noise.uniform(-0.43, -0.28);
+            Lens {
+                center_px: lens.center_px.map(|c| c + noise.uniform(-6.0, 6.0)),
+                px_per_m: lens.px_per_m * noise.uniform(0.97, 1.03),
+                radial: [second, -0.45 * second],
+                turn_rad: lens.turn_rad + noise.uniform(-0.01, 0.01),
+            }
+        });
         let mut around = |nominal: f64, spread: f64| nominal * noise.uniform(1.0 - spread, 1.0 + spread);
         let bubble = BubbleConfig {
-            press_m: around(0.0144, 0.05),
-            dome_rise_m: around(0.0155, 0.07),
-            rim_semi_axes_m,
-            rim_center_z_m,
-            air_kept: around(0.63, 0.1),
+            press_m,
+            dome_rise_m: around(b.dome_rise_m, 0.03),
+            dome_fullness: b.dome_fullness,
+            rim_semi_axes_m: b.rim_semi_axes_m.map(|a| around(a, 0.02)),
+            rim_centers_m,
+            rim_tilt: around(b.rim_tilt, 0.2),
+            pressure_per_m: around(b.pressure_per_m, 0.07),
+            stiffening: around(b.stiffening, 0.25),
+            reference_m: around(b.reference_m, 0.3),
             noise_m: around(b.noise_m, 0.4),
             drift_m: around(b.drift_m, 0.6),
             texture_m: around(b.texture_m, 0.4),
@@ -264,26 +301,29 @@ impl SimConfig {
             indentation_spread: around(g.indentation_spread, 0.5),
             tilt_rad: around(g.tilt_rad, 0.6),
             lean_rad,
-            decay_m,
-            smoothing_m: around(g.smoothing_m, 0.6),
+            roll_rad: around(g.roll_rad, 1.5),
+            decay_m: around(g.decay_m, 0.3),
+            smoothing_m,
             led_angle_rad: g.led_angle_rad.map(|a| a + around(1.0, 0.22) - 1.0),
             led_gain: g.led_gain.map(|a| around(a, 0.35)),
             led_falloff: around(g.led_falloff, 0.7),
             base: g.base.map(|a| around(a, 0.15)),
             saturation: around(g.saturation, 0.3),
-            shadow: around(g.shadow, 0.8),
-            color_drift: around(g.color_drift, 0.8),
+            shadow: around(g.shadow, 0.6),
+            color_drift: g.color_drift.map(|drift| around(drift, 0.8)),
+            lenses,
             marker_pitch_m: around(g.marker_pitch_m, 0.12),
             marker_radius_m: around(g.marker_radius_m, 0.2),
-            marker_phase: [around(0.5, 1.0), around(0.5, 1.0)],
-            marker_angle_rad: around(1.0, 0.06) - 1.0,
-            marker_fan: around(g.marker_fan, 0.8),
-            marker_darkness: around(g.marker_darkness, 0.18),
-            marker_push_m: around(g.marker_push_m, 0.5),
+            marker_phase: g.marker_phase.map(|phase| phase.map(|_| around(0.5, 1.0))),
+            marker_angle_rad: g.marker_angle_rad.map(|_| around(1.0, 0.05) - 1.0),
+            marker_darkness: around(g.marker_darkness, 0.3),
+            marker_push_m: around(g.marker_push_m, 0.4),
             spread_m: around(g.spread_m, 0.3),
+            drag_m: around(g.drag_m, 1.0),
+            dilation: around(g.dilation, 0.6),
             shear_m: around(g.shear_m, 0.8),
             twist_rad: around(g.twist_rad, 0.9),
-            noise: around(g.noise, 0.5),
+            noise: g.noise.map(|deviation| around(deviation, 0.5)),
             sensor_seed: seed ^ 0x5EED_6E15,
         };
         Self { bubble, gelslim }

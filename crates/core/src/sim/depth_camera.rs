@@ -38,43 +38,20 @@ impl Rays {
         let d = self.grasp_from_camera.matrix3 * lab::BUBBLE.crop.lift(&self.intrinsics, u as f64, v as f64, 1.0);
         DVec3::new(self.outward * d.x, d.y, d.z)
     }
-}
 
-/// Depth of the free dome, meters.
-pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
-    let origin = rays.origin();
-    DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| dome_hit(origin, rays.direction(u, v), dome) as f32)
-}
-
-/// Depth at which a ray meets the dome: its height over the dome is a quadratic in depth, negative at the camera.
-fn dome_hit(origin: DVec3, d: DVec3, dome: &Dome) -> f64 {
-    let o = (DVec2::new(origin.y, origin.z) - dome.center) / dome.semi;
-    let e = DVec2::new(d.y, d.z) / dome.semi;
-    let a = dome.rise * e.length_squared();
-    let b = d.x + 2.0 * dome.rise * o.dot(e);
-    let c = origin.x - dome.apex + dome.rise * o.length_squared();
-    2.0 * -c / (b + (b * b - 4.0 * a * c).max(0.0).sqrt())
-}
-
-/// Depth of the pressed membrane, meters, and where it lies on the tool.
-pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap, Mask) {
-    let origin = rays.origin();
-    let mut contact = Mask::filled(lab::BUBBLE.width, lab::BUBBLE.height, false);
-    // the membrane is nowhere pushed in further than this, so a ray cannot meet it before it meets this dome
-    let lowest = membrane.lowest_dome();
-    let depth = DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
-        let d = rays.direction(u, v);
+    /// Depth at which the ray of a pixel first meets a surface that is nowhere lower than `lowest`, meters: behind a bar the
+    /// wall hides the membrane.
+    fn first_hit(&self, u: usize, v: usize, lowest: f64, surface: impl Fn(DVec2) -> f64) -> f64 {
+        let (origin, d) = (self.origin(), self.direction(u, v));
         let above = |z: f64| {
             let p = origin + d * z;
-            p.x - membrane.height(DVec2::new(p.y, p.z))
+            p.x - surface(DVec2::new(p.y, p.z))
         };
-        // The first crossing counts: behind a bar the wall hides the membrane. With the steepest slope
-        // known, a step of the remaining height over that rate cannot jump over the surface.
+        // With the steepest slope known, a step of the remaining height over that rate cannot jump over the surface.
         let rate = d.x.abs() + MAX_SLOPE * DVec2::new(d.y, d.z).length();
-        let mut low = dome_hit(origin, d, &lowest) - 1e-4;
+        let mut low = ((lowest - origin.x) / d.x.max(1e-3) - 1e-4).max(0.0);
         let mut f_low = above(low);
-        let mut high = low;
-        let mut f_high = f_low;
+        let (mut high, mut f_high) = (low, f_low);
         for _ in 0..300 {
             if f_high >= 0.0 {
                 break;
@@ -93,10 +70,28 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
             let f = above(z);
             if f < 0.0 { (low, f_low) = (z, f) } else { (high, f_high) = (z, f) }
         }
-        let hit = origin + d * high;
+        high
+    }
+}
+
+/// Depth of the free dome, meters.
+pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
+    let lowest = dome.apex - dome.rise - (dome.tilt * dome.semi.y).abs();
+    DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
+        rays.first_hit(u, v, lowest, |yz| dome.height(yz)) as f32
+    })
+}
+
+/// Depth of the pressed membrane, meters, and where it lies on the tool.
+pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane) -> (DepthMap, Mask) {
+    let mut contact = Mask::filled(lab::BUBBLE.width, lab::BUBBLE.height, false);
+    let lowest = membrane.lowest();
+    let depth = DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
+        let depth = rays.first_hit(u, v, lowest, |yz| membrane.height(yz));
+        let hit = rays.origin() + rays.direction(u, v) * depth;
         let yz = DVec2::new(hit.y, hit.z);
         contact[(u, v)] = membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;
-        high as f32
+        depth as f32
     });
     (depth, contact)
 }
@@ -109,7 +104,7 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane<'_>) -> (DepthMap,
 /// * the noise of the one reference frame, the same in every image of a sensor: grain and speckles, because the
 ///   texture printed on the membrane disturbs the camera;
 /// * flying pixels between foreground and background at depth steps; dropped pixels, which read 0.
-pub(crate) fn measure(
+pub(super) fn measure(
     reference: &DepthMap,
     depth: &DepthMap,
     config: &BubbleConfig,

@@ -53,7 +53,7 @@ impl Fault {
         let mut tool = tools()[number].clone();
         if self == Self::StraightRod {
             // So long that neither end is felt.
-            tool.bars[0].core.iter_mut().for_each(|end| *end *= 2.5);
+            tool.points_mut().for_each(|end| *end *= 2.5);
         }
         tool
     }
@@ -67,9 +67,8 @@ impl Fault {
     pub fn sample(self) -> Sample {
         let mut felt = self.tool();
         if self == Self::BlobInMask {
-            // As thick as the tool, between two of its arms.
-            felt.bars
-                .push(Bar { core: vec![DVec2::new(0.011, -0.016), DVec2::new(0.018, -0.020)], half_width_m: 0.004 });
+            // As thick as the tool, beside it.
+            felt.bars.push(Bar::straight(DVec2::new(-0.016, 0.002), DVec2::new(-0.022, 0.006), 0.004));
         }
         let mut sample = simulate(&felt, self.grasp(), SEED, &SimConfig::default());
         if self == Self::BlankFinger {

@@ -7,7 +7,7 @@
 
 use glam::DVec2;
 
-use super::{GelSlimConfig, rig};
+use super::{GelSlimConfig, Lens, rig};
 use crate::catalog::ToolSpec;
 use crate::frames::PlanarPose;
 use crate::grid::RgbGrid;
@@ -20,12 +20,71 @@ use crate::sample::{ColorImages, ColorTouch};
 const STEP_M: f64 = 0.000_15;
 /// Margin of the gel beyond the picture, meters.
 const MARGIN_M: f64 = 0.002_4;
-/// Pixels of the picture per grid step.
-const PX_PER_STEP: f64 = STEP_M * lab::GELSLIM.px_per_m;
-/// Grid steps from the first node to the first pixel.
-const MARGIN_STEPS: f64 = MARGIN_M / STEP_M;
+/// Half the width of the picture, on which the light falls off, meters.
+const HALF_WIDTH_M: f64 = 0.009;
+/// Lengths of the gel's stains, and of the slow change of its colors, meters.
+const STAIN_M: f64 = 0.006_3;
+const DRIFT_M: f64 = 0.005_5;
 
-/// Gel, by the depth that the tool pushes into it, in picture axes (x right, y down), meters.
+/// Grid on the gel, along the picture's axes (right, down), and where the pixels of the picture lie in it.
+struct Frame {
+    lens: Lens,
+    columns: usize,
+    rows: usize,
+    /// For each pixel the place in the grid, in steps.
+    nodes: Vec<[f32; 2]>,
+}
+
+impl Frame {
+    fn new(lens: Lens) -> Self {
+        let half = (lens.half_extent() + MARGIN_M) / STEP_M;
+        let (columns, rows) = (2 * half.x.ceil() as usize + 1, 2 * half.y.ceil() as usize + 1);
+        let mut frame = Self { lens, columns, rows, nodes: Vec::new() };
+        let (width, height) = (lab::GELSLIM.width, lab::GELSLIM.height);
+        let pixels = (0..width * height).map(|i| DVec2::new((i % width) as f64, (i / width) as f64));
+        let view = lens.view();
+        frame.nodes = pixels.map(|px| frame.node(view(px)).as_vec2().to_array()).collect();
+        frame
+    }
+
+    fn middle(&self) -> DVec2 {
+        DVec2::new((self.columns / 2) as f64, (self.rows / 2) as f64)
+    }
+
+    /// Place in the grid, in steps, of a place on the gel, meters from the picture's middle.
+    fn node(&self, flat: DVec2) -> DVec2 {
+        flat / STEP_M + self.middle()
+    }
+
+    /// The inverse of [`Frame::node`].
+    fn flat(&self, i: usize, j: usize) -> DVec2 {
+        (DVec2::new(i as f64, j as f64) - self.middle()) * STEP_M
+    }
+
+    /// The picture of a color at every node.
+    fn picture(&self, mut color: impl FnMut(usize, usize) -> [f32; 3]) -> RgbGrid {
+        let mut values = Vec::with_capacity(self.columns * self.rows);
+        for j in 0..self.rows {
+            for i in 0..self.columns {
+                values.push(color(i, j));
+            }
+        }
+        RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
+            let [i, j] = self.nodes[y * lab::GELSLIM.width + x];
+            let (tx, ty) = (i.fract(), j.fract());
+            let k = j as usize * self.columns + i as usize;
+            let (a, b) = (&values[k], &values[k + 1]);
+            let (c, d) = (&values[k + self.columns], &values[k + self.columns + 1]);
+            std::array::from_fn(|n| {
+                let top = a[n] + (b[n] - a[n]) * tx;
+                let bottom = c[n] + (d[n] - c[n]) * tx;
+                top + (bottom - top) * ty
+            })
+        })
+    }
+}
+
+/// Gel, by the depth that the tool pushes into it, meters.
 struct Gel {
     pushed: Field,
 }
@@ -36,20 +95,20 @@ impl Gel {
         tool: &ToolSpec,
         object_from_grasp: PlanarPose,
         finger: PadId,
+        frame: &Frame,
         noise: &mut Noise,
     ) -> Self {
-        let (columns, rows) = grid_size();
+        let (columns, rows) = (frame.columns, frame.rows);
         // the two surfaces are never quite parallel
         let tilt = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.tilt_rad
-            - DVec2::Y * config.lean_rad;
+            + DVec2::new(rig::outward(finger) * config.roll_rad, -config.lean_rad);
         let depth = config.indentation_m * (1.0 + config.indentation_spread * f64::from(noise.normal()));
         let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
+        let solid = tool.solid();
         for j in 0..rows {
             for i in 0..columns {
-                let column = (i as f64 - MARGIN_STEPS) * PX_PER_STEP;
-                let row = (j as f64 - MARGIN_STEPS) * PX_PER_STEP;
-                let yz = rig::gelslim_yz(finger, column, row);
-                if let Some(height) = tool.height(object_from_grasp.transform_yz(yz)) {
+                let yz = rig::gelslim_yz(finger, frame.flat(i, j));
+                if let Some(height) = solid.height(object_from_grasp.transform_yz(yz)) {
                     let push = depth - (tool.half_thickness_m - height) + tilt.dot(yz);
                     obstacle.values[j * columns + i] = push as f32;
                 }
@@ -85,7 +144,7 @@ impl Gel {
 }
 
 /// Gaussian blur as three box blurs along each axis; the border repeats.
-pub(crate) fn blur(field: &mut Field, sigma: f64) {
+fn blur(field: &mut Field, sigma: f64) {
     let radius = ((sigma * sigma + 0.25).sqrt() - 0.5).round() as usize;
     if radius == 0 {
         return;
@@ -113,7 +172,7 @@ pub(crate) fn blur(field: &mut Field, sigma: f64) {
 }
 
 /// The slope of a field at every node, meters per meter.
-pub(crate) fn slopes(field: &Field, step: f64) -> [Field; 2] {
+fn slopes(field: &Field, step: f64) -> [Field; 2] {
     let (columns, rows) = (field.columns, field.rows);
     let mut out = [Field::filled(columns, rows, 0.0), Field::filled(columns, rows, 0.0)];
     let scale = (0.5 / step) as f32;
@@ -136,20 +195,21 @@ pub(super) fn touch(
     seed: u64,
 ) -> ColorTouch {
     let mut noise = Noise::new(seed, Stream::Gel, finger.index());
-    let gel = Gel::press(config, tool, object_from_grasp, finger, &mut noise);
+    let frame = Frame::new(config.lenses[finger.index()]);
+    let gel = Gel::press(config, tool, object_from_grasp, finger, &frame, &mut noise);
 
-    let base = illumination(config, finger);
-    let markers = marker_grid(config, finger);
+    let base = illumination(config, finger, &frame);
+    let markers = marker_grid(config, finger, &frame);
     let mut reference = base.clone();
-    for &(center, size) in &markers {
-        stamp(&mut reference, center, size, config.marker_darkness);
+    for &(place, size) in &markers {
+        stamp(&mut reference, &frame.lens, place, size, config.marker_darkness);
     }
     add_noise(&mut reference, config.noise, &mut Noise::new(config.sensor_seed, Stream::GelReference, finger.index()));
 
     let mut raw = base;
-    shade(&mut raw, config, &gel, &mut noise);
-    for (center, size) in moved(&markers, config, &gel, &mut noise) {
-        stamp(&mut raw, center, size, config.marker_darkness);
+    shade(&mut raw, config, &gel, &frame, &mut noise);
+    for (place, size) in moved(&markers, config, &gel, &frame, &mut noise) {
+        stamp(&mut raw, &frame.lens, place, size, config.marker_darkness);
     }
     add_noise(&mut raw, config.noise, &mut Noise::new(seed, Stream::GelNoise, finger.index()));
     let difference = RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
@@ -158,81 +218,29 @@ pub(super) fn touch(
     ColorTouch { images: Some(ColorImages { raw, reference }), difference }
 }
 
-/// A color at every grid node, for effects that are smooth over a few pixels.
-struct Wash {
-    columns: usize,
-    values: Vec<[f32; 3]>,
-}
-
-impl Wash {
-    /// From a function of the node's column and row.
-    fn new(columns: usize, rows: usize, mut f: impl FnMut(usize, usize) -> [f32; 3]) -> Self {
-        let mut values = Vec::with_capacity(columns * rows);
-        for j in 0..rows {
-            for i in 0..columns {
-                values.push(f(i, j));
-            }
-        }
-        Self { columns, values }
-    }
-
-    /// The interpolated picture.
-    fn picture(&self) -> RgbGrid {
-        let steps: Vec<(usize, f32)> = (0..lab::GELSLIM.width.max(lab::GELSLIM.height))
-            .map(|x| {
-                let i = x as f64 / PX_PER_STEP + MARGIN_STEPS;
-                (i as usize, i.fract() as f32)
-            })
-            .collect();
-        RgbGrid::from_fn(lab::GELSLIM.width, lab::GELSLIM.height, |x, y| {
-            let ((i, tx), (j, ty)) = (steps[x], steps[y]);
-            let k = j * self.columns + i;
-            let (a, b) = (&self.values[k], &self.values[k + 1]);
-            let (c, d) = (&self.values[k + self.columns], &self.values[k + self.columns + 1]);
-            std::array::from_fn(|n| {
-                let top = a[n] + (b[n] - a[n]) * tx;
-                let bottom = c[n] + (d[n] - c[n]) * tx;
-                top + (bottom - top) * ty
-            })
-        })
-    }
-}
-
-/// Columns and rows of the solver's grid.
-fn grid_size() -> (usize, usize) {
-    (
-        (lab::GELSLIM.width as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
-        (lab::GELSLIM.height as f64 / PX_PER_STEP + 2.0 * MARGIN_STEPS).ceil() as usize + 1,
-    )
-}
-
 /// The light without contact and without markers: each LED is brighter on its own side.
-fn illumination(config: &GelSlimConfig, finger: PadId) -> RgbGrid {
+fn illumination(config: &GelSlimConfig, finger: PadId, frame: &Frame) -> RgbGrid {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 8 + finger.index());
-    let (columns, rows) = grid_size();
-    let stain = noise.smooth(columns, rows, 150.0 / PX_PER_STEP);
+    let stain = noise.smooth(frame.columns, frame.rows, STAIN_M / STEP_M);
     let leds = config.led_directions();
-    let middle = DVec2::new(columns as f64, rows as f64) * 0.5;
-    let half_width = 0.5 * lab::GELSLIM.width as f64 / PX_PER_STEP;
-    Wash::new(columns, rows, |i, j| {
-        let p = (DVec2::new(i as f64, j as f64) - middle) / half_width;
+    frame.picture(|i, j| {
+        let p = frame.flat(i, j) / HALF_WIDTH_M;
         std::array::from_fn(|c| {
             let fall = 1.0 + config.led_falloff * leds[c].dot(p) - 0.12 * (p.length_squared() - 0.5);
             (config.base[c] * fall) as f32 * (1.0 + 0.02 * stain[(i, j)])
         })
     })
-    .picture()
 }
 
 /// Adds the light and shade of the gel's slopes.
-fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noise) {
+fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, frame: &Frame, noise: &mut Noise) {
     let mut pushed = gel.pushed.clone();
     blur(&mut pushed, config.smoothing_m / STEP_M);
     let [slope_x, slope_y] = slopes(&pushed, STEP_M);
     let (columns, rows) = (pushed.columns, pushed.rows);
-    let slow: [_; 3] = std::array::from_fn(|_| noise.smooth(columns, rows, 130.0 / PX_PER_STEP));
+    let slow: [_; 3] = std::array::from_fn(|_| noise.smooth(columns, rows, DRIFT_M / STEP_M));
     let leds = config.led_directions();
-    let light = Wash::new(columns, rows, |i, j| {
+    let light = frame.picture(|i, j| {
         // the side of a dent faces away from where it is deepest
         let k = j * columns + i;
         let facing = -DVec2::new(f64::from(slope_x.values[k]), f64::from(slope_y.values[k]));
@@ -242,10 +250,9 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
                 - config.shadow * steep / (1.0 + steep);
             // more light saturates
             let light = light / (1.0 + (light / config.saturation).powi(2)).sqrt();
-            (light + config.color_drift * f64::from(slow[c][(i, j)])) as f32
+            (light + config.color_drift[c] * f64::from(slow[c][(i, j)])) as f32
         })
-    })
-    .picture();
+    });
     for (pixel, light) in image.as_mut_slice().iter_mut().zip(light.as_slice()) {
         for c in 0..3 {
             pixel[c] += light[c];
@@ -253,62 +260,64 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, noise: &mut Noi
     }
 }
 
-/// Center (pixels) and radius (pixels) of each marker without contact.
-fn marker_grid(config: &GelSlimConfig, finger: PadId) -> Vec<(DVec2, f64)> {
+/// Place on the gel and radius of each marker without contact, meters.
+fn marker_grid(config: &GelSlimConfig, finger: PadId, frame: &Frame) -> Vec<(DVec2, f64)> {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());
-    let pitch = config.marker_pitch_m * lab::GELSLIM.px_per_m;
-    let radius = config.marker_radius_m * lab::GELSLIM.px_per_m;
-    let center = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
-    let turn = DVec2::from_angle(config.marker_angle_rad);
-    let reach = (lab::GELSLIM.width as f64 / pitch) as i32;
+    let (pitch, phase) = (config.marker_pitch_m, DVec2::from_array(config.marker_phase[finger.index()]));
+    let center = frame.lens.flat(DVec2::from_array(frame.lens.center_px));
+    let turn = DVec2::from_angle(config.marker_angle_rad[finger.index()] + frame.lens.turn_rad);
+    let extent = frame.lens.half_extent() + pitch;
+    let reach = (extent.x / pitch) as i32 + 2;
     let mut markers = Vec::new();
     for j in -reach..=reach {
         for i in -reach..=reach {
-            let cell = DVec2::new(f64::from(i) + config.marker_phase[0], f64::from(j) + config.marker_phase[1]);
             let jitter = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * 0.03;
-            let flat = turn.rotate(cell + jitter) * pitch;
-            // the gel is curved: the grid looks wider towards the rim
-            let p = center + flat * (1.0 + config.marker_fan * (flat / center.x).length_squared());
-            let size = radius * (1.0 + 0.12 * f64::from(noise.normal()));
-            let inside = p.cmpge(DVec2::splat(-10.0)).all()
-                && p.cmple(DVec2::new(lab::GELSLIM.width as f64, lab::GELSLIM.height as f64) + 10.0).all();
-            if inside {
-                markers.push((p, size));
+            let cell = DVec2::new(f64::from(i), f64::from(j)) + phase + jitter;
+            let place = center + turn.rotate(cell) * pitch;
+            let size = config.marker_radius_m * (1.0 + 0.12 * f64::from(noise.normal()));
+            if place.abs().cmple(extent).all() {
+                markers.push((place, size));
             }
         }
     }
     markers
 }
 
-/// The markers during the touch: pushed away from the dents, plus the shear and twist of the grasp.
-fn moved(markers: &[(DVec2, f64)], config: &GelSlimConfig, gel: &Gel, noise: &mut Noise) -> Vec<(DVec2, f64)> {
+/// The markers during the touch: pushed away from the dents, drawn along and apart by the grip, sheared and twisted.
+fn moved(
+    markers: &[(DVec2, f64)],
+    config: &GelSlimConfig,
+    gel: &Gel,
+    frame: &Frame,
+    noise: &mut Noise,
+) -> Vec<(DVec2, f64)> {
     let bulk = gel.bulk(config.spread_m);
     let slopes = slopes(&bulk, 4.0 * STEP_M);
     let shear = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * config.shear_m;
     let twist = f64::from(noise.normal()) * config.twist_rad;
-    let deepest = bulk.values.iter().fold(1e-9_f32, |a, &b| a.max(b));
-    let center = DVec2::new(0.5 * lab::GELSLIM.width as f64, 0.5 * lab::GELSLIM.height as f64);
     markers
         .iter()
-        .map(|&(p, size)| {
-            let node = (p / PX_PER_STEP + MARGIN_STEPS) / 4.0 - 0.375;
+        .map(|&(place, size)| {
+            let node = frame.node(place) / 4.0 - 0.375;
             let away = -DVec2::new(slopes[0].at(node.x, node.y), slopes[1].at(node.x, node.y));
-            // friction drags the gel along where it is pressed
-            let held = bulk.at(node.x, node.y) / f64::from(deepest);
-            let drag = (shear * lab::GELSLIM.px_per_m + (p - center).perp() * twist) * (0.35 + 0.65 * held);
-            (p + away * config.marker_push_m * lab::GELSLIM.px_per_m + drag, size)
+            let drag = DVec2::X * config.drag_m + shear + place * config.dilation + place.perp() * twist;
+            (place + away * config.marker_push_m + drag, size)
         })
         .collect()
 }
 
-/// Darkens a soft round spot.
-fn stamp(image: &mut RgbGrid, center: DVec2, radius: f64, darkness: f64) {
-    let reach = radius + 2.5;
-    let span = |c: f64, n: usize| (c - reach).max(0.0) as usize..((c + reach).max(0.0) as usize + 1).min(n);
+/// Darkens a soft round spot at a place on the gel.
+fn stamp(image: &mut RgbGrid, lens: &Lens, place: DVec2, radius_m: f64, darkness: f64) {
+    /// Width of the spot's edge, pixels.
+    const EDGE: f64 = 3.8;
+    let center = lens.pixel(place);
+    let radius = radius_m * lens.scale(center);
+    let reach = radius + EDGE;
+    let span = |c: f64, n: usize| ((c - reach).max(0.0) as usize).min(n)..((c + reach).max(0.0) as usize + 1).min(n);
     for y in span(center.y, image.height()) {
         for x in span(center.x, image.width()) {
             let r = (DVec2::new(x as f64, y as f64) - center).length();
-            let cover = (0.5 + (radius - r) / 2.4).clamp(0.0, 1.0);
+            let cover = (0.5 + (radius - r) / EDGE).clamp(0.0, 1.0);
             let keep = (1.0 - darkness * cover * cover * (3.0 - 2.0 * cover)) as f32;
             for value in &mut image[(x, y)] {
                 *value *= keep;
@@ -318,11 +327,10 @@ fn stamp(image: &mut RgbGrid, center: DVec2, radius: f64, darkness: f64) {
 }
 
 /// Adds sensor noise and rounds to the camera's whole values.
-fn add_noise(image: &mut RgbGrid, deviation: f64, noise: &mut Noise) {
-    let deviation = deviation as f32;
+fn add_noise(image: &mut RgbGrid, deviations: [f64; 3], noise: &mut Noise) {
     for pixel in image.as_mut_slice() {
-        for value in pixel {
-            *value = (*value + deviation * noise.normal()).round().clamp(0.0, 255.0);
+        for (value, deviation) in pixel.iter_mut().zip(deviations) {
+            *value = (*value + deviation as f32 * noise.normal()).round().clamp(0.0, 255.0);
         }
     }
 }

@@ -1,32 +1,32 @@
-//! The bubble's membrane: an inflated elastic sheet over an elliptical rim, pressed onto the tool.
+//! The bubble's membrane: a sheet over a deep elliptical rim, blown up and pressed onto the tool.
 //!
-//! Coordinates of one finger: `n` points away from the finger (towards the other one, 0 in the middle plane), `y`
-//! and `z` are the grasp frame's. Free, the membrane is the dome `n = dome(y, z)`, the exact solution of
-//! "tension times curvature equals pressure" for an elliptical rim. Pressed, it may pass neither the tool nor the
-//! middle plane (where it meets the other finger's membrane, which mirrors it); in between it spans freely, so it
-//! tents between bars. The pressure acts along the sheet's normal, so it bends a steep sheet more than a flat one: beside
-//! a bar the membrane falls off steeply and then levels out. The trapped air cannot leave: part of the volume that the tool takes comes back as extra
-//! pressure, which makes the free parts bulge beyond the dome.
+//! Coordinates of one finger: `n` points away from the finger (towards the other one, 0 in the tool's middle plane), `y` and
+//! `z` are the grasp frame's. Free, the membrane is a dome over the rim. Pressed, it may not pass the tool; in between it
+//! spans freely, so it hangs in flat facets from bead to bead and falls off steeply beside a bar (see [`super::sheet`]).
+//! The law and its constants were fitted to half of 36 published imprints and kept on the other half: the best touch of the
+//! same tool then resembles a real one to 28.2 dB (best straight line, 64 px).
+//!
+//! Left out: friction between membrane and tool, the air that the tool displaces, the other finger's membrane.
 
 use glam::DVec2;
 
+use super::sheet::Sheet;
 use super::{BubbleConfig, MEMBRANE_STEP_M};
-use crate::catalog::ToolSpec;
+use crate::catalog::{Solid, ToolSpec};
 use crate::frames::PlanarPose;
-use crate::relax::{Field, Problem};
+use crate::rig::PadId;
 
 /// A pressed membrane.
-pub struct Membrane<'a> {
+pub struct Membrane {
     dome: Dome,
-    tool: &'a ToolSpec,
+    tool: Solid,
     object_from_grasp: PlanarPose,
-    /// Dome minus membrane at the grid nodes, meters.
-    pushed: Field,
-    /// Cells (and their neighbors) in which a bar begins or lies.
+    sheet: Sheet,
+    /// Height at each node, meters.
+    height: Vec<f64>,
+    /// Nodes that a bar lies beside or under.
     near_tool: Vec<bool>,
     origin: DVec2,
-    #[cfg(test)]
-    rest: (Field, Vec<bool>, f32, Field),
 }
 
 /// The undeformed membrane.
@@ -36,6 +36,10 @@ pub struct Dome {
     pub apex: f64,
     /// Height of the apex over the rim, meters.
     pub rise: f64,
+    /// Share by which it is fuller than a paraboloid.
+    pub fullness: f64,
+    /// Slope of the rim's plane along z.
+    pub tilt: f64,
     /// Semi-axes of the rim along y and z, meters.
     pub semi: DVec2,
     /// Center of the rim, (y, z), meters.
@@ -43,70 +47,65 @@ pub struct Dome {
 }
 
 impl Dome {
-    /// The dome of a bubble pressed by `config.press_m` onto a tool of this thickness.
-    pub fn new(config: &BubbleConfig, half_thickness_m: f64) -> Self {
+    /// The dome of a finger's bubble pressed by `config.press_m` onto a tool of this thickness.
+    pub fn new(config: &BubbleConfig, half_thickness_m: f64, finger: PadId) -> Self {
         Self {
             apex: config.press_m - half_thickness_m,
             rise: config.dome_rise_m,
+            fullness: config.dome_fullness,
+            tilt: config.rim_tilt,
             semi: DVec2::from_array(config.rim_semi_axes_m),
-            center: DVec2::new(0.0, config.rim_center_z_m),
+            center: DVec2::from_array(config.rim_centers_m[finger.index()]),
         }
     }
 
-    /// Height at `(y, z)`; beyond the rim it goes on falling.
+    /// Height at `(y, z)`; beyond the rim that of the rim's plane.
     pub fn height(&self, yz: DVec2) -> f64 {
-        self.apex - self.rise * ((yz - self.center) / self.semi).length_squared()
+        let share = ((yz - self.center) / self.semi).length_squared().min(1.0);
+        self.apex - self.rise * share * (1.0 - self.fullness * (1.0 - share)) + self.tilt * (yz.y - self.center.y)
+    }
+
+    /// Height of the rim's plane at `(y, z)`.
+    fn rim(&self, yz: DVec2) -> f64 {
+        self.apex - self.rise + self.tilt * (yz.y - self.center.y)
     }
 }
 
-impl<'a> Membrane<'a> {
-    /// Solves the contact of the membrane with `tool` held at `object_from_grasp`.
-    pub fn press(config: &BubbleConfig, tool: &'a ToolSpec, object_from_grasp: PlanarPose) -> Self {
-        let dome = Dome::new(config, tool.half_thickness_m);
-        let step = MEMBRANE_STEP_M;
-        let size = (2.0 * dome.semi / step).ceil();
-        let (columns, rows) = (size.x as usize + 3, size.y as usize + 3);
+impl Membrane {
+    /// Solves the contact of a finger's membrane with `tool` held at `object_from_grasp`.
+    pub fn press(config: &BubbleConfig, tool: &ToolSpec, object_from_grasp: PlanarPose, finger: PadId) -> Self {
+        let dome = Dome::new(config, tool.half_thickness_m, finger);
+        let tool = tool.solid();
+        let count = (2.0 * dome.semi / MEMBRANE_STEP_M).ceil();
+        let step = 2.0 * dome.semi / count;
+        let (columns, rows) = (count.x as usize + 3, count.y as usize + 3);
         let origin = dome.center - dome.semi - step;
-
-        let mut obstacle = Field::filled(columns, rows, f32::NEG_INFINITY);
-        let mut free = vec![false; columns * rows];
-        let mut near = vec![false; columns * rows];
-        for j in 0..rows {
-            for i in 0..columns {
-                let k = j * columns + i;
-                let yz = origin + DVec2::new(i as f64, j as f64) * step;
-                free[k] = ((yz - dome.center) / dome.semi).length_squared() < 1.0;
-                if !free[k] {
-                    continue;
-                }
-                let s = tool.outline_distance(object_from_grasp.transform_yz(yz));
-                near[k] = s < 1.5 * step;
-                let surface = if s <= 0.0 { -tool.height_at(s) } else { 0.0 };
-                obstacle.values[k] = (dome.height(yz) - surface) as f32;
+        let mut sheet = Sheet {
+            columns,
+            rows,
+            step,
+            obstacle: vec![f64::INFINITY; columns * rows],
+            free: vec![false; columns * rows],
+            rim: [dome.apex - dome.rise, dome.tilt],
+            load: config.pressure_per_m,
+            stiffening: config.stiffening,
+        };
+        let mut near_tool = vec![false; columns * rows];
+        for (k, near) in near_tool.iter_mut().enumerate() {
+            let yz = origin + DVec2::new((k % columns) as f64, (k / columns) as f64) * step;
+            sheet.free[k] = ((yz - dome.center) / dome.semi).length_squared() < 1.0;
+            let p = object_from_grasp.transform_yz(yz);
+            let beside = tool.outline_distance(p);
+            *near = beside < 1.5 * step.max_element();
+            if sheet.free[k] && beside < WIDER_M {
+                // A thin bead may fall between the nodes: the tool is a little wider for them.
+                let around = [DVec2::ZERO, DVec2::X, -DVec2::X, DVec2::Y, -DVec2::Y].map(|to| p + to * WIDER_M);
+                let highest = around.into_iter().filter_map(|p| tool.height(p)).reduce(f64::max);
+                sheet.obstacle[k] = highest.map_or(f64::INFINITY, |height| -height);
             }
         }
-        let mut problem =
-            Problem { obstacle: &obstacle, free: &free, load: 0.0, more: None, stiffness: 0.0, step: step as f32 };
-        problem.load = extra_pressure(&problem, config.air_kept, &dome);
-        let mut pushed = problem.solve(LEVELS, SWEEPS);
-        #[cfg(test)]
-        let mut rest = None;
-        for _ in 0..BENDINGS {
-            let more = bending(&pushed, &dome, problem.load, origin);
-            pushed = Problem { more: Some(&more), ..problem }.solve(LEVELS, SWEEPS);
-            #[cfg(test)]
-            rest.replace((obstacle.clone(), free.clone(), problem.load, more));
-        }
-        Self {
-            dome,
-            tool,
-            object_from_grasp,
-            pushed,
-            near_tool: near,
-            origin,
-            #[cfg(test)]
-            rest: rest.expect("it was bent"),
-        }
+        let height = sheet.solve();
+        Self { dome, tool, object_from_grasp, sheet, height, near_tool, origin }
     }
 
     /// The undeformed shape.
@@ -114,38 +113,27 @@ impl<'a> Membrane<'a> {
         &self.dome
     }
 
-    /// A dome that the membrane is nowhere below.
-    pub(super) fn lowest_dome(&self) -> Dome {
-        let deepest = self.pushed.values.iter().fold(0.0_f32, |a, &w| a.max(w));
-        // between nodes the tool's exact surface counts, a little deeper than the grid's
-        Dome { apex: self.dome.apex - f64::from(deepest) - 2e-3, ..self.dome }
+    /// Height that the membrane is nowhere below, meters.
+    pub(super) fn lowest(&self) -> f64 {
+        // Between the nodes the tool's exact surface counts, a little deeper than the grid's.
+        self.height.iter().copied().fold(f64::INFINITY, f64::min) - 2e-3
     }
 
     /// Height of the membrane at `(y, z)`, meters.
     pub fn height(&self, yz: DVec2) -> f64 {
-        let grid = (yz - self.origin) / MEMBRANE_STEP_M;
-        let free = self.dome.height(yz) - self.pushed.at(grid.x, grid.y);
-        // between the nodes the tool's edges are sharper than the grid
-        if self.is_near(grid) {
-            let s = self.tool.outline_distance(self.object_from_grasp.transform_yz(yz));
-            if s <= 0.0 {
-                return free.min(-self.tool.height_at(s));
-            }
+        let at = (yz - self.origin) / self.sheet.step;
+        let (columns, rows) = (self.sheet.columns, self.sheet.rows);
+        if !(at.x >= 0.0 && at.y >= 0.0 && at.x < (columns - 1) as f64 && at.y < (rows - 1) as f64) {
+            return self.dome.rim(yz);
+        }
+        let free = self.sheet.between(&self.height, at);
+        let k = at.y as usize * columns + at.x as usize;
+        // Between the nodes the tool's edges are sharper than the grid.
+        if [k, k + 1, k + columns, k + columns + 1].iter().any(|&k| self.near_tool[k]) {
+            let tool = self.tool.height(self.object_from_grasp.transform_yz(yz));
+            return tool.map_or(free, |height| free.min(-height));
         }
         free
-    }
-
-    fn is_near(&self, grid: DVec2) -> bool {
-        let columns = self.pushed.columns;
-        if grid.x < 0.0 || grid.y < 0.0 {
-            return false;
-        }
-        let (i, j) = (grid.x as usize, grid.y as usize);
-        if i + 1 >= columns || j + 1 >= self.pushed.rows {
-            return false;
-        }
-        let k = j * columns + i;
-        self.near_tool[k] || self.near_tool[k + 1] || self.near_tool[k + columns] || self.near_tool[k + columns + 1]
     }
 
     /// Distance of the membrane's point `(n, y, z)` from the tool's surface, meters, negative inside; more than
@@ -156,116 +144,41 @@ impl<'a> Membrane<'a> {
         if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }
     }
 
-    /// Largest and mean difference, meters, from the solution after many more sweeps.
-    #[cfg(test)]
-    fn error_against_many_sweeps(&self, sweeps: usize) -> (f64, f64) {
-        let (obstacle, free, load, more) = &self.rest;
-        let step = MEMBRANE_STEP_M as f32;
-        let problem = Problem { obstacle, free, load: *load, more: Some(more), stiffness: 0.0, step };
-        let mut converged = self.pushed.clone();
-        problem.relax(&mut converged, sweeps);
-        let error = |(a, b): (&f32, &f32)| f64::from((a - b).abs());
-        let errors: Vec<f64> = converged.values.iter().zip(&self.pushed.values).map(error).collect();
-        (errors.iter().copied().fold(0.0, f64::max), errors.iter().sum::<f64>() / errors.len() as f64)
-    }
-
     /// Largest depth of a grid node inside the tool, meters.
     pub fn worst_gap(&self) -> f64 {
         let mut worst = 0.0_f64;
-        for j in 0..self.pushed.rows {
-            for i in 0..self.pushed.columns {
-                let yz = self.origin + DVec2::new(i as f64, j as f64) * MEMBRANE_STEP_M;
-                if let Some(h) = self.tool.height(self.object_from_grasp.transform_yz(yz)) {
-                    let n = self.dome.height(yz) - f64::from(self.pushed.values[j * self.pushed.columns + i]);
-                    worst = worst.max(n + h);
-                }
+        for (k, n) in self.height.iter().enumerate() {
+            let node = DVec2::new((k % self.sheet.columns) as f64, (k / self.sheet.columns) as f64);
+            let yz = self.origin + node * self.sheet.step;
+            if let Some(h) = self.tool.height(self.object_from_grasp.transform_yz(yz)) {
+                worst = worst.max(n + h);
             }
         }
         worst
     }
 }
 
-/// Load that the slopes of the sheet add to the load `extra`: a pressure p (over tension) bends a sheet of slope s by p
-/// (1 + s²)^1.5, the flat-sheet equation by p. The dome's own pressure and slopes are in its shape already.
-fn bending(pushed: &Field, dome: &Dome, extra: f32, origin: DVec2) -> Field {
-    let (columns, rows) = (pushed.columns, pushed.rows);
-    let rest = 2.0 * dome.rise * dome.semi.powf(-2.0).element_sum();
-    let pressure = rest - f64::from(extra);
-    let bent = |slope: DVec2| (1.0 + slope.length_squared().min(STEEPEST * STEEPEST)).powf(1.5);
-    let mut more = Field::filled(columns, rows, 0.0);
-    for j in 1..rows - 1 {
-        for i in 1..columns - 1 {
-            let k = j * columns + i;
-            let w = |k: usize| f64::from(pushed.values[k]);
-            let slope = DVec2::new(w(k + 1) - w(k - 1), w(k + columns) - w(k - columns)) / (2.0 * MEMBRANE_STEP_M);
-            let yz = origin + DVec2::new(i as f64, j as f64) * MEMBRANE_STEP_M;
-            let dome_slope = -2.0 * dome.rise * (yz - dome.center) / (dome.semi * dome.semi);
-            let added = pressure * (bent(dome_slope - slope) - 1.0) - rest * (bent(dome_slope) - 1.0);
-            more.values[k] = -added as f32;
-        }
-    }
-    more
-}
-
-/// The trapped air: the load that brings back the share `kept` of the volume that the tool takes without it. A grid
-/// four times as coarse is fine enough for a volume.
-fn extra_pressure(problem: &Problem<'_>, kept: f64, dome: &Dome) -> f32 {
-    let (obstacle, free) = problem.coarser(0);
-    let half = Problem { obstacle: &obstacle, free: &free, step: 2.0 * problem.step, ..*problem };
-    let (obstacle, free) = half.coarser(1);
-    let mut coarse = Problem { obstacle: &obstacle, free: &free, step: 2.0 * half.step, ..half };
-    let cell = f64::from(coarse.step).powi(2);
-    let volume = |w: &Field| w.values.iter().map(|&w| f64::from(w)).sum::<f64>() * cell;
-    let mut w = coarse.solve(3, 12);
-    let taken = volume(&w);
-    // without any contact a load gives back this volume per unit
-    let (a, b) = (dome.semi.x, dome.semi.y);
-    let free_response = std::f64::consts::PI * a * b / (4.0 * (a.powi(-2) + b.powi(-2)));
-    let mut response = free_response;
-    for _ in 0..4 {
-        coarse.load = -(kept * taken / response) as f32;
-        coarse.relax(&mut w, 30);
-        let back = taken - volume(&w);
-        if coarse.load == 0.0 || back <= 0.0 {
-            break;
-        }
-        // the contact holds the membrane: less comes back, but never less than a quarter
-        response = (back / -f64::from(coarse.load)).clamp(0.25 * free_response, free_response);
-    }
-    -(kept * taken / response) as f32
-}
-
-/// Grids in the solver, the coarsest 8 times the finest step.
-const LEVELS: usize = 4;
-/// Times that the load is corrected for the slopes it led to.
-const BENDINGS: usize = 2;
-/// Slopes beyond this one bend no more: near vertical the sheet would hang over, which a height cannot say.
-const STEEPEST: f64 = 1.6;
-/// Sweeps on each grid. 24 leave an error below 0.1 mm against a thousand (tested).
-const SWEEPS: usize = 24;
+/// Widening of the tool for the nodes, meters.
+const WIDER_M: f64 = 0.000_4;
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::catalog::tools;
-    use crate::sim::{Grasp, SimConfig, random_grasp};
+    use crate::rig::lab;
+    use crate::sim::{Grasp, SimConfig};
 
     #[test]
-    fn few_sweeps_are_enough() {
-        for (i, tool) in tools().iter().enumerate().step_by(4) {
-            let membrane =
-                Membrane::press(&SimConfig::default().bubble, tool, random_grasp(i as u64).object_from_grasp());
-            let before = membrane.pushed.clone();
-            let (worst, mean) = membrane.error_against_many_sweeps(3000);
-            assert!(worst < 2e-4 && mean < 8e-5, "{}: worst {worst}, mean {mean}", tool.name);
-            assert!(before.values.iter().any(|&w| w < -1e-3), "the free parts bulge");
-        }
-    }
-
-    #[test]
-    fn without_contact_the_membrane_is_the_dome() {
-        let config = BubbleConfig { press_m: -0.002, ..BubbleConfig::default() };
-        let membrane = Membrane::press(&config, &tools()[0], Grasp::default().object_from_grasp());
-        assert!(membrane.pushed.values.iter().all(|w| w.abs() < 1e-7), "nothing touches, nothing moves");
+    fn the_membrane_hangs_from_the_beads_and_falls_off_beside_the_tool() {
+        let tool = &tools()[2];
+        let config = SimConfig::default().bubble;
+        let membrane = Membrane::press(&config, tool, Grasp::default().object_from_grasp(), lab::RIGHT);
+        assert!(membrane.worst_gap() < 1e-6);
+        let at = |y: f64, z: f64| membrane.height(DVec2::new(y, z) * 1e-3);
+        let top = -tool.half_thickness_m;
+        assert!((at(0.0, 0.0) - top).abs() < 1e-4, "on the bead");
+        // Between two bars it does not reach the walls' feet; beyond the tool's end it falls on towards the rim.
+        assert!(at(8.0, 8.0) > top + 1e-3 && at(8.0, 8.0) < top + 0.012, "{}", at(8.0, 8.0));
+        assert!(at(0.0, 37.0) < top - 2e-3, "{}", at(0.0, 37.0));
     }
 }

@@ -4,13 +4,15 @@ use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
 use super::{BubbleConfig, Condition, SimConfig, random_grasp};
-use crate::catalog::{self, ToolSpec};
+use crate::catalog;
 use crate::sample::Sample;
 
 /// Share of drawn tools in [`Mix::Train`].
 const DRAWN_TOOLS: f64 = 0.4;
 /// Share of touches by nominal sensors in [`Mix::Train`].
 const NOMINAL: f64 = 0.4;
+/// Variation of the lab's grip, meters.
+const GRIP_M: f64 = 0.0022;
 
 /// Mix that touches are drawn from.
 #[derive(
@@ -28,7 +30,7 @@ const NOMINAL: f64 = 0.4;
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Mix {
-    /// The seen tools and drawn ones, most of them stretched and felt by drawn sensors; never an unseen tool.
+    /// The seen tools and drawn ones, most of them felt by drawn sensors; never an unseen tool.
     #[default]
     Train,
     /// The tools of [`Mix::Train`], felt by drawn sensors alone, with bubbles of any size pressed 2 to 15 mm deep: for
@@ -48,7 +50,7 @@ pub struct Drawn {
     pub sample: Sample,
     /// The tool's place in the catalog; `None` for a drawn one.
     pub tool: Option<usize>,
-    /// True where the sensors are the nominal ones and the tool as the catalog has it.
+    /// True where the sensors are the nominal ones.
     pub nominal: bool,
 }
 
@@ -65,46 +67,31 @@ pub fn training_touch(seed: u64, index: u64, mix: Mix, condition: Condition) -> 
     };
     let nominal = !train || rng.random_bool(if mix == Mix::Depths { 0.0 } else { NOMINAL });
     let spec = tool.map_or_else(|| catalog::random_tool(rng.random()), |i| catalog[i].clone());
-    let spec = if nominal { spec } else { stretched(spec, &mut rng) };
     let mut config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
     if mix == Mix::Depths {
         config.bubble = of_any_depth(config.bubble, &mut rng);
+    } else if nominal && train {
+        // The lab's grip varies from touch to touch.
+        config.bubble.press_m += rng.random_range(-GRIP_M..GRIP_M);
     }
     let (grasp, noise) = (random_grasp(rng.random()), rng.random());
     let sample = condition.simulate(&condition.tool(&spec, index), grasp, noise, &config);
     Drawn { sample, tool, nominal }
 }
 
-/// The tool with narrower bars, longer ones to the sides and towards the wrist and shorter ones at the tip, as the real tools
-/// have: most of their bars that lie across run out of the picture.
-fn stretched(mut tool: ToolSpec, rng: &mut ChaCha8Rng) -> ToolSpec {
-    let side = rng.random_range(1.0..2.4);
-    let wrist = rng.random_range(0.95..1.3);
-    let tip = rng.random_range(0.15..0.9);
-    for p in tool.bars.iter_mut().flat_map(|bar| &mut bar.core) {
-        p.x *= side;
-        p.y *= if p.y > 0.0 { tip } else { wrist };
-    }
-    // Real bars are narrower than the catalog's, with sharper rims.
-    let width = rng.random_range(0.5..1.0);
-    tool.bars.iter_mut().for_each(|bar| bar.half_width_m *= width);
-    let bevel = rng.random_range(0.4..1.0);
-    tool.bevel_width_m *= bevel * width;
-    tool.bevel_depth_m *= bevel;
-    tool
-}
-
 /// The bubble in another size, pressed on as lightly or as hard as any gripper does; slower distortions weigh more where the
 /// imprint is shallow.
 pub fn of_any_depth(bubble: BubbleConfig, rng: &mut ChaCha8Rng) -> BubbleConfig {
-    let press_m = 0.002 * 7.5_f64.powf(rng.random_range(0.0..1.0));
+    let press_m = 0.003 * 6.0_f64.powf(rng.random_range(0.0..1.0));
     let size = rng.random_range(0.55..1.0);
     BubbleConfig {
         press_m,
         dome_rise_m: bubble.dome_rise_m * rng.random_range(0.5..1.1),
         rim_semi_axes_m: bubble.rim_semi_axes_m.map(|a| a * size),
-        rim_center_z_m: bubble.rim_center_z_m * rng.random_range(-0.3..1.0),
-        air_kept: bubble.air_kept * rng.random_range(0.0..1.0),
+        rim_centers_m: bubble.rim_centers_m.map(|[y, z]| [y, z * rng.random_range(0.0..1.0)]),
+        rim_tilt: bubble.rim_tilt * rng.random_range(-0.5..1.2),
+        pressure_per_m: bubble.pressure_per_m * rng.random_range(0.4..1.4),
+        stiffening: rng.random_range(0.5..6.0),
         noise_m: bubble.noise_m * rng.random_range(0.2..1.0),
         texture_m: bubble.texture_m * rng.random_range(0.0..1.0),
         speckle_density: bubble.speckle_density * rng.random_range(0.0..1.0),

@@ -21,7 +21,6 @@ use touch2touch_core::catalog;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::measured;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::resample::{bilinear, bilinear_rgb};
 use touch2touch_core::rig::{PadId, Rig, lab};
@@ -29,6 +28,8 @@ use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{Condition, Mix, training_touch};
 
 const WHAT: &str = "Write training data";
+/// Tells the simulator's touches from those of the simulator before: shards of both do not mix.
+const SIMULATOR: &str = "measured tools and membrane";
 /// Pairs in memory at a time.
 const CHUNK: usize = 64;
 
@@ -47,8 +48,6 @@ pub enum TouchSource<'a> {
         condition: Condition,
         /// Decides all of it.
         seed: u64,
-        /// The lab's own tools and sensors, as measured on real pairs; the condition is plain then.
-        lab: bool,
     },
 }
 
@@ -259,9 +258,9 @@ impl<'a> Reader<'a> {
     fn name(&self) -> String {
         match self.source {
             TouchSource::Dataset(dataset, ..) => names::label(&dataset.title),
-            TouchSource::Simulator { mix, condition, seed, lab, .. } => {
-                let (mix, what): (&str, _) = (mix.into(), if lab { "lab" } else { condition.key() });
-                format!("simulated-{mix}-{what}-{seed}")
+            TouchSource::Simulator { mix, condition, seed, .. } => {
+                let mix: &str = mix.into();
+                format!("simulated-{mix}-{}-{seed}", condition.key())
             }
         }
     }
@@ -269,9 +268,9 @@ impl<'a> Reader<'a> {
     fn about(&self) -> Value {
         match self.source {
             TouchSource::Dataset(dataset, ..) => json!({"source": dataset.title}),
-            TouchSource::Simulator { grasps, mix, condition, seed, lab } => json!({
-                "source": "simulator", "mix": mix, "condition": condition, "grasps": grasps, "seed": seed, "lab": lab,
-                "windows_px": windows_px(lab),
+            TouchSource::Simulator { grasps, mix, condition, seed } => json!({
+                "source": "simulator", "mix": mix, "condition": condition, "grasps": grasps, "seed": seed,
+                "windows_px": windows_px(),
             }),
         }
     }
@@ -283,10 +282,9 @@ impl<'a> Reader<'a> {
                 let name = |id: &PairId| dataset.index.get(*id).map(|entry| entry.name.as_str());
                 json!([dataset.title, self.pairs[range].iter().map(name).collect::<Vec<_>>()])
             }
-            TouchSource::Simulator { mix, condition, seed, lab: false, .. } => {
-                json!([mix, condition, seed, [range.start, range.end]])
+            TouchSource::Simulator { mix, condition, seed, .. } => {
+                json!([SIMULATOR, mix, condition, seed, [range.start, range.end]])
             }
-            TouchSource::Simulator { mix, seed, .. } => json!(["lab", mix, seed, [range.start, range.end]]),
         };
         sha256(text.to_string().as_bytes())[..16].to_owned()
     }
@@ -294,12 +292,8 @@ impl<'a> Reader<'a> {
     fn read(&self, at: usize) -> Result<Vec<ShardTouch>, Remark> {
         match self.source {
             TouchSource::Dataset(dataset, labels, _) => self.measured(dataset, labels, at),
-            TouchSource::Simulator { mix, condition, seed, lab, .. } => {
-                let drawn = if lab {
-                    measured::training_touch(seed, at as u64, mix)
-                } else {
-                    training_touch(seed, at as u64, mix, condition)
-                };
+            TouchSource::Simulator { mix, condition, seed, .. } => {
+                let drawn = training_touch(seed, at as u64, mix, condition);
                 let origin = match (mix, drawn.nominal) {
                     (Mix::Depths, _) => Origin::AnyDepth,
                     (_, true) => Origin::Nominal,
@@ -348,11 +342,10 @@ impl<'a> Reader<'a> {
     }
 }
 
-/// Centers of the GelSlims' windows in the raw bubble picture, of each finger: of the measured rig, or of the simulator's.
-fn windows_px(lab: bool) -> Vec<[f64; 2]> {
+/// Centers of the GelSlims' windows in the raw bubble picture, of each finger.
+fn windows_px() -> Vec<[f64; 2]> {
     let rig = Rig::lab();
-    let simulated = || rig.pads().filter_map(|pad| Some(rig.color_window(pad)?.center_px)).collect();
-    if lab { measured::WINDOWS_PX.to_vec() } else { simulated() }
+    rig.pads().filter_map(|pad| Some(rig.color_window(pad)?.center_px)).collect()
 }
 
 /// A touch without what only the simulator or people know; `None` where a sensor felt nothing.

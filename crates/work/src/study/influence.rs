@@ -265,7 +265,7 @@ mod tests {
         };
         let (all, by_mask_alone) = correlation(&|start| by_mask(usize::MAX, start));
         let (thinned, _) = correlation(&|start| by_mask(AlignConfig::default().points, start));
-        assert!(all > 0.8, "{all}");
+        assert!(all > 0.65, "{all}");
         // The product thins, and which points stay changes with the mask: that moves the angle as much as a square does.
         assert!(thinned > 0.2 && thinned < all, "{thinned}");
         let (joint, with_membranes) = correlation(&|start| {

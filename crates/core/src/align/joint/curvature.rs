@@ -15,7 +15,9 @@ const PLACES: usize = 800;
 const KERNEL_M: f64 = 0.5e-3;
 /// The variance of a place's height is four times this times the noise that is left, meters: neighbors err together, and a
 /// part of what is left is the template's error, which hardly moves the pose. From fresh grasps under two laws.
-const SHARED_M: f64 = 4e-5;
+const SHARED_M: f64 = 5e-5;
+/// The same of a membrane that hangs from the tool.
+const HANGING_SHARED_M: f64 = 8e-5;
 /// The same of predicted images, whose errors go together over the width of a bar. From fresh grasps that the shipped
 /// generator predicted.
 const PREDICTED_SHARED_M: f64 = 42e-5;
@@ -42,7 +44,11 @@ impl Problem<'_> {
         let patches = self.patches_of(self.answer_band(), PLACES);
         let noise_m = noise_m(Relief::of(&patches, at, KERNEL_M).residuals_m).max(1e-6);
         let mut joint = Joint { fingers: &patches, kernel_m: KERNEL_M, mask: None, lookups: 0 };
-        let shared_m = if self.is_predicted() { PREDICTED_SHARED_M } else { SHARED_M };
+        let shared_m = match (self.is_predicted(), self.hangs()) {
+            (true, _) => PREDICTED_SHARED_M,
+            (false, true) => HANGING_SHARED_M,
+            (false, false) => SHARED_M,
+        };
         let scale = KERNEL_M.powi(2) * joint.points() as f64 / (4.0 * shared_m * noise_m);
         let information = in_the_hand(&joint.sums(at).h, pose) * scale;
         Uncertainty::new(information, self.centroid(), pose, patches.len().max(1) as f64)

@@ -120,7 +120,8 @@ impl Problem<'_> {
             .filter(|finger| finger[0].1.len() > 0)
             .map(|finger| Relief::of(finger, at, LOOK.kernel_m).likeness())
             .fold(1.0, f64::min);
-        let descent = DESCENT.map(|look| (self.patches_of(look.band, look.places), look.kernel_m));
+        let descent =
+            DESCENT.map(|look| (self.patches_of(look.band.min(self.answer_band()), look.places), look.kernel_m));
         let all = 0..descent[0].0.len();
         let (own, gain) = descend(&descent, all.clone(), at);
         let alone: Vec<(State, f64)> = all.map(|finger| descend(&descent, finger..finger + 1, own)).collect();

@@ -7,11 +7,16 @@ use super::smooth::{Band, Layer, Smooth};
 use crate::align::PadImage;
 use crate::align::lanes::{MAGIC, MAGIC_MASK};
 use crate::mesh::sampling::spread;
+use crate::tent::FreeShape;
 
-/// The zone is where the free membrane lies less than this above its floor, at least, meters, and less than this share of
-/// the tool's height above it: there the template's plane and the free membrane are the same to the tool.
+/// The zone is where the free membrane lies less than this above its lowest part, at least, meters, and less than a share of the
+/// tool's height above it: one that reaches the middle plane is the template's plane only there, and one that hangs over it falls
+/// off to the rim, whatever the tool.
 const ZONE_M: f32 = 0.5e-3;
 const ZONE_SHARE: f64 = 0.2;
+const HANGING_ZONE_SHARE: f64 = 0.65;
+/// A free membrane whose lowest part is nearer to the middle plane reaches it, meters.
+const REACHES_M: f64 = 1e-3;
 /// Heights beyond these are no membrane of a closed gripper, meters.
 const LOWEST_M: f32 = -0.05;
 /// Spacing of the image's grid, meters: about the width of the narrowest Gaussian.
@@ -22,8 +27,8 @@ const LANES: usize = 8;
 const SHAPE_PIXELS: usize = 400;
 /// Highest floor, meters: a gripper that is wide open.
 const HIGHEST_M: f32 = 0.05;
-/// Greatest height that counts, meters.
-const CLIP_M: f32 = 0.012;
+/// Greatest height over the tool's top that counts, meters.
+const CLIP_M: f32 = 0.5e-3;
 /// Margin of the image around the zone, meters.
 const MARGIN_M: f64 = 0.003;
 /// Pixels nearer to the zone's border are not compared, meters: beyond it the membrane is not the template's.
@@ -41,10 +46,8 @@ const NODE_WEIGHT: f32 = 1.0;
 pub(super) struct Image {
     /// The sign of x on the finger's side of the middle plane.
     pub(super) side: f64,
-    /// The Laplacian of the free membrane's height in the zone, 1/m.
-    pub(super) curvature: f64,
-    /// Height of the plane that it reaches, over the middle plane, meters.
-    pub(super) floor_m: f64,
+    /// The free membrane about the zone.
+    pub(super) free: FreeShape,
     origin: DVec2,
     /// Nodes of the zone with depth: column and row.
     nodes: Vec<[u16; 2]>,
@@ -84,7 +87,7 @@ impl Rays {
     }
 }
 
-/// Zone in which the free membranes would meet.
+/// Zone in which the tool shapes the membrane.
 struct Zone {
     /// For each row the first and one past the last column.
     spans: Vec<[usize; 2]>,
@@ -92,16 +95,16 @@ struct Zone {
     inner: Vec<[usize; 2]>,
     low: DVec2,
     high: DVec2,
-    curvature: f64,
-    /// Height of the plane that the free membrane reaches: the middle plane, or where it ends before that, meters.
-    floor_m: f32,
+    free: FreeShape,
 }
 
 impl Zone {
     fn new(image: &PadImage<'_>, rays: &Rays, top_m: f64) -> Option<Self> {
         let reference = &image.camera.depth_reference;
         let floor_m = floor(image, rays);
-        let zone_m = floor_m + ZONE_M.max((ZONE_SHARE * (top_m - f64::from(floor_m))) as f32);
+        let reaches = f64::from(floor_m) < REACHES_M;
+        let share = if reaches { ZONE_SHARE } else { HANGING_ZONE_SHARE };
+        let zone_m = floor_m + ZONE_M.max((share * (top_m - f64::from(floor_m))) as f32);
         let mut spans = vec![[0usize; 2]; reference.height()];
         let mut pixels = 0;
         for (v, span) in spans.iter_mut().enumerate() {
@@ -151,7 +154,7 @@ impl Zone {
         let size = high - low;
         let sized = size.is_finite() && size.min_element() > 4.0 * STEP_M && size.max_element() < 0.3;
         let inner = shrunk(&spans, BORDER_M, image);
-        sized.then_some(Self { spans, inner, low, high, curvature: shape.laplacian(), floor_m })
+        sized.then_some(Self { spans, inner, low, high, free: FreeShape { reaches, ..shape.at_origin() } })
     }
 }
 
@@ -204,19 +207,30 @@ struct Quadratic {
 }
 
 impl Quadratic {
+    /// Makes the terms comparable.
+    const UNIT_M: f64 = 0.01;
+
     fn add(&mut self, yz: DVec2, height: f64) {
-        /// Makes the terms comparable.
-        const UNIT_M: f64 = 0.01;
-        let p = (yz - *self.origin.get_or_insert(yz)) / UNIT_M;
+        let p = (yz - *self.origin.get_or_insert(yz)) / Self::UNIT_M;
         let terms = SVector::from([1.0, p.x, p.y, p.x * p.x, p.x * p.y, p.y * p.y]);
         self.h += terms * terms.transpose();
-        self.g += terms * (height / (UNIT_M * UNIT_M));
+        self.g += terms * (height / (Self::UNIT_M * Self::UNIT_M));
     }
 
-    /// 1/m; 0 where nothing determines it.
-    fn laplacian(self) -> f64 {
-        let found = self.h.cholesky().map(|c| c.solve(&self.g));
-        found.map(|f| 2.0 * (f[3] + f[5])).filter(|c| c.is_finite()).unwrap_or(0.0)
+    /// The surface about y = z = 0; flat where nothing determines it.
+    fn at_origin(self) -> FreeShape {
+        let found = self.h.cholesky().map(|c| c.solve(&self.g)).filter(|f| f.iter().all(|v| v.is_finite()));
+        let (Some(f), Some(origin)) = (found, self.origin) else { return FreeShape::default() };
+        // In units of 0.01 m: terms of the place about the origin of the sums.
+        let p = -origin / Self::UNIT_M;
+        let height = f[0] + f[1] * p.x + f[2] * p.y + f[3] * p.x * p.x + f[4] * p.x * p.y + f[5] * p.y * p.y;
+        let slope = DVec2::new(f[1] + 2.0 * f[3] * p.x + f[4] * p.y, f[2] + f[4] * p.x + 2.0 * f[5] * p.y);
+        FreeShape {
+            height_m: height * Self::UNIT_M * Self::UNIT_M,
+            slope: slope * Self::UNIT_M,
+            bend: DVec2::new(2.0 * f[3], 2.0 * f[5]).max(DVec2::ZERO),
+            reaches: false,
+        }
     }
 }
 
@@ -245,7 +259,8 @@ struct Placing<'a> {
     rays: &'a Rays,
     /// Origin of the rays about the grid's.
     from: Vec3,
-    floor_m: f32,
+    /// Greatest height that counts, meters.
+    clip_m: f32,
     columns: usize,
     rows: usize,
 }
@@ -282,20 +297,20 @@ impl Placing<'_> {
             placed.fy[l] = y - column;
             placed.fz[l] = z - row;
             let free = rays.height(direction_x, reference);
-            let free = if free > self.floor_m { free } else { self.floor_m };
-            placed.height[l] = (if height < CLIP_M { height } else { CLIP_M }) - free;
+            let free = if free > 0.0 { free } else { 0.0 };
+            placed.height[l] = (if height < self.clip_m { height } else { self.clip_m }) - free;
         }
         placed
     }
 }
 
 impl Splat {
-    fn new(image: &PadImage<'_>, rays: &Rays, zone: &Zone) -> Self {
+    fn new(image: &PadImage<'_>, rays: &Rays, zone: &Zone, top_m: f64) -> Self {
         let origin = zone.low - MARGIN_M;
         let count = ((zone.high + MARGIN_M - origin) / STEP_M).ceil() + 1.0;
         let (columns, rows) = (count.x as usize, count.y as usize);
         let from = Vec3::new(rays.from.x, rays.from.y - origin.x as f32, rays.from.z - origin.y as f32);
-        let placing = Placing { rays, from, floor_m: zone.floor_m, columns, rows };
+        let placing = Placing { rays, from, clip_m: top_m as f32 + CLIP_M, columns, rows };
         // One more than there are, for the pixels that have no place.
         let mut pairs: Vec<Pair> = vec![[0.0; 4]; columns * (rows + 1) + 1];
         let mut inside = vec![false; columns * rows + 1];
@@ -354,14 +369,15 @@ fn at_nodes(pairs: &[Pair], columns: usize, rows: usize) -> Layer<2> {
 }
 
 impl Image {
-    /// `None` where the free membrane does not reach the middle plane, or the camera cannot be right.
+    /// `None` where the free membrane lies too far from the tool, or the camera cannot be right.
     pub(super) fn new(image: &PadImage<'_>, tops_m: [f64; 2]) -> Option<Self> {
         if image.imprint.size() != image.camera.depth_reference.size() || !image.camera.intrinsics.is_plausible() {
             return None;
         }
         let rays = Rays::new(image)?;
-        let zone = Zone::new(image, &rays, tops_m[usize::from(rays.side > 0.0)])?;
-        let splat = Splat::new(image, &rays, &zone);
+        let top_m = tops_m[usize::from(rays.side > 0.0)];
+        let zone = Zone::new(image, &rays, top_m)?;
+        let splat = Splat::new(image, &rays, &zone, top_m);
         let columns = splat.nodes.columns;
         let smooth = Smooth::new(&splat.nodes, STEP_M, STEP_M * STEP_M / 6.0);
         let nodes: Vec<[u16; 2]> = (0..splat.inside.len())
@@ -371,14 +387,7 @@ impl Image {
             .map(|at| at.map(|n| n as u16))
             .collect();
         let side = f64::from(rays.side);
-        Some(Self {
-            side,
-            curvature: zone.curvature,
-            floor_m: f64::from(zone.floor_m),
-            origin: splat.origin,
-            nodes,
-            smooth,
-        })
+        Some(Self { side, free: zone.free, origin: splat.origin, nodes, smooth })
     }
 
     /// Nodes of the zone with depth.

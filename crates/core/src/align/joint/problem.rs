@@ -18,6 +18,7 @@ use crate::align::{
 };
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
+use crate::tent::FreeShape;
 use crate::tool::ToolModel;
 
 /// Smallest area of the membranes that is compared, square meters.
@@ -81,6 +82,8 @@ pub(super) struct Problem<'a> {
     /// The mask's points for scouts and for the answer; `None` where they are too few.
     mask: Option<[Cloud; 2]>,
     not_finite: usize,
+    /// True where the free membrane does not reach the middle plane.
+    hangs: bool,
     /// True where a model predicted the images.
     predicted: bool,
 }
@@ -171,11 +174,17 @@ impl<'a> Problem<'a> {
             return Ok(None);
         }
         // The membranes of a gripper are alike: one free shape, the mean of all images.
-        let mean = |of: fn(&Image) -> f64| images.iter().map(|image| of(image) * image.area_m2()).sum::<f64>() / area;
-        let (curvature, floor_m) = (mean(|image| image.curvature), mean(|image| image.floor_m));
+        let mean =
+            |of: fn(&Image) -> DVec2| images.iter().map(|image| of(image) * image.area_m2()).sum::<DVec2>() / area;
+        let free = FreeShape {
+            height_m: mean(|image| DVec2::splat(image.free.height_m)).x,
+            slope: mean(|image| image.free.slope),
+            bend: mean(|image| image.free.bend),
+            reaches: images.iter().all(|image| image.free.reaches),
+        };
         let fingers: Vec<Finger> = images
             .into_iter()
-            .filter_map(|image| Some(Finger { template: template(tool, image.side, curvature, floor_m)?, image }))
+            .filter_map(|image| Some(Finger { template: template(tool, image.side, free)?, image }))
             .collect();
         let places: Vec<DVec2> =
             fingers.iter().flat_map(|finger| finger.image.sample(BANDS[0], 64).map(|(place, _)| place)).collect();
@@ -196,7 +205,7 @@ impl<'a> Problem<'a> {
             })
         });
         let predicted = scene.images().iter().any(|image| image.predicted);
-        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted }))
+        Ok(Some(Self { tool, config, fingers, centroid, mask, not_finite, predicted, hangs: !free.reaches }))
     }
 
     /// The point about which everything turns, `(y, z)`, meters.
@@ -230,13 +239,17 @@ impl<'a> Problem<'a> {
 
     /// The images as a stage compares them.
     pub(super) fn patches(&self, stage: usize) -> Patches<'_> {
-        let band = if stage == LAST { self.answer_band() } else { stage };
-        self.patches_of(band, self.config.points[stage])
+        self.patches_of(stage.min(self.answer_band()), self.config.points[stage])
     }
 
-    /// Band that decides the answer: the finest that is not noise.
+    /// Band that decides the answer: the finest that is not noise. To a membrane that hangs from the tool, and to a predicted one,
+    /// lengths of 0.7 to 2 mm are.
     pub(super) fn answer_band(&self) -> usize {
-        BANDS.len() - 1 - usize::from(self.predicted)
+        BANDS.len() - 1 - usize::from(self.predicted || self.hangs)
+    }
+
+    pub(super) fn hangs(&self) -> bool {
+        self.hangs
     }
 
     pub(super) fn is_predicted(&self) -> bool {

@@ -8,15 +8,14 @@ use glam::DVec2;
 use super::pyramid::Pyramid;
 use super::smooth::{BANDS, Layer, Smooth};
 use crate::relax::Field;
-use crate::tent::{STEP_M, heights, tent};
+use crate::tent::{FreeShape, STEP_M, heights, lifted, tent};
 use crate::tool::ToolModel;
 
-/// Curvatures of free membranes, 1/m: flat as a large bubble, and round as a small one.
-const CURVATURE: std::ops::RangeInclusive<f64> = 8.0..=400.0;
-/// Templates are made for so many curvatures between one and twice it.
-const STEPS: f64 = 4.0;
-/// Templates are made for floors so far apart, meters.
-const FLOOR_M: f64 = 0.5e-3;
+/// Templates are made for free membranes so far apart: height (meters), slopes, and bends (1/m).
+const STEPS: [f64; 5] = [1e-3, 0.05, 0.05, 2.0, 2.0];
+/// Curvatures of free membranes, 1/m: of a large bubble, and of a small one.
+const FLATTEST: f64 = 8.0;
+const ROUNDEST: f64 = 400.0;
 
 /// A band of a membrane's height over the y-z plane of the object frame, meters.
 pub(super) struct BandField {
@@ -29,29 +28,34 @@ pub(super) struct BandField {
 /// The bands of one side of a tool, in the order of [`BANDS`].
 pub(super) type Template = [BandField; BANDS.len()];
 
-/// Step of curvature, step of floor, and the side.
-type Key = (i32, i32, bool);
+/// Steps of height, slopes and bends, the side, and whether the free membrane reaches the middle plane.
+type Key = ([i32; 5], bool, bool);
 
 /// The templates of a tool. `None` where the tool has nothing on that side.
 #[derive(Default)]
 struct Templates(Mutex<BTreeMap<Key, Option<Arc<Template>>>>);
 
-/// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane whose free
-/// height has the Laplacian `curvature` (1/m) and which reaches the plane `floor_m` over the middle plane, over which heights
-/// count. Made at the first request (25 to 65 ms) and kept with the tool.
-pub(super) fn template(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Arc<Template>> {
-    let step = (STEPS * curvature.clamp(*CURVATURE.start(), *CURVATURE.end()).log2()).round();
-    let floor = (floor_m.clamp(0.0, 0.05) / FLOOR_M).round();
-    let key = (step as i32, floor as i32, side > 0.0);
+/// The template of a tool on the side of the middle plane where x has the sign of `side`, under a membrane of this free shape.
+/// Made at the first request (some 50 ms) and kept with the tool.
+pub(super) fn template(tool: &ToolModel, side: f64, free: FreeShape) -> Option<Arc<Template>> {
+    let all = if free.reaches {
+        // A tent depends on the curvature alone.
+        let curvature = free.bend.element_sum().clamp(FLATTEST, ROUNDEST);
+        [0.0, 0.0, 0.0, 0.5 * curvature, 0.5 * curvature]
+    } else {
+        [free.height_m, free.slope.x, free.slope.y, free.bend.x, free.bend.y]
+    };
+    let steps: [i32; 5] = std::array::from_fn(|i| (all[i] / STEPS[i]).round().clamp(-400.0, 400.0) as i32);
+    let [height_m, y, z, yy, zz] = std::array::from_fn(|i| f64::from(steps[i]) * STEPS[i]);
+    let free = FreeShape { height_m, slope: DVec2::new(y, z), bend: DVec2::new(yy, zz), reaches: free.reaches };
     let kept = tool.derived(|_| Templates::default());
     let mut kept = kept.0.lock().unwrap_or_else(PoisonError::into_inner);
-    kept.entry(key).or_insert_with(|| made(tool, side, (step / STEPS).exp2(), floor * FLOOR_M).map(Arc::new)).clone()
+    kept.entry((steps, side > 0.0, free.reaches)).or_insert_with(|| made(tool, side, free).map(Arc::new)).clone()
 }
 
-fn made(tool: &ToolModel, side: f64, curvature: f64, floor_m: f64) -> Option<Template> {
-    let mut heights = heights(&tool.mesh, side)?;
-    heights.field.values.iter_mut().for_each(|height| *height = (*height - floor_m as f32).max(0.0));
-    let sheet = tent(&heights, curvature);
+fn made(tool: &ToolModel, side: f64, free: FreeShape) -> Option<Template> {
+    let top = heights(&tool.mesh, side)?;
+    let sheet = if free.reaches { tent(&top, free.bend.element_sum()) } else { lifted(&top, &free) };
     let smooth = Smooth::new(&Layer::of(&sheet.field), STEP_M, 0.0);
     let (columns, rows) = (sheet.field.columns, sheet.field.rows);
     Some(BANDS.map(|[narrow, wide]| {

@@ -14,6 +14,7 @@ use crate::pose::register_with;
 use crate::rig::lab;
 use crate::sample::DepthCamera;
 use crate::sim::{SimConfig, random_grasp, simulate};
+use crate::tent::FreeShape;
 use crate::units::angle_error;
 use crate::verdict::{Grade, Verdict};
 
@@ -74,12 +75,12 @@ fn a_foreign_body_in_the_mask_turns_the_masks_pose_and_hardly_this_one() {
         joint_worst = joint_worst.max(touch.error_deg(&joint));
         mask_worst = mask_worst.max(touch.error_deg(&touch.by(&AlignConfig::default()).unwrap()));
     }
-    assert!(joint_worst < 2.5 && mask_worst > 2.0 * joint_worst, "{joint_worst} {mask_worst}");
+    assert!(joint_worst < 1.5 && mask_worst > 1.25 * joint_worst, "{joint_worst} {mask_worst}");
 }
 
 #[test]
 fn without_a_mask_the_membrane_answers_and_the_order_of_the_fingers_is_nothing() {
-    let mut touch = Touch::new(3, 8);
+    let mut touch = Touch::new(3, 5);
     touch.masks.iter_mut().for_each(|mask| mask.as_mut_slice().fill(false));
     let found = touch.by(&JointConfig::default()).unwrap();
     assert_eq!(found.joint.unwrap().basis, Basis::Membrane);
@@ -150,7 +151,7 @@ fn most_pixels_can_be_missing_or_absurd() {
 #[test]
 fn the_slope_of_the_joint_cost_is_its_derivative() {
     let touch = Touch::new(0, 3);
-    let template = template(&touch.tool, 1.0, 20.0, 0.0).unwrap();
+    let template = template(&touch.tool, 1.0, FreeShape { bend: DVec2::splat(10.0), ..FreeShape::default() }).unwrap();
     let places = (0..200).map(|i| {
         let place = DVec2::new(f64::from(i % 20) - 10.0, f64::from(i / 20) - 5.0) * 1.3e-3;
         (place, 2e-4 * (i % 7) as f32 - 4e-4)
@@ -217,7 +218,7 @@ fn the_spread_is_as_wide_as_what_the_contact_leaves_open() {
     let told = report.evidence.unwrap().uncertainty;
     let [long, short] = told.half_axes(report.grasp_from_object);
     let along = DVec2::from_angle(report.grasp_from_object.theta_rad).perp();
-    assert!(long.length() > 3.0 * short.length(), "{long} {short}");
+    assert!(long.length() > 1.3 * short.length(), "{long} {short}");
     assert!(long.normalize().dot(along).abs() > 0.98, "{long} {along}");
     // Of nothing, all that is known is what a gripper can hold.
     let nothing = Scene::new(&[][..]);

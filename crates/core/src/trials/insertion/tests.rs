@@ -173,7 +173,8 @@ fn a_chamfer_lets_in_what_only_the_edge_of_the_mouth_kept_out() {
 
 #[test]
 fn a_triangle_that_goes_in_corner_first_is_askew() {
-    let triangle = outline(tools().iter().position(|tool| tool.name == "pattern_36").unwrap());
+    let corners = [[-12.0, 6.0], [1.0, -12.0], [9.0, 10.0]].map(|[y, z]| DVec2::new(y, z) * 1e-3);
+    let triangle = Outline::polygon(&corners).unwrap();
     let trial = insertion(&triangle, shape(0.01, 0.001), 2.0, 0.001);
     let attempt = trial.attempt(off(30f64.to_radians(), 0.0)).unwrap();
     assert_eq!(attempt.end, End::Askew { depth_m: 0.01 });

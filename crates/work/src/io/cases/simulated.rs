@@ -29,7 +29,7 @@ fn plain_tools() -> Vec<ToolSpec> {
     let mut tools: Vec<ToolSpec> = catalog::tools().iter().filter(|t| !is_rod(t)).cloned().collect();
     let peg = rod.clone().map(|rod| ToolSpec {
         name: "peg".into(),
-        bars: vec![Bar { core: vec![DVec2::ZERO, DVec2::new(0.0, 0.05)], half_width_m: 0.003 }],
+        bars: vec![Bar::straight(DVec2::ZERO, DVec2::new(0.0, 0.05), 0.003)],
         ..rod
     });
     tools.extend(rod.into_iter().chain(peg));

@@ -107,7 +107,7 @@ fn won(report: &AlignReport) -> f64 {
 
 #[test]
 fn the_fast_answer_is_the_proved_one() {
-    for (tool, seed) in [(0, 3), (3, 8), (7, 5)] {
+    for (tool, seed) in [(0, 2), (3, 5), (7, 5)] {
         let touch = Touch::new(tool, seed);
         let [fast, proved] = [JointConfig::default(), JointConfig::certified()].map(|c| touch.by(&c).unwrap());
         let certificate = proved.certificate.unwrap();
@@ -155,7 +155,7 @@ fn no_pose_of_the_prior_costs_less_than_what_is_proved() {
 
 #[test]
 fn a_small_budget_is_admitted() {
-    let touch = Touch::new(0, 3);
+    let touch = Touch::new(7, 5);
     let mask = AlignConfig { budget: 30_000, ..AlignConfig::certified() };
     let report = touch.by(&JointConfig { mask, ..JointConfig::certified() }).unwrap();
     let certificate = report.certificate.unwrap();
@@ -168,7 +168,7 @@ fn a_small_budget_is_admitted() {
 
 #[test]
 fn the_proof_finds_what_the_starts_miss() {
-    let touch = Touch::new(3, 8);
+    let touch = Touch::new(3, 4);
     // One start at the prior's edge, and descents that see no farther than a fraction of a millimeter.
     let starts = vec![PlanarPose { theta_rad: -0.38 * touch.truth.theta_rad.signum(), y_m: 5e-3, z_m: -5e-3 }];
     let blind = JointConfig {

@@ -32,8 +32,8 @@ fn a_picture_with_one_window_for_all_pads_is_moved_to_each_pads_own() {
     let mut framed = generator(Some([10.0, 10.0])).unwrap();
     framed.output.imprint_size = rig.depth().unwrap().size();
     framed.output.window_px = Some([74.5, 74.0]);
-    assert!(near(moved(&framed, lab::RIGHT), [4.0, 0.0]), "{:?}", moved(&framed, lab::RIGHT));
-    assert!(near(moved(&framed, lab::LEFT), [-5.0, -1.0]), "{:?}", moved(&framed, lab::LEFT));
+    assert!(near(moved(&framed, lab::RIGHT), [-10.0, -2.4]), "{:?}", moved(&framed, lab::RIGHT));
+    assert!(near(moved(&framed, lab::LEFT), [0.3, -0.6]), "{:?}", moved(&framed, lab::LEFT));
     assert!(near(moved(&generator(None).unwrap(), lab::LEFT), [0.0, 0.0]), "without the key nothing moves");
     assert!(generator(Some([-1.0, 10.0])).unwrap_err().contains("output.window_px"));
 }
