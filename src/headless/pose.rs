@@ -23,6 +23,7 @@ use touch2touch_core::pose::{RegistrationChoice, ToolModel};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::{Touch, feel};
+use touch2touch_work::io::dataset::SourceKind;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
@@ -61,6 +62,9 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &doubts::notes(&dataset));
+    if dataset.kind == SourceKind::Pictures {
+        output.note("pictures hold no camera: the simulator's is assumed");
+    }
     let mut cases = Vec::new();
     let all_labels = Labels::of(&dataset);
     let mut complete = true;

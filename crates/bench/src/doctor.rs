@@ -178,7 +178,13 @@ fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
 }
 
 fn doubts(set: &Set, generator: Option<Generator<'_>>) -> Vec<Doubt> {
-    let felt: Vec<Felt<'_>> = set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample }).collect();
+    let count = set.pairs.len() as isize;
+    let beside: Vec<_> = (0..count)
+        .map(|at| move |on: isize| set.pairs[(at + on).rem_euclid(count) as usize].1.grasp_from_object)
+        .collect();
+    let felt = set.pairs.iter().zip(&beside);
+    let felt: Vec<Felt<'_>> =
+        felt.map(|((tool, sample), beside)| Felt { tool: Some(tool), sample, beside: Some(beside) }).collect();
     match generator {
         Some(generator) => {
             judge(&felt, &set.tools, Some(&mut |samples| placed(samples, generator, &JobCx::unwatched())))

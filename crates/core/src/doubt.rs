@@ -8,31 +8,40 @@
 //!
 //! * `fit`, `imprints`: what was pushed in against the tool's outline at the true pose, or where that is not known at the
 //!   registered one;
+//! * `poses`: true poses against good registrations;
 //! * `images`: touched against untouched images, over all pairs;
 //! * `predictions`: what a generator makes of the images against what was measured.
 
 mod fit;
 mod images;
 mod imprints;
+mod poses;
 mod predictions;
 
 use std::collections::BTreeMap;
 
+use super::frames::PlanarPose;
 use super::mesh::TriMesh;
 use super::read_as::ReadAs;
 use super::rig::PerPad;
 use super::sample::{PadTouch, Reading, Sample};
 
 pub use imprints::Axes;
+pub use poses::Mismatch;
 pub use predictions::{Placed, likeness};
 
+/// The true pose, `grasp_from_object`, of the pair so many places after one.
+pub type Beside<'a> = &'a dyn Fn(isize) -> Option<PlanarPose>;
+
 /// A pair that is looked at.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy)]
 pub struct Felt<'a> {
     /// Name of its tool, where known.
     pub tool: Option<&'a str>,
     /// Sample as it is stored.
     pub sample: &'a Sample,
+    /// True poses of the pairs before and after it; asked only if its own contradicts its imprint.
+    pub beside: Option<Beside<'a>>,
 }
 
 /// Cause of a doubt.
@@ -52,6 +61,8 @@ pub enum Cause {
     NoReference,
     /// The color images are gray.
     Gray,
+    /// True poses are not where the tool was felt.
+    Poses(Mismatch),
     /// Imprints do not lie on their CAD models, and nothing that was tried explains it.
     Unexplained,
 }
@@ -67,6 +78,7 @@ impl Cause {
             Self::SameImages => "same-images".into(),
             Self::NoReference => "no-reference".into(),
             Self::Gray => "gray".into(),
+            Self::Poses(mismatch) => mismatch.key().into(),
             Self::Unexplained => "unexplained".into(),
         }
     }
@@ -111,8 +123,8 @@ pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
 pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     let depths: Vec<Sample> = felt.iter().map(|felt| only(felt.sample, false)).collect();
-    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
-    doubts.extend(imprints::judge(&depths, &named, tools));
+    let depths: Vec<Felt<'_>> = felt.iter().zip(&depths).map(|(felt, sample)| Felt { sample, ..*felt }).collect();
+    doubts.extend(of_imprints(&depths, tools));
     let images = images::judge(felt);
     let sound = images.is_none();
     doubts.extend(images);
@@ -125,6 +137,28 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
         doubts.extend(predictions::judge(&read, sound, predict));
     }
     doubts
+}
+
+/// Doubt about imprints, CAD models and true poses, which are judged together: each of the three may be what is wrong.
+fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
+    let registered = poses::Registered::of(felt, tools);
+    if registered.agree() {
+        return None;
+    }
+    let samples: Vec<&Sample> = felt.iter().map(|felt| felt.sample).collect();
+    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    let by_imprints = || imprints::judge(&samples, &named, tools);
+    let Some((mismatch, likeness)) = registered.mismatch(felt) else { return by_imprints().map(|(doubt, _)| doubt) };
+    if mismatch.is_rigid() {
+        // No mirror image and no factor of the imprints looks like this.
+        return Some(registered.doubt(mismatch));
+    }
+    // An explanation is better than none, and of two the likelier.
+    let margin = if mismatch == Mismatch::Unknown { -SAME } else { SAME };
+    match by_imprints() {
+        Some((doubt, explained)) if explained > likeness + margin => Some(doubt),
+        _ => Some(registered.doubt(mismatch)),
+    }
 }
 
 /// A sample with the readings of one kind of sensor alone: what is tried on it need not copy the other's pictures.
@@ -144,7 +178,7 @@ fn only(sample: &Sample, color: bool) -> Sample {
             Some(kept)
         })
         .collect();
-    let Sample { rig, grasp_from_object, scale, laid, reading, .. } = sample;
+    let Sample { rig, grasp_from_object, scale, laid, reading, taken_by, .. } = sample;
     Sample {
         rig: rig.clone(),
         pads,
@@ -152,6 +186,7 @@ fn only(sample: &Sample, color: bool) -> Sample {
         scale: *scale,
         laid: *laid,
         reading: *reading,
+        taken_by: *taken_by,
         notes: Vec::new(),
     }
 }

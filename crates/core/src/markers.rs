@@ -4,9 +4,13 @@
 //! difference image without its smooth part shows the markers' edges; pictures of one sensor have them in the same
 //! places. On 36 published pairs of two fingers, each picture left out in turn, all 36 are told.
 
+use glam::DVec2;
+
 use super::blur::gaussian;
 use super::grid::{Grid, RgbGrid};
 use super::resample;
+use super::rig::{PadId, lab};
+use super::sim::marker_places;
 
 /// The lattice is looked at at this size, pixels.
 const SIDE: usize = 128;
@@ -16,6 +20,12 @@ const SMOOTH_PX: f64 = 4.0;
 const EDGE_PX: f64 = 1.0;
 /// Rounds of assigning and averaging; it ends after three or four.
 const ROUNDS: usize = 20;
+/// Deviations of the blurs of a dot and of what is around it, pixels.
+const DOT_PX: f64 = 0.6;
+const AROUND_DOT_PX: f64 = 3.0;
+/// Mean brightness of a finger's dots, in deviations of the picture, that tells it. Published pictures have 1.0 and more at
+/// their own finger's dots, less than 0.4 at the other's.
+const BRIGHT: f64 = 0.6;
 /// By how much each picture must be more like its own group than like the other. Published pictures of two fingers have
 /// .51 to .84; halves of the pictures of one finger, taken apart by chance, less than .2.
 const APART: f64 = 0.25;
@@ -30,6 +40,32 @@ pub fn signature(difference: &RgbGrid) -> Option<Grid<f32>> {
     let smooth = gaussian(&gray, SMOOTH_PX);
     let edges = Grid::from_fn(SIDE, SIDE, |x, y| (gray[(x, y)] - smooth[(x, y)]).abs());
     standardized(&gaussian(&edges, EDGE_PX))
+}
+
+/// The finger of the lab's rig whose GelSlim took an upright difference image, by the places of its markers: without contact
+/// they were there, which leaves bright dots in the difference. `None` where the dots are clearly neither's.
+pub fn lab_finger(difference: &RgbGrid) -> Option<PadId> {
+    if difference.is_empty() || difference.as_slice().iter().flatten().any(|v| !v.is_finite()) {
+        return None;
+    }
+    let gray =
+        resample::bilinear_rgb(difference, SIDE, SIDE).map(|p| p.iter().map(|&v| f64::from(v)).sum::<f64>() / 3.0);
+    let (fine, smooth) = (gaussian(&gray, DOT_PX), gaussian(&gray, AROUND_DOT_PX));
+    let dots = Grid::from_fn(SIDE, SIDE, |x, y| fine[(x, y)] - smooth[(x, y)]);
+    let mut sizes: Vec<f64> = dots.as_slice().iter().map(|v| v.abs()).collect();
+    // Edges of the bars are no dots, however bright.
+    let most = *sizes.select_nth_unstable_by(dots.len() * 49 / 50, f64::total_cmp).1;
+    let dots = dots.map(|v| v.clamp(-most, most));
+    let spread = (dots.as_slice().iter().map(|v| v * v).sum::<f64>() / dots.len() as f64).sqrt();
+    let scale = lab::GELSLIM.size().map(|full| SIDE as f64 / full as f64);
+    let brightness = |finger: PadId| {
+        let places = marker_places(finger);
+        let of = |px: &DVec2| dots.get(((px.x + 0.5) * scale[0]) as usize, ((px.y + 0.5) * scale[1]) as usize);
+        places.iter().filter_map(of).sum::<f64>() / (places.len() as f64 * spread)
+    };
+    let [right, left] = lab::PADS.map(brightness);
+    let (finger, own, other) = if right > left { (lab::RIGHT, right, left) } else { (lab::LEFT, left, right) };
+    (own > BRIGHT && own - other > BRIGHT).then_some(finger)
 }
 
 fn standardized(image: &Grid<f64>) -> Option<Grid<f32>> {
@@ -102,6 +138,7 @@ pub fn two_groups(signatures: &[Grid<f32>]) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sim::{SimConfig, random_grasp, simulate};
 
     /// A picture of a gel whose markers lie at `phase`, with noise and a touch that differ by `seed`.
     fn picture(phase: f64, seed: u64) -> RgbGrid {
@@ -131,5 +168,21 @@ mod tests {
         assert_eq!(signature(&Grid::filled(64, 64, [f32::NAN; 3])), None);
         assert_eq!(signature(&Grid::filled(0, 0, [0.0; 3])), None);
         assert_eq!(template(&[]), None);
+    }
+
+    /// Of simulated touches, and none of other gels.
+    #[test]
+    fn the_dots_tell_the_finger() {
+        let tools = crate::catalog::tools();
+        for number in 0..4 {
+            let sensors = if number < 3 { SimConfig::default() } else { SimConfig::randomised(number) };
+            let touch = simulate(&tools[2 * number as usize], random_grasp(40 + number), number, &sensors);
+            for pad in lab::PADS {
+                let found = lab_finger(&touch.pad(pad).unwrap().color().unwrap().difference);
+                assert_eq!(found, (number < 3).then_some(pad), "{number}");
+            }
+        }
+        assert_eq!(lab_finger(&Grid::filled(9, 9, [0.0; 3])), None);
+        assert_eq!(lab_finger(&Grid::filled(9, 9, [f32::NAN; 3])), None);
     }
 }

@@ -30,6 +30,9 @@ pub struct Sample {
     /// Reading of that turn, with how sure it is, where the colors of a picture told; `None` for whatever comes from a
     /// sensor.
     pub reading: Option<TurnReading>,
+    /// The pad whose sensors took pictures, which lie at the first pad because they do not say it: named beside them, or read
+    /// from the dots of the gel.
+    pub taken_by: Option<PadId>,
     /// Oddities of its files and numbers: whoever answers from this sample says so.
     pub notes: Vec<Problem>,
 }
@@ -44,6 +47,7 @@ impl Default for Sample {
             scale: Scale::default(),
             laid: Turn::default(),
             reading: None,
+            taken_by: None,
             notes: Vec::new(),
         }
     }

@@ -32,6 +32,7 @@ pub use condition::{Condition, TEST_GRASPS, test_grasp};
 pub(crate) use config::{BubbleConfig, GelSlimConfig};
 pub use config::{Sensors, SimConfig};
 pub use faults::Fault;
+pub(crate) use gelslim::marker_places;
 pub use grasp::{Grasp, grid_grasp, random_grasp};
 pub use lens::Lens;
 pub use membrane::{Dome, Membrane};
@@ -71,6 +72,17 @@ pub(crate) fn simulate_apart(
         Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
     });
     Sample { pads: pads.into(), grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
+}
+
+/// The nominal depth camera of a finger as it looks at one of the lab's tools, with the depth of the free membrane.
+pub fn nominal_camera(finger: PadId) -> DepthCamera {
+    let half_thickness_m = super::catalog::tools()[0].half_thickness_m;
+    let config = BubbleConfig::default();
+    let grasp_from_camera = grasp_from_camera(finger, half_thickness_m);
+    let rays = depth_camera::Rays::new(finger, INTRINSICS, grasp_from_camera);
+    let dome = Dome::new(&config, half_thickness_m, finger);
+    let depth_reference = depth_camera::dome_depth(&rays, &dome).map(|z| z - config.reference_m as f32);
+    DepthCamera { depth_reference, intrinsics: INTRINSICS, crop: lab::BUBBLE.crop, grasp_from_camera }
 }
 
 fn bubble_touch(config: &BubbleConfig, tool: &ToolSpec, membrane: &Membrane, finger: PadId, seed: u64) -> DepthTouch {

@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 use touch2touch_core::doubt::Cause;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::read_as::{Depths, Images, Lay, ReadAs, Stored};
@@ -51,7 +52,7 @@ fn stored(name: &str, undone_by: &[&str], mistake: ReadAs) -> Kind {
 
 /// All ways.
 pub(super) fn kinds() -> Vec<Kind> {
-    imprints().into_iter().chain(models()).chain(images()).collect()
+    imprints().into_iter().chain(poses()).chain(models()).chain(images()).collect()
 }
 
 fn imprints() -> Vec<Kind> {
@@ -73,6 +74,45 @@ fn imprints() -> Vec<Kind> {
     for (factor, undone) in [(0.5, "2"), (0.8, "1.25"), (1.25, "0.8"), (2.0, "0.5")] {
         let named = format!("scale-camera={undone}");
         all.push(stored(&format!("K x {factor}"), &[&named], ReadAs::ScaleCamera(factor)));
+    }
+    all
+}
+
+/// A way to store true poses wrongly, from `object_from_grasp`, which the lab stores, to itself.
+fn pose(name: &str, named: &[&str], change: impl Fn(PlanarPose) -> PlanarPose + Send + Sync + 'static) -> Kind {
+    kind(&format!("true poses: {name}"), named, move |set| {
+        for (_, sample) in &mut set.pairs {
+            sample.grasp_from_object = sample.grasp_from_object.map(|pose| change(pose.inverse()).inverse());
+        }
+    })
+}
+
+fn poses() -> Vec<Kind> {
+    let mut all = vec![
+        pose("inverse", &["poses-inverse"], PlanarPose::inverse),
+        pose("angles doubled", &["poses-factor"], |lab| PlanarPose { theta_rad: 2.0 * lab.theta_rad, ..lab }),
+        pose("angles halved", &["poses-factor"], |lab| PlanarPose { theta_rad: 0.5 * lab.theta_rad, ..lab }),
+        pose("angles zero", &["poses-constant"], |lab| PlanarPose { theta_rad: 0.0, ..lab }),
+        pose("another grasp frame", &["poses-grasp-frame"], |lab| {
+            lab.compose(PlanarPose { theta_rad: 0.2, y_m: 0.01, z_m: -0.015 })
+        }),
+        kind("true poses: of the pair before", &["poses-neighbor"], |set| {
+            let poses: Vec<_> = set.pairs.iter().map(|(_, sample)| sample.grasp_from_object).collect();
+            let before = poses.iter().cycle().skip(poses.len().saturating_sub(1));
+            set.pairs.iter_mut().zip(before).for_each(|((_, sample), pose)| sample.grasp_from_object = *pose);
+        }),
+    ];
+    for degrees in [5.0f64, -10.0, 15.0] {
+        all.push(pose(&format!("angles {degrees}° too large"), &["poses-angle"], move |lab| PlanarPose {
+            theta_rad: lab.theta_rad + degrees.to_radians(),
+            ..lab
+        }));
+    }
+    for degrees in [5.0f64, 10.0] {
+        all.push(kind(&format!("CAD models turned by {degrees}°"), &["poses-angle"], move |set| {
+            let turn = DMat3::from_rotation_x(degrees.to_radians());
+            set.tools.values_mut().flat_map(|mesh| &mut mesh.vertices).for_each(|vertex| *vertex = turn * *vertex);
+        }));
     }
     all
 }

@@ -90,7 +90,7 @@ struct Pairs<'a> {
 }
 
 impl<'a> Pairs<'a> {
-    fn of(samples: &[Sample], named: &[Option<&'a str>], meshes: &'a BTreeMap<String, TriMesh>) -> Self {
+    fn of(samples: &[&Sample], named: &[Option<&'a str>], meshes: &'a BTreeMap<String, TriMesh>) -> Self {
         let fields: BTreeMap<&str, DistanceField> = meshes
             .iter()
             .filter_map(|(name, mesh)| Some((name.as_str(), DistanceField::from_mesh(mesh).ok()?)))
@@ -101,7 +101,7 @@ impl<'a> Pairs<'a> {
             if !sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()) {
                 continue;
             }
-            let mut sample = sample.clone();
+            let mut sample = (*sample).clone();
             for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
                 depth.imprint = without_grain(&depth.imprint, 1);
             }
@@ -130,8 +130,13 @@ impl<'a> Pairs<'a> {
     }
 }
 
-/// Doubt about the imprints of some pairs, or about their CAD models.
-pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
+/// Doubt about the imprints of some pairs, or about their CAD models, with the mean likeness where it is mended; 0 where
+/// nothing mends it.
+pub(super) fn judge(
+    samples: &[&Sample],
+    named: &[Option<&str>],
+    meshes: &BTreeMap<String, TriMesh>,
+) -> Option<(Doubt, f64)> {
     let pairs = Pairs::of(samples, named, meshes);
     if pairs.samples.is_empty() {
         return None;
@@ -145,15 +150,15 @@ pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMa
     if let Some((doubt, with)) = of_models(&pairs, meshes, &models, &stored)
         && with > best_read
     {
-        return Some(doubt);
+        return Some((doubt, with));
     }
     if let Some((read_as, gain)) = read {
-        return Some(Doubt::stored(read_as, &figures(&pairs, &stored, read_as, &gain)));
+        return Some((Doubt::stored(read_as, &figures(&pairs, &stored, read_as, &gain)), gain.read));
     }
     if let Some(doubt) = one_model(&pairs, &models, &stored) {
-        return Some(doubt);
+        return Some((doubt, 0.0));
     }
-    (mean < NOTHING).then(|| Doubt {
+    let unexplained = || Doubt {
         cause: Cause::Unexplained,
         what: format!(
             "the imprints do not lie on their CAD models at the true poses (likeness {mean:.2} in {}, where sound data have 0.6), \
@@ -161,7 +166,8 @@ pub(super) fn judge(samples: &[Sample], named: &[Option<&str>], meshes: &BTreeMa
             counted(stored.len(), "pair")
         ),
         hint: "check that poses, CAD models and imprints are of the same grasps, and their frames".into(),
-    })
+    };
+    (mean < NOTHING).then(|| (unexplained(), 0.0))
 }
 
 /// CAD models that do not fit where those of other tools do, and that none of them replaces.

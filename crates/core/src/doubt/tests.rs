@@ -26,7 +26,8 @@ fn set(condition: Condition, pairs: u64, config: &SimConfig) -> Set {
 
 impl Set {
     fn judged(&self) -> Vec<String> {
-        let felt: Vec<Felt<'_>> = self.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample }).collect();
+        let felt: Vec<Felt<'_>> =
+            self.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None }).collect();
         judge(&felt, &self.tools, None).iter().map(|doubt| doubt.cause.key()).collect()
     }
 
@@ -46,7 +47,7 @@ fn sound_sets_of_every_condition_and_of_other_sensors_raise_no_doubt() {
     }
     assert!(judge(&[], &BTreeMap::new(), None).is_empty());
     let nothing = Sample::default();
-    assert!(judge(&[Felt { tool: None, sample: &nothing }], &BTreeMap::new(), None).is_empty());
+    assert!(judge(&[Felt { tool: None, sample: &nothing, beside: None }], &BTreeMap::new(), None).is_empty());
 }
 
 #[test]
@@ -87,7 +88,7 @@ fn a_wrong_cad_model_is_named() {
 fn predictions_tell_the_fingers_of_the_images() {
     // In place of a generator: the imprints of the fingers whose images they are.
     let sound = set(Condition::Plain, 3, &SimConfig::default());
-    let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample }).collect();
+    let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample, beside: None }).collect();
     let predictor = |swapped: bool| {
         move |samples: &[&Sample]| {
             let imprint =
@@ -107,15 +108,49 @@ fn predictions_tell_the_fingers_of_the_images() {
 }
 
 #[test]
-#[ignore = "tmp"]
-fn tmp_scan() {
-    for (number, condition) in (0u64..).zip(Condition::iter()) {
-        let config = if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(number) };
-        for pairs in [1, 4, 8] {
-            let set = set(condition, pairs, &config);
-            let felt: Vec<Felt<'_>> =
-                set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample }).collect();
-            println!("{condition:?} {pairs}: {:?}", judge(&felt, &set.tools, None));
+fn true_poses_that_contradict_the_imprints_are_named_with_their_mistake() {
+    let sound = set(Condition::Plain, 6, &SimConfig::default());
+    let truths: Vec<PlanarPose> = sound.pairs.iter().map(|(_, sample)| sample.grasp_from_object.unwrap()).collect();
+    let labs = |change: &dyn Fn(PlanarPose) -> PlanarPose| -> Vec<PlanarPose> {
+        truths.iter().map(|truth| change(truth.inverse()).inverse()).collect()
+    };
+    let turned = |degrees: f64| labs(&|lab| PlanarPose { theta_rad: lab.theta_rad + degrees.to_radians(), ..lab });
+    let times = |factor: f64| labs(&|lab| PlanarPose { theta_rad: factor * lab.theta_rad, ..lab });
+    let moved = PlanarPose { theta_rad: 0.1, y_m: 0.012, z_m: -0.007 };
+    let before: Vec<PlanarPose> = (0..truths.len()).map(|at| truths[(at + 5) % 6]).collect();
+    for (stored, named) in [
+        (truths.clone(), None),
+        (truths.iter().map(|truth| truth.inverse()).collect(), Some("poses-inverse")),
+        (turned(5.0), Some("poses-angle")),
+        (turned(-10.0), Some("poses-angle")),
+        (turned(15.0), Some("poses-angle")),
+        (times(2.0), Some("poses-factor")),
+        (times(0.0), Some("poses-constant")),
+        (before, Some("poses-neighbor")),
+        (truths.iter().map(|truth| moved.compose(*truth)).collect(), Some("poses-grasp-frame")),
+        (
+            truths.iter().map(|truth| truth.compose(PlanarPose { theta_rad: 0.0, ..moved })).collect(),
+            Some("poses-object-frame"),
+        ),
+    ] {
+        let with: Vec<Sample> = sound
+            .pairs
+            .iter()
+            .zip(&stored)
+            .map(|((_, sample), pose)| Sample { grasp_from_object: Some(*pose), ..sample.clone() })
+            .collect();
+        let stored = &stored;
+        let beside: Vec<_> = (0..with.len())
+            .map(|at| move |on: isize| Some(stored[(at as isize + on).rem_euclid(6) as usize]))
+            .collect();
+        let felt: Vec<Felt<'_>> = (0..with.len())
+            .map(|at| Felt { tool: Some(&sound.pairs[at].0), sample: &with[at], beside: Some(&beside[at]) })
+            .collect();
+        let doubts = judge(&felt, &sound.tools, None);
+        let keys: Vec<String> = doubts.iter().map(|doubt| doubt.cause.key()).collect();
+        assert_eq!(keys, named.map(str::to_owned).into_iter().collect::<Vec<_>>(), "{named:?}: {doubts:?}");
+        if named == Some("poses-angle") {
+            assert!(doubts[0].what.contains("° too large, or all CAD models are turned"), "{}", doubts[0].what);
         }
     }
 }

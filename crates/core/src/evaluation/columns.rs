@@ -293,7 +293,7 @@ pub fn conventions(scale: Scale) -> &'static str {
         }
         Scale::Assumed => {
             "PSNR and SSIM: each image stretched to 0..1 on its own, peak and range 1, then the mean (the source lost \
-             its scale)"
+             its scale); angles, where the tools are named: from the pose of the measured imprint, with an assumed camera"
         }
     }
 }

@@ -260,6 +260,19 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, frame: &Frame, 
     }
 }
 
+/// Places of the markers of one of the lab's GelSlims without contact, pixels of its picture.
+pub(crate) fn marker_places(finger: PadId) -> Vec<DVec2> {
+    let config = GelSlimConfig::default();
+    let lens = config.lenses[finger.index()];
+    let phase = DVec2::from_array(config.marker_phase[finger.index()]);
+    let center = lens.flat(DVec2::from_array(lens.center_px));
+    let turn = DVec2::from_angle(config.marker_angle_rad[finger.index()] + lens.turn_rad);
+    let size = DVec2::new(lab::GELSLIM.width as f64, lab::GELSLIM.height as f64);
+    let cells = (-8..=8).flat_map(|j| (-8..=8).map(move |i| DVec2::new(f64::from(i), f64::from(j)) + phase));
+    let places = cells.map(|cell| lens.pixel(center + turn.rotate(cell) * config.marker_pitch_m));
+    places.filter(|px| px.cmpgt(DVec2::ZERO).all() && px.cmplt(size - 1.0).all()).collect()
+}
+
 /// Place on the gel and radius of each marker without contact, meters.
 fn marker_grid(config: &GelSlimConfig, finger: PadId, frame: &Frame) -> Vec<(DVec2, f64)> {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());

@@ -183,7 +183,9 @@ fn cad(dataset: &Dataset, models: &BTreeMap<String, Cad>) -> Option<Fact> {
 
 fn cameras(looked_at: &[Sample], posed: usize) -> Fact {
     let camera = looked_at.iter().flat_map(|sample| sample.pads.iter().flatten()).find_map(PadTouch::camera);
+    let assumed = looked_at.iter().any(|sample| sample.scale == Scale::Assumed);
     let camera = match camera {
+        Some(_) if assumed => "depth cameras assumed: pictures hold none".into(),
         Some(camera) => format!("depth cameras known (focal length {:.0} px)", camera.intrinsics.fx),
         None => "no depth camera known: no points in space, no pose".into(),
     };

@@ -8,6 +8,7 @@
 //! A [`Dataset`] never changes after opening and can be shared with worker threads.
 
 mod built_in;
+mod cad;
 mod error;
 mod grow;
 mod lab;
@@ -34,7 +35,7 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub use grow::cameras_of;
-pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters};
+pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters, imprint_from_tile};
 pub use pictures::{RIG_JSON, rig_of};
 pub use read_as::{READ_AS_FILE, write_read_as};
 pub(crate) use tool_scale::ToolFile;
@@ -156,7 +157,10 @@ impl Dataset {
         drop(std::fs::read_dir(&folder).map_err(io)?);
         let found = match lab::scan(&folder) {
             Some(scan) => Some(scan),
-            None => pictures::scan(&folder)?.or_else(|| lab::scan_flat(&folder)),
+            None => match pictures::scan(&folder)?.or_else(|| lab::scan_flat(&folder)) {
+                Some(scan) => Some(scan),
+                None => pictures::scan_folders(&folder)?,
+            },
         };
         let mut scan = found.ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
         if *rig_of(&scan.root)? != *scan.rig {
@@ -275,10 +279,13 @@ impl Dataset {
     /// # Errors
     /// As [`Dataset::tool_mesh`].
     pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
-        if let Source::BuiltIn(set) = self.source {
-            return Ok(set.mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }));
+        match (self.tool_mesh_file(tool), &self.source) {
+            (Some(path), _) => read_tool(path, self.scale_of(tool)).map(Some),
+            (None, Source::Lab(_)) => Ok(None),
+            (None, Source::Pictures(_) | Source::BuiltIn(_)) => {
+                Ok(built_in::mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }))
+            }
         }
-        self.tool_mesh_file(tool).map(|path| read_tool(path, self.scale_of(tool))).transpose()
     }
 
     /// Unit that was set for a tool's CAD file other than beside it: for this run, else on the command line.
@@ -295,8 +302,9 @@ impl Dataset {
     /// The file of the tool's CAD model, if the source has files.
     pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
         match &self.source {
-            Source::Lab(lab) => lab.mesh_file(tool),
-            Source::Pictures(_) | Source::BuiltIn(_) => None,
+            Source::Lab(lab) => lab.meshes.get(tool).map(PathBuf::as_path),
+            Source::Pictures(pictures) => pictures.meshes.get(tool).map(PathBuf::as_path),
+            Source::BuiltIn(_) => None,
         }
     }
 

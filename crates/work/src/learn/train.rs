@@ -441,6 +441,9 @@ pub fn train(
     write::check_folder(&setup.out, &setup.start)?;
     let plan = plan(dataset, masks, setup.choice)?;
     plan.check()?;
+    if setup.choice.from == MasksFrom::Cad {
+        crate::doubts::check_truth(dataset, WHAT)?;
+    }
     let gathered = gather::gather(dataset, masks, &plan, setup, models, cx)?;
     let mut trained = tune::tune(dataset, &plan, gathered, setup, begin, cx)?;
     trained.poses = poses(dataset, setup, &trained, models, cx)?;

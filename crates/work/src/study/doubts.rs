@@ -13,7 +13,7 @@ use crate::models::Models;
 use crate::predict::Generating;
 use crate::tool::tool_file;
 use touch2touch_core::dataset::{PairId, Problem};
-use touch2touch_core::doubt::{Doubt, Felt, Placed, judge};
+use touch2touch_core::doubt::{Cause, Doubt, Felt, Placed, judge};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::read_as::{ReadAs, also, list};
@@ -37,11 +37,22 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
         return Vec::new();
     }
     let ids = handful(dataset, pairs);
-    let loaded: Vec<(Option<&str>, Sample)> = ids
+    let loaded: Vec<(PairId, Option<&str>, Sample)> = ids
         .par_iter()
-        .filter_map(|id| Some((dataset.index.get(*id)?.tool.as_deref(), dataset.load(*id).ok()?)))
+        .filter_map(|id| Some((*id, dataset.index.get(*id)?.tool.as_deref(), dataset.load(*id).ok()?)))
         .collect();
-    let felt: Vec<Felt<'_>> = loaded.iter().map(|(tool, sample)| Felt { tool: *tool, sample }).collect();
+    let beside: Vec<_> = loaded
+        .iter()
+        .map(|(id, ..)| {
+            move |on: isize| {
+                let id = PairId(u32::try_from(i64::from(id.0) + on as i64).ok()?);
+                dataset.load(id).ok()?.grasp_from_object
+            }
+        })
+        .collect();
+    let felt = loaded.iter().zip(&beside);
+    let felt: Vec<Felt<'_>> =
+        felt.map(|((_, tool, sample), beside)| Felt { tool: *tool, sample, beside: Some(beside) }).collect();
     let tools = dataset.index.tools();
     let mesh = |tool: &String| Some((tool.clone(), tool_file(dataset, tool).ok()?.mesh));
     let meshes: BTreeMap<String, TriMesh> = tools.par_iter().take(MOST_TOOLS).filter_map(mesh).collect();
@@ -99,6 +110,18 @@ pub fn problems(dataset: &Dataset, doubts: &[Doubt]) -> Vec<Problem> {
 /// Doubts about a data set, for the notes of whoever answers from it: cheaply, without predictions.
 pub fn notes(dataset: &Dataset) -> Vec<Problem> {
     problems(dataset, &examine_reading(dataset, PAIRS, None, &JobCx::unwatched()))
+}
+
+/// Refuses true poses that contradict the imprints, for whoever would make masks of them.
+///
+/// # Errors
+/// In words, with what seems wrong.
+pub(crate) fn check_truth(dataset: &Dataset, what: &str) -> Result<(), TaskError> {
+    let doubts = examine_reading(dataset, PAIRS, None, &JobCx::unwatched());
+    match doubts.into_iter().find(|doubt| matches!(doubt.cause, Cause::Poses(_))) {
+        Some(doubt) => Err(TaskError::new(what, doubt.what).with_hint(doubt.hint)),
+        None => Ok(()),
+    }
 }
 
 /// About so many pairs, of as many tools as there are, spread over the pairs of each.

@@ -134,12 +134,15 @@ pub(crate) fn chain_of_pad(
     Ok(DepthChain { correction: correction.map(with), ..chain(prediction, shift)?.placed(window(sample, finger)) })
 }
 
-/// Center of the color sensor's window in the imprint of a finger, shares of width and height. Picture pairs do not say
-/// of which finger they are: the middle of the windows stands for it.
+/// Center of the color sensor's window in the imprint of a finger, shares of width and height. Where it is not known of which
+/// finger a picture pair is, the middle of the windows stands for it.
 pub fn window(sample: &Sample, finger: PadId) -> Option<[f64; 2]> {
     match sample.scale {
         Scale::Measured => sample.rig.window_share(finger),
-        Scale::Assumed => sample.rig.mean_window_share(),
+        Scale::Assumed => match sample.taken_by {
+            Some(taken_by) => sample.rig.window_share(taken_by),
+            None => sample.rig.mean_window_share(),
+        },
     }
 }
 

@@ -15,6 +15,7 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, grade_color};
 use touch2touch_core::align::MIN_POINTS;
 use touch2touch_core::manual::PoseDifference;
+use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
 
@@ -136,6 +137,10 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
                 let off = PoseDifference::between(pose.grasp_from_object, truth);
                 text += &format!(" · {}", difference("off by", "", off));
                 details.extend(pose.truth_rad.map(|truth| format!("true angle {}", units::text_deg(truth))));
+            }
+            if results::sample(state).ready().is_some_and(|sample| sample.scale == Scale::Assumed) {
+                text += " · assumed camera";
+                details.push("Pictures hold no camera and no scale: those of the simulator are assumed".to_owned());
             }
             (text, color, details)
         }

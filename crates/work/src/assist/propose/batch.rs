@@ -100,6 +100,9 @@ pub fn propose_all(dataset: &Dataset, setup: &BatchSetup, models: &Models, cx: &
     }
     let labels = Labels::of(dataset);
     labels.folder()?;
+    if setup.propose.source == ProposalSource::CadTruth {
+        crate::doubts::check_truth(dataset, WHAT)?;
+    }
     let (mut tools, total) = (BTreeMap::new(), setup.pairs.len());
     let mut batch = Batch { source: setup.propose.source, complete: true, ..Batch::default() };
     for (done, &pair) in setup.pairs.iter().enumerate() {

@@ -92,13 +92,13 @@ impl BuiltIn {
             }
         })
     }
+}
 
-    /// The CAD model of a tool.
-    pub(super) fn mesh(self, tool: &str) -> Option<TriMesh> {
-        let pattern = catalog::tools().iter().find(|t| t.name == catalog::pattern_of(tool))?;
-        let spec = if pattern.name == tool { pattern.clone() } else { catalog::on_a_shaft(pattern.clone()) };
-        Some(spec.mesh())
-    }
+/// The CAD model of a tool of the catalog.
+pub(super) fn mesh(tool: &str) -> Option<TriMesh> {
+    let pattern = catalog::tools().iter().find(|t| t.name == catalog::pattern_of(tool))?;
+    let spec = if pattern.name == tool { pattern.clone() } else { catalog::on_a_shaft(pattern.clone()) };
+    Some(spec.mesh())
 }
 
 #[cfg(test)]
@@ -119,7 +119,7 @@ mod tests {
             tools.dedup();
             assert!(tools.len() >= 12);
             for tool in tools.iter().rev().take(2) {
-                assert!(set.mesh(tool).is_some(), "{tool}");
+                assert!(mesh(tool).is_some(), "{tool}");
             }
             let last = PairId(u32::try_from(pairs.len()).unwrap() - 1);
             let sample = set.load(last).unwrap();

@@ -49,6 +49,9 @@ impl Dataset {
         let scan = match &self.source {
             Source::Lab(lab) if lab.flat => lab::scan_flat_again(root),
             Source::Lab(_) => lab::scan(root),
+            Source::Pictures(pictures) if pictures.folders.iter().all(|folder| folder != root) => {
+                pictures::scan_folders(root)?
+            }
             Source::Pictures(_) => pictures::scan(root)?,
             Source::BuiltIn(_) => None,
         };
@@ -82,8 +85,10 @@ impl Dataset {
                 }
             }
         }
-        if let (Source::Lab(mine), Source::Lab(other)) = (&mut dataset.source, &fresh.source) {
-            mine.meshes.clone_from(&other.meshes);
+        match (&mut dataset.source, &fresh.source) {
+            (Source::Lab(mine), Source::Lab(other)) => mine.meshes.clone_from(&other.meshes),
+            (Source::Pictures(mine), Source::Pictures(other)) => mine.meshes.clone_from(&other.meshes),
+            _ => {}
         }
         Ok(Growth { dataset, new, changed })
     }
@@ -136,7 +141,7 @@ impl Dataset {
     pub fn folders(&self) -> Vec<PathBuf> {
         match &self.source {
             Source::Lab(lab) => lab.folders.clone(),
-            Source::Pictures(pictures) => vec![pictures.folder.clone()],
+            Source::Pictures(pictures) => pictures.folders.clone(),
             Source::BuiltIn(_) => Vec::new(),
         }
     }

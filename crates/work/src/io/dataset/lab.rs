@@ -22,6 +22,7 @@ use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::DepthCamera;
 
+use super::cad::{CAD_FOLDER, cad_files};
 use super::{LoadError, Loaded, Scan, Source, SourceKind, last_integer, problem, same_name};
 
 const BUBBLES: &str = "bubbles";
@@ -130,7 +131,7 @@ fn locate(path: &Path) -> Option<(Vec<Group>, Option<String>)> {
     None
 }
 
-fn tool_name(folder: &str) -> &str {
+pub(super) fn tool_name(folder: &str) -> &str {
     TOOL_PREFIXES.iter().find_map(|prefix| folder.strip_prefix(prefix)).unwrap_or(folder)
 }
 
@@ -191,7 +192,11 @@ impl Scanner {
             (a.split as u8, &a.tool, a.number, &a.name).cmp(&(b.split as u8, &b.tool, b.number, &b.name))
         });
         let (pairs, files): (Vec<_>, Vec<_>) = pairs.into_iter().unzip();
-        let meshes = self.meshes(&root, groups, &pairs);
+        let mut folders = vec![root.join(CAD_FOLDER)];
+        folders.extend(groups.iter().map(|g| g.folder.join(CAD_FOLDER)));
+        folders.extend(root.parent().map(|p| p.join(CAD_FOLDER)));
+        let tools = pairs.iter().filter_map(|p| p.tool.as_deref());
+        let meshes = cad_files(&root, folders, tools, |_| false, &mut self.problems);
         Scan {
             root,
             pairs,
@@ -387,50 +392,9 @@ impl Scanner {
             self.folder(&path, inner.as_deref(), depth + 1, out);
         }
     }
-
-    /// The CAD models by tool name; tools without one are listed once.
-    fn meshes(&mut self, root: &Path, groups: &[Group], pairs: &[PairEntry]) -> BTreeMap<String, PathBuf> {
-        let mut meshes = BTreeMap::new();
-        let mut candidates = vec![root.join("tools_stls")];
-        candidates.extend(groups.iter().map(|g| g.folder.join("tools_stls")));
-        candidates.extend(root.parent().map(|p| p.join("tools_stls")));
-        for folder in candidates {
-            let Ok(entries) = std::fs::read_dir(&folder) else { continue };
-            let mut models: Vec<PathBuf> = entries.flatten().map(|entry| entry.path()).collect();
-            models.retain(|path| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("stl")));
-            // Small letters first, whatever order the folder has.
-            models.sort_by(|a, b| b.cmp(a));
-            for path in models {
-                let Some(stem) = path.file_stem() else { continue };
-                let first = meshes.entry(stem.to_string_lossy().into_owned()).or_insert_with(|| path.clone());
-                if *first != path && first.parent() == path.parent() {
-                    let used = first.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                    let what = format!("a second CAD model of the same name: {used} is used");
-                    self.problems.push(problem(path, what, "delete or rename the one that is not the tool's"));
-                }
-            }
-        }
-        let mut tools: Vec<&String> = pairs.iter().filter_map(|p| p.tool.as_ref()).collect();
-        tools.sort();
-        tools.dedup();
-        for tool in tools {
-            if !meshes.contains_key(tool) {
-                self.problems.push(problem(
-                    root.join("tools_stls").join(format!("{tool}.stl")),
-                    format!("the CAD model of {tool} is missing: its pose cannot be estimated"),
-                    "add the STL in meters, named like the tool",
-                ));
-            }
-        }
-        meshes
-    }
 }
 
 impl Lab {
-    pub(super) fn mesh_file(&self, tool: &str) -> Option<&Path> {
-        self.meshes.get(tool).map(PathBuf::as_path)
-    }
-
     fn path(&self, file: &FileRef) -> PathBuf {
         self.folders[file.folder as usize].join(&file.name)
     }

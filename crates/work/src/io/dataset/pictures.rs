@@ -14,8 +14,11 @@
 //!   brightest one lost half of their range; they get the gain that brings their spread to [`DIFFERENCE_STD`].
 //! * **Turns**: both pictures of a pair may have been turned or mirrored for training. The colors tell
 //!   ([`touch2touch_core::upright`]), and both are laid upright again.
+//! * **Cameras**: pictures of the lab's sensors whose tool is named (the submodule `tools`) get the simulator's nominal
+//!   camera, because a pose needs one.
 
 mod lengths;
+mod tools;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -25,13 +28,15 @@ use crate::io::files;
 use crate::io::images;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::markers::lab_finger;
 use touch2touch_core::resample;
-use touch2touch_core::rig::{Rig, Sensor, SensorId, SensorKind, lab};
+use touch2touch_core::rig::{PadId, Rig, Sensor, SensorId, SensorKind, lab};
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
 use touch2touch_core::turn::Turn;
 use touch2touch_core::upright::{self, TurnReading};
 
-use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, last_integer, problem, same_name};
+use super::cad::{CAD_FOLDER, cad_files};
+use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, built_in, last_integer, problem, same_name};
 
 /// Depths that the darkest and the brightest value of a bubble picture are taken for, meters.
 pub(crate) const ASSUMED_IMPRINT_RANGE_M: [f64; 2] = [-0.0063, 0.0180];
@@ -72,9 +77,22 @@ type NotedTile = (Grid<f32>, Option<Problem>);
 /// The files of a picture folder, in the order of the index.
 #[derive(Clone, Debug)]
 pub(super) struct Pictures {
-    pub(super) pairs: Vec<Files>,
-    pub(super) folder: PathBuf,
+    pub(super) pairs: Vec<Touch>,
+    /// The folders that the pictures lie in.
+    pub(super) folders: Vec<PathBuf>,
+    /// The CAD models by tool.
+    pub(super) meshes: BTreeMap<String, PathBuf>,
     rig: Arc<Rig>,
+}
+
+/// The pictures of a pair.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Touch {
+    files: Files,
+    /// The finger, where it is named.
+    finger: Option<PadId>,
+    /// True where its tool is named, so that a camera is worth assuming.
+    of_tool: bool,
 }
 
 /// Ends of the pictures' names, in lower case, in the order of their kinds.
@@ -104,99 +122,146 @@ pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
 pub(super) fn scan(folder: &Path) -> Result<Option<Scan>, OpenError> {
     let rig = rig_of(folder)?;
-    Ok(scan_as(folder, rig))
+    let mut found = Found::default();
+    found.look(folder, None, &rig);
+    Ok(found.end(folder, rig))
 }
 
-/// Pictures directly in `folder`, felt by the sensors of `rig`.
-fn scan_as(folder: &Path, rig: Arc<Rig>) -> Option<Scan> {
-    let mut problems = Vec::new();
-    let suffixes = suffixes(&rig);
-    let mut found: BTreeMap<String, Files> = BTreeMap::new();
-    let mut common = None;
-    for entry in std::fs::read_dir(folder).ok()? {
-        let path = match entry {
-            Ok(entry) => entry.path(),
-            Err(err) => {
-                problems.push(problem(folder, format!("cannot list the folder: {err}"), "check its permissions"));
+/// Looks for pictures in the folders in `folder`, each named like the tool of its pictures; `None` if there is none.
+pub(super) fn scan_folders(folder: &Path) -> Result<Option<Scan>, OpenError> {
+    let rig = rig_of(folder)?;
+    let mut found = Found::default();
+    for (tool, path) in tools::folders(folder) {
+        found.look(&path, Some(&tool), &rig);
+    }
+    Ok(found.end(folder, rig))
+}
+
+/// What is found in one folder after the other.
+#[derive(Default)]
+struct Found {
+    pairs: Vec<(PairEntry, Files)>,
+    problems: Vec<Problem>,
+    /// The folders that hold touches.
+    folders: Vec<PathBuf>,
+}
+
+impl Found {
+    /// Takes the pictures directly in `folder`, felt by the sensors of `rig`, of this tool.
+    fn look(&mut self, folder: &Path, tool: Option<&str>, rig: &Rig) {
+        let suffixes = suffixes(rig);
+        let mut found: BTreeMap<String, Files> = BTreeMap::new();
+        let mut problems = Vec::new();
+        let mut common = None;
+        let Ok(entries) = std::fs::read_dir(folder) else { return };
+        for entry in entries {
+            let path = match entry {
+                Ok(entry) => entry.path(),
+                Err(err) => {
+                    problems.push(problem(folder, format!("cannot list the folder: {err}"), "check its permissions"));
+                    continue;
+                }
+            };
+            let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
+            let lower = name.to_ascii_lowercase();
+            if lower == RIG_JSON && name != RIG_JSON && !folder.join(RIG_JSON).exists() {
+                let what = format!(
+                    "the sensors are declared in {RIG_JSON} alone: this name has other letters and is not read"
+                );
+                problems.push(problem(&path, what, "rename it to rig.json"));
+            }
+            let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
+            if name.starts_with('.') {
                 continue;
             }
-        };
-        let Some(name) = path.file_name().map(|n| n.to_string_lossy().into_owned()) else { continue };
-        let lower = name.to_ascii_lowercase();
-        if lower == RIG_JSON && name != RIG_JSON && !folder.join(RIG_JSON).exists() {
-            let what =
-                format!("the sensors are declared in {RIG_JSON} alone: this name has other letters and is not read");
-            problems.push(problem(&path, what, "rename it to rig.json"));
+            if stem == COMMON_REFERENCE {
+                common = Some(path);
+                continue;
+            }
+            let Some(kind) = suffixes.iter().position(|suffix| stem.ends_with(suffix.as_str())) else { continue };
+            // Suffix and extension are ASCII, so the cut is at a character.
+            let pair = name[..stem.len() - suffixes[kind].len()].to_owned();
+            let slot = &mut found.entry(pair).or_default()[kind];
+            match slot {
+                Some(first) => problems.push(same_name(path, stem, first)),
+                None => *slot = Some(path),
+            }
         }
-        let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
-        if name.starts_with('.') {
-            continue;
+        if found.values().all(|files| [GELSLIM, BUBBLE, TOUCH].iter().all(|kind| files[*kind].is_none())) {
+            return;
         }
-        if stem == COMMON_REFERENCE {
-            common = Some(path);
-            continue;
+        self.folders.push(folder.to_owned());
+        for (name, mut files) in found {
+            let touched = files[TOUCH].is_some();
+            if touched && files[REFERENCE].is_none() {
+                files[REFERENCE].clone_from(&common);
+            }
+            let lone = |kind: usize| files[kind].clone().unwrap_or_default();
+            if files[GELSLIM].is_some() || (touched && files[REFERENCE].is_some()) {
+                let number = last_integer(&name);
+                let name = tool.map_or_else(|| name.clone(), |tool| format!("{tool}/{name}"));
+                self.pairs.push((PairEntry { name, tool: tool.map(str::to_owned), split: Split::None, number }, files));
+            } else if touched {
+                let what =
+                    format!("the untouched image is missing: {name}_reference.png, or one reference.png for all");
+                problems.push(problem(lone(TOUCH), what, "add the image of the gel without contact"));
+            } else if files[REFERENCE].is_none() || files[BUBBLE].is_some() || files[VQVAE].is_some() {
+                let file = if files[BUBBLE].is_some() { lone(BUBBLE) } else { lone(VQVAE) };
+                problems.push(problem(
+                    file,
+                    format!("its other half {name}{}.png is missing", suffixes[GELSLIM]),
+                    "add the missing picture, or remove this one",
+                ));
+            }
         }
-        let Some(kind) = suffixes.iter().position(|suffix| stem.ends_with(suffix.as_str())) else { continue };
-        // Suffix and extension are ASCII, so the cut is at a character.
-        let pair = name[..stem.len() - suffixes[kind].len()].to_owned();
-        let slot = &mut found.entry(pair).or_default()[kind];
-        match slot {
-            Some(first) => problems.push(same_name(path, stem, first)),
-            None => *slot = Some(path),
-        }
+        self.problems.append(&mut problems);
     }
-    if found.values().all(|files| [GELSLIM, BUBBLE, TOUCH].iter().all(|kind| files[*kind].is_none())) {
-        return None;
-    }
-    let mut pairs: Vec<(PairEntry, Files)> = Vec::new();
-    for (name, mut files) in found {
-        let touched = files[TOUCH].is_some();
-        if touched && files[REFERENCE].is_none() {
-            files[REFERENCE].clone_from(&common);
+
+    /// The data set of the pictures, if there are any.
+    fn end(mut self, folder: &Path, rig: Arc<Rig>) -> Option<Scan> {
+        if self.folders.is_empty() {
+            return None;
         }
-        let lone = |kind: usize| files[kind].clone().unwrap_or_default();
-        if files[GELSLIM].is_some() || (touched && files[REFERENCE].is_some()) {
-            let number = last_integer(&name);
-            pairs.push((PairEntry { name, tool: None, split: Split::None, number }, files));
-        } else if touched {
-            let what = format!("the untouched image is missing: {name}_reference.png, or one reference.png for all");
-            problems.push(problem(lone(TOUCH), what, "add the image of the gel without contact"));
-        } else if files[REFERENCE].is_none() || files[BUBBLE].is_some() || files[VQVAE].is_some() {
-            let file = if files[BUBBLE].is_some() { lone(BUBBLE) } else { lone(VQVAE) };
-            problems.push(problem(
-                file,
-                format!("its other half {name}{}.png is missing", suffixes[GELSLIM]),
-                "add the missing picture, or remove this one",
-            ));
-        }
+        self.pairs.sort_by(|(a, _), (b, _)| (&a.tool, a.number, &a.name).cmp(&(&b.tool, b.number, &b.name)));
+        let (mut pairs, files): (Vec<PairEntry>, Vec<Files>) = self.pairs.into_iter().unzip();
+        let fingers = tools::name(folder, &mut pairs, &rig, &mut self.problems);
+        let touches = files.into_iter().zip(fingers).zip(&pairs);
+        let touches =
+            touches.map(|((files, finger), pair)| Touch { files, finger, of_tool: pair.tool.is_some() }).collect();
+        let tools = pairs.iter().filter_map(|pair| pair.tool.as_deref());
+        let known = |tool: &str| built_in::mesh(tool).is_some();
+        let meshes = cad_files(folder, vec![folder.join(CAD_FOLDER)], tools, known, &mut self.problems);
+        Some(Scan {
+            root: folder.to_owned(),
+            pairs,
+            problems: self.problems,
+            source: Source::Pictures(Pictures { pairs: touches, folders: self.folders, meshes, rig: rig.clone() }),
+            kind: SourceKind::Pictures,
+            rig,
+        })
     }
-    pairs.sort_by(|(a, _), (b, _)| (a.number, &a.name).cmp(&(b.number, &b.name)));
-    let (pairs, files) = pairs.into_iter().unzip();
-    Some(Scan {
-        root: folder.to_owned(),
-        pairs,
-        problems,
-        source: Source::Pictures(Pictures { pairs: files, folder: folder.to_owned(), rig: rig.clone() }),
-        kind: SourceKind::Pictures,
-        rig,
-    })
 }
 
 impl Pictures {
+    fn touch(&self, id: PairId) -> Result<&Touch, LoadError> {
+        self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })
+    }
+
     fn file(&self, id: PairId, kind: usize) -> Result<Option<&Path>, LoadError> {
-        let files = self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
-        Ok(files[kind].as_deref())
+        Ok(self.touch(id)?.files[kind].as_deref())
     }
 
     pub(super) fn files(&self, id: PairId) -> Vec<PathBuf> {
-        let files = self.pairs.get(id.0 as usize);
         let kinds = [GELSLIM, TOUCH, REFERENCE, BUBBLE];
-        files.into_iter().flat_map(|files| kinds.iter().filter_map(|&kind| files[kind].clone())).collect()
+        self.touch(id)
+            .into_iter()
+            .flat_map(|touch| kinds.iter().filter_map(|&kind| touch.files[kind].clone()))
+            .collect()
     }
 
     /// The file of a stored prediction.
     pub(super) fn stored(&self, id: PairId) -> Option<PathBuf> {
-        self.pairs.get(id.0 as usize)?[VQVAE].clone()
+        self.touch(id).ok()?.files[VQVAE].clone()
     }
 
     /// A gray picture that lay this way in its file, upright.
@@ -234,8 +299,9 @@ impl Pictures {
         Ok(Some((0..3).any(|channel| matches!(mode(&tile, channel), 0 | 255))))
     }
 
-    /// The pair as the first pad's touch: which one it was is not known.
+    /// The pair as the first pad's touch, whichever it was ([`Sample::taken_by`]).
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
+        let named = self.touch(id)?;
         let mut notes = Vec::new();
         let mut touch = PadTouch::default();
         let mut scale = Scale::Assumed;
@@ -267,6 +333,8 @@ impl Pictures {
                 notes.push(problem(file, what, "they are left out; write only the bytes that the encoder returned"));
             }
         }
+        let dots = || lab_finger(&touch.color()?.difference).filter(|_| reading.is_some());
+        let taken_by = named.finger.or_else(dots);
         if let Some((tile, note)) = self.tile_and_note(id, BUBBLE, laid)? {
             notes.extend(note);
             let [w, h] = tile.size();
@@ -282,11 +350,13 @@ impl Pictures {
                 notes.push(problem(path, "the picture is a single gray", "check that the right picture was saved"));
             }
             let imprint = imprint_from_tile(&tile, &self.rig);
-            touch.set(depth_id, DepthTouch { imprint, camera: None, truth: None });
+            let camera = named.of_tool.then(|| tools::camera(&self.rig, taken_by.unwrap_or(lab::RIGHT))).flatten();
+            touch.set(depth_id, DepthTouch { imprint, camera, truth: None });
             scale = Scale::Assumed;
         }
         let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
-        let sample = Sample { rig: self.rig.clone(), pads, grasp_from_object: None, scale, laid, reading, notes };
+        let rig = self.rig.clone();
+        let sample = Sample { rig, pads, grasp_from_object: None, scale, laid, reading, taken_by, notes };
         Ok(Loaded { sample, invalid: Default::default() })
     }
 }
@@ -309,7 +379,7 @@ pub(crate) fn assumed_meters(tile: &Grid<f32>) -> DepthMap {
 }
 
 /// Assumed meters, turned back to how the depth sensor's picture lies, at its size.
-pub(super) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
+pub(crate) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
     let sensor = rig.depth().unwrap_or(&lab::BUBBLE);
     let turned = if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile.clone() };
     // The lab made these pictures with torchvision's resize, so they are undone with the same one.

@@ -11,7 +11,7 @@ use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::features::{FeatureExtractor, Preparation};
-use crate::io::dataset::{Dataset, SourceKind};
+use crate::io::dataset::{Dataset, SourceKind, imprint_from_tile};
 use crate::job::JobCx;
 use crate::labels::ImprintSource;
 use crate::mask::MaskRecipe;
@@ -101,6 +101,7 @@ impl Models {
     pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
         let mut methods = Vec::new();
         let pictures = dataset.kind == SourceKind::Pictures;
+        let posed = !pictures || !dataset.index.tools().is_empty();
         if !pictures {
             methods.push(Method::Measured);
         }
@@ -123,7 +124,7 @@ impl Models {
         if pictures && (0..LOOKED_AT).any(stored) {
             methods.push(Method::Stored);
         }
-        let mask_model = setup.recipe.mask_model.clone().filter(|_| !pictures);
+        let mask_model = setup.recipe.mask_model.clone().filter(|_| posed);
         if let Some(model) = &mask_model {
             (**model).clone().of_kind(BundleKind::Mask, WHAT)?;
         }
@@ -309,13 +310,9 @@ fn measured(case: &LoadedPair) -> Made {
 
 fn stored(case: &LoadedPair) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
-    Ok(Made {
-        imprints: PerPad::default(),
-        colors: PerPad::default(),
-        pictures: PerPad::default(),
-        tile: Some(tile),
-        seconds: None,
-    })
+    let mut imprints = PerPad::default();
+    imprints[PadId::new(0)] = Some(imprint_from_tile(&tile, &case.sample.rig));
+    Ok(Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: Some(tile), seconds: None })
 }
 
 impl GeneratorMethod {

@@ -18,9 +18,9 @@ use crate::infer::features::FeatureExtractor;
 use crate::io::caught::caught;
 use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::job::JobCx;
-use crate::labels::PairLabels;
+use crate::labels::{ImprintSource, PairLabels};
 use crate::models;
-use crate::recipe::Stage;
+use crate::recipe::{Recipe, Stage};
 use crate::tool::load_tool;
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
@@ -95,6 +95,12 @@ fn describe(extractor: Option<&mut FeatureExtractor>, images: &mut [Image]) -> R
     let found = found.map_err(|why| format!("feature extractor: {why}"))?;
     images.iter_mut().zip(found).for_each(|(image, features)| image.features = Some(features));
     Ok(())
+}
+
+/// True where the pose of a grasp can be compared with another: the true one, or that of the measured imprints.
+fn can_be_posed(sample: &Sample) -> bool {
+    let cameras = || sample.pads.iter().flatten().any(|touch| touch.camera().is_some());
+    sample.grasp_from_object.is_some() || (sample.scale == Scale::Assumed && cameras())
 }
 
 /// A grasp with what a method made of it.
@@ -178,7 +184,7 @@ impl<'a> Tool<'a> {
                 };
                 let touch = self.touch(case, &labels);
                 let mut felt = Felt::with_imprints(&recipe, made.imprints.clone());
-                let posed = with_masks && self.model.is_some() && case.sample.grasp_from_object.is_some();
+                let posed = with_masks && self.model.is_some() && can_be_posed(&case.sample);
                 if posed {
                     let reach =
                         || felt.clone().reach(touch, Stage::Mask, by_models, &cx.quiet()).map_err(|err| err.why);
@@ -263,18 +269,27 @@ impl<'a> Tool<'a> {
         }
     }
 
-    /// The error of the angle from both fingers and the verdict on the pose.
+    /// The error of the angle from both fingers and the verdict on the pose. Pictures know no true pose: what the measured
+    /// imprints give stands for it.
     fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Judged, String> {
         if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return Ok(Judged::default());
         }
-        let felt = felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why)?;
+        let pose = |felt: Felt| felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why);
+        let truth = match touch.sample.scale {
+            Scale::Measured => touch.sample.grasp_from_object,
+            Scale::Assumed => {
+                let measured = touch.sample.pads.clone().map(|touch| Some(touch?.depth()?.imprint.clone()));
+                let recipe = Recipe { imprint: ImprintSource::Measured, generator: None, ..felt.recipe().clone() };
+                pose(Felt::with_imprints(&recipe, measured))?.pose().ok().map(|found| found.grasp_from_object)
+            }
+        };
+        let felt = pose(felt)?;
         let found = felt.pose().ok();
-        let truth = touch.sample.grasp_from_object;
         let both = found.zip(truth);
         let apart = both.map(|(found, truth)| PoseDifference::between(found.grasp_from_object, truth));
         Ok(Judged {
-            angle_error_rad: truth.map(|_| found.and_then(|found| found.error_rad).unwrap_or(f64::NAN)),
+            angle_error_rad: truth.map(|_| apart.map_or(f64::NAN, |apart| apart.angle_rad)),
             position_error_m: apart.map(|apart| apart.position_m),
             verdict: found.and_then(|found| Some(found.verdict.as_ref()?.grade)),
         })

@@ -1,0 +1,299 @@
+//! True poses against registered ones: where the files say that the tool was, and where its imprints lie.
+//!
+//! Registrations that are good without the truth, and a truth that is far from nearly all of them, contradict each other:
+//! that much needs no explanation. The explanations that are tried change the truth alone.
+
+use std::collections::BTreeMap;
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+
+use super::fit::likeness;
+use super::{Cause, Doubt, Felt, median};
+use crate::align::{Ask, Contacts, PadImage};
+use crate::cloud::lift;
+use crate::contact::{rest_and_top, threshold, without_grain};
+use crate::frames::PlanarPose;
+use crate::mesh::TriMesh;
+use crate::pose::{Registration, register_with};
+use crate::sample::{PadTouch, Sample};
+use crate::tool::ToolModel;
+use crate::units::{angle_error, fixed, wrap_angle};
+use crate::verdict::{Grade, Verdict};
+
+/// Fewest good registrations that can contradict the truth.
+const FEWEST: usize = 3;
+/// Share of the pairs with a truth whose registration must be good.
+const SURE: f64 = 0.5;
+/// Share of the good registrations that must be far from the truth, and with which an explanation must agree.
+const MOST: f64 = 0.8;
+/// A pose further from the truth contradicts it, radians and meters: good registrations are off by 0.6 degrees and 1 mm.
+const FAR_RAD: f64 = 2.5 * std::f64::consts::PI / 180.0;
+const FAR_M: f64 = 4e-3;
+/// A frame is moved by at least this, meters.
+const MOVED_M: f64 = 3e-3;
+/// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
+const CONTACT_SHARE: f32 = 0.7;
+/// True angles that differ by less are all the same, radians.
+const SAME_RAD: f64 = 1e-3;
+
+/// How true poses differ from where the tool was felt.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mismatch {
+    /// Each is the inverse.
+    Inverse,
+    /// The angles are off by the same, radians, in the lab's sense; CAD models that are all turned look the same.
+    Angle(f64),
+    /// The angles are this many times as large.
+    Factor(f64),
+    /// All angles are the same.
+    Constant,
+    /// Where a pair's pose should be, that of the pair so many places on is right.
+    Neighbor(isize),
+    /// They are of another grasp frame: moved by this along y and z, meters, and turned by this, radians.
+    GraspFrame(DVec2, f64),
+    /// They are of another object frame than the CAD models: moved by this along the object's y and z, meters.
+    ObjectFrame(DVec2),
+    /// Nothing that was tried explains it.
+    Unknown,
+}
+
+impl Mismatch {
+    /// A word for tables.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            Self::Inverse => "poses-inverse",
+            Self::Angle(_) => "poses-angle",
+            Self::Factor(_) => "poses-factor",
+            Self::Constant => "poses-constant",
+            Self::Neighbor(_) => "poses-neighbor",
+            Self::GraspFrame(..) => "poses-grasp-frame",
+            Self::ObjectFrame(_) => "poses-object-frame",
+            Self::Unknown => "poses-unknown",
+        }
+    }
+
+    /// True where the poses are right but for one motion, or are those of other pairs.
+    pub(super) fn is_rigid(self) -> bool {
+        !matches!(self, Self::Inverse | Self::Factor(_) | Self::Constant | Self::Unknown)
+    }
+
+    fn text(self) -> String {
+        let deg = |rad: f64| fixed(rad.to_degrees(), 1);
+        let mm = |v: DVec2| format!("{} and {} mm along y and z", fixed(v.x * 1e3, 1), fixed(v.y * 1e3, 1));
+        match self {
+            Self::Inverse => "they fit as the inverse: object and grasp frame are exchanged".into(),
+            Self::Angle(off) => format!("all angles are {}° too large, or all CAD models are turned by that", deg(off)),
+            Self::Factor(factor) => format!("the angles are {factor:.3} times what they should be"),
+            Self::Constant => "all true angles are the same, the registered ones are not".into(),
+            Self::Neighbor(on) => {
+                format!("each is the pose of the pair {} it", if on < 0 { "after" } else { "before" })
+            }
+            Self::GraspFrame(off, turn) => {
+                format!("they are of a grasp frame that is moved by {} and turned by {}°", mm(off), deg(turn))
+            }
+            Self::ObjectFrame(off) => format!("the CAD models have their origin elsewhere, by {}", mm(off)),
+            Self::Unknown => "nothing that was tried explains it".into(),
+        }
+    }
+
+    fn hint(self) -> &'static str {
+        match self {
+            Self::Inverse => {
+                "store the pose of the object in the grasp frame as the lab does, and check the sign of theta"
+            }
+            Self::Angle(_) | Self::ObjectFrame(_) => {
+                "check the zero of the angle, and the frame that the CAD models are drawn in"
+            }
+            Self::Factor(_) => "check the unit of the angle: theta is in radians",
+            Self::Constant => "check what writes theta",
+            Self::Neighbor(_) => "check that poses and imprints are numbered alike",
+            Self::GraspFrame(..) => "check the calibration of the cameras, and the frame that the poses are given in",
+            Self::Unknown => "check that poses and imprints are of the same grasps, and their frames",
+        }
+    }
+}
+
+/// A pair whose registration is good, with its truth; both are `grasp_from_object`.
+#[derive(Clone, Copy, Debug)]
+struct Sure {
+    /// Its position among the pairs that are looked at.
+    at: usize,
+    truth: PlanarPose,
+    found: PlanarPose,
+}
+
+/// Registrations of some pairs.
+pub(super) struct Registered<'a> {
+    sure: Vec<Sure>,
+    models: BTreeMap<&'a str, ToolModel>,
+    /// Pairs with a truth, a CAD model and cameras.
+    asked: usize,
+}
+
+impl<'a> Registered<'a> {
+    /// Registers the pairs that have a truth.
+    pub(super) fn of(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -> Self {
+        let named: BTreeMap<&str, &TriMesh> =
+            felt.iter().filter_map(|felt| Some((felt.tool?, tools.get(felt.tool?)?))).collect();
+        let models: BTreeMap<&str, ToolModel> =
+            named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect();
+        let with_truth: Vec<(usize, &Sample, &ToolModel, PlanarPose)> = (0..)
+            .zip(felt)
+            .filter_map(|(at, felt)| Some((at, felt.sample, models.get(felt.tool?)?, felt.sample.grasp_from_object?)))
+            .filter(|(_, sample, ..)| sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()))
+            .collect();
+        let sure = with_truth
+            .par_iter()
+            .filter_map(|&(at, sample, model, truth)| Some(Sure { at, truth, found: good_pose(sample, model)? }));
+        let (sure, asked) = (sure.collect(), with_truth.len());
+        Self { sure, asked, models }
+    }
+
+    /// True where there are enough of them to tell.
+    fn tell(&self) -> bool {
+        self.sure.len() >= FEWEST && self.sure.len() as f64 >= SURE * self.asked as f64
+    }
+
+    /// True where good registrations agree with the truth on nearly all pairs: nothing is wrong with imprints, CAD models and
+    /// poses together.
+    pub(super) fn agree(&self) -> bool {
+        self.asked > 0
+            && self.sure.iter().filter(|sure| is_near(sure.found, sure.truth)).count() as f64
+                >= MOST * self.asked as f64
+    }
+
+    /// The mismatch of truth and registrations where they contradict each other, with the mean likeness where it is mended.
+    pub(super) fn mismatch(&self, felt: &[Felt<'_>]) -> Option<(Mismatch, f64)> {
+        let far = self.sure.iter().filter(|sure| !is_near(sure.found, sure.truth)).count();
+        if !self.tell() || (far as f64) < MOST * self.sure.len() as f64 {
+            return None;
+        }
+        let explained = self.explanations(felt).into_iter().filter_map(|(mismatch, truths)| {
+            let off =
+                truths.iter().zip(&self.sure).map(|(truth, sure)| truth.map_or(f64::INFINITY, |t| off(sure.found, t)));
+            let near = off.clone().filter(|off| *off <= 1.0).count();
+            (near as f64 >= MOST * self.sure.len() as f64).then_some((near, median(off)?, mismatch, truths))
+        });
+        let best = explained.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+        let (mismatch, truths) = match best {
+            Some((_, _, mismatch, truths)) => (mismatch, truths),
+            None => (Mismatch::Unknown, self.sure.iter().map(|sure| Some(sure.found)).collect()),
+        };
+        Some((mismatch, self.likeness(felt, &truths)))
+    }
+
+    /// The mean likeness of the sure pairs at these poses.
+    fn likeness(&self, felt: &[Felt<'_>], poses: &[Option<PlanarPose>]) -> f64 {
+        let one = |(sure, pose): (&Sure, &Option<PlanarPose>)| {
+            let (felt, pose) = (felt[sure.at], (*pose)?);
+            let mut sample = felt.sample.clone();
+            for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
+                depth.imprint = without_grain(&depth.imprint, 1);
+            }
+            Some(likeness(&sample, &self.models.get(felt.tool?)?.field, pose))
+        };
+        let found: f64 = self.sure.iter().zip(poses).filter_map(one).sum();
+        found / self.sure.len().max(1) as f64
+    }
+
+    /// What may be wrong with the truth, and the truths of the sure pairs if it is.
+    fn explanations(&self, felt: &[Felt<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
+        let labs: Vec<PlanarPose> = self.sure.iter().map(|sure| sure.truth.inverse()).collect();
+        let all = |of: &dyn Fn(&Sure) -> PlanarPose| self.sure.iter().map(|sure| Some(of(sure))).collect::<Vec<_>>();
+        let with_angle = |of: &dyn Fn(f64) -> f64| {
+            all(&|sure| {
+                let lab = sure.truth.inverse();
+                PlanarPose { theta_rad: of(lab.theta_rad), ..lab }.inverse()
+            })
+        };
+        let mut tried = vec![(Mismatch::Inverse, all(&|sure| sure.truth.inverse()))];
+        for factor in [2.0, 0.5, 1f64.to_degrees(), 1f64.to_radians()] {
+            tried.push((Mismatch::Factor(factor), with_angle(&|theta| theta / factor)));
+        }
+        let same = labs.iter().all(|lab| angle_error(lab.theta_rad, labs[0].theta_rad) < SAME_RAD);
+        if same {
+            // Whatever the angles are, they are not these.
+            tried.push((Mismatch::Constant, all(&|sure| sure.found)));
+        } else if let Some(off) = median(
+            labs.iter().zip(&self.sure).map(|(lab, sure)| wrap_angle(lab.theta_rad - sure.found.inverse().theta_rad)),
+        ) {
+            tried.push((Mismatch::Angle(off), with_angle(&|theta| theta - off)));
+        }
+        for on in [-1, 1] {
+            let truths = self.sure.iter().map(|sure| (felt[sure.at].beside?)(on));
+            tried.push((Mismatch::Neighbor(on), truths.collect()));
+        }
+        // One rigid motion on the side of the gripper, or of the object; a mere turn is that of the angles.
+        let moves = |motion: &PlanarPose| motion.y_m.hypot(motion.z_m) > MOVED_M;
+        if let Some(motion) =
+            typical(self.sure.iter().map(|sure| sure.found.compose(sure.truth.inverse()))).filter(moves)
+        {
+            let mismatch = Mismatch::GraspFrame(-DVec2::new(motion.y_m, motion.z_m), -motion.theta_rad);
+            tried.push((mismatch, all(&|sure| motion.compose(sure.truth))));
+        }
+        if let Some(motion) =
+            typical(self.sure.iter().map(|sure| sure.truth.inverse().compose(sure.found))).filter(moves)
+        {
+            let mismatch = Mismatch::ObjectFrame(-DVec2::new(motion.y_m, motion.z_m));
+            tried.push((mismatch, all(&|sure| sure.truth.compose(motion))));
+        }
+        tried
+    }
+
+    /// The doubt about the true poses, in words.
+    pub(super) fn doubt(&self, mismatch: Mismatch) -> Doubt {
+        let angle = median(self.sure.iter().map(|sure| angle_error(sure.found.theta_rad, sure.truth.theta_rad)));
+        let place = median(self.sure.iter().map(|sure| place_error(sure.found, sure.truth)));
+        let what = format!(
+            "the true poses contradict the imprints: registered without them, {} of {} poses are good, and they are a median of \
+             {}° and {} mm away from the stored ones; {}",
+            self.sure.len(),
+            self.asked,
+            fixed(angle.unwrap_or(f64::NAN).to_degrees(), 1),
+            fixed(1e3 * place.unwrap_or(f64::NAN), 1),
+            mismatch.text()
+        );
+        Doubt { cause: Cause::Poses(mismatch), what, hint: mismatch.hint().into() }
+    }
+}
+
+fn place_error(a: PlanarPose, b: PlanarPose) -> f64 {
+    (a.y_m - b.y_m).hypot(a.z_m - b.z_m)
+}
+
+/// Distance of two poses; from 1 on they contradict each other.
+fn off(a: PlanarPose, b: PlanarPose) -> f64 {
+    (angle_error(a.theta_rad, b.theta_rad) / FAR_RAD).max(place_error(a, b) / FAR_M)
+}
+
+fn is_near(a: PlanarPose, b: PlanarPose) -> bool {
+    off(a, b) <= 1.0
+}
+
+/// The motion in the middle of all.
+fn typical(motions: impl Iterator<Item = PlanarPose> + Clone) -> Option<PlanarPose> {
+    Some(PlanarPose {
+        theta_rad: median(motions.clone().map(|m| wrap_angle(m.theta_rad)))?,
+        y_m: median(motions.clone().map(|m| m.y_m))?,
+        z_m: median(motions.map(|m| m.z_m))?,
+    })
+}
+
+/// The registered pose, from membranes and contact by depth alone, where the verdict on it is good.
+fn good_pose(sample: &Sample, tool: &ToolModel) -> Option<PlanarPose> {
+    let mut points: Vec<DVec3> = Vec::new();
+    let mut images = Vec::new();
+    for touch in sample.pads.iter().flatten() {
+        let Some((depth, camera)) = touch.depth().zip(touch.camera()) else { continue };
+        let Some([rest, top]) = rest_and_top(&depth.imprint) else { continue };
+        let contact = threshold(&depth.imprint, rest + CONTACT_SHARE * (top - rest));
+        points.extend(lift(&depth.imprint, camera, Some(&contact)).ok()?.points);
+        images.push(PadImage { imprint: &depth.imprint, camera, predicted: false });
+    }
+    let contacts = Contacts { points: &points, images: &images };
+    let ask = Ask { evidence: true, ..Ask::default() };
+    let report = register_with(&*Registration::Joint.method(), contacts, tool, ask).ok()?;
+    let verdict = Verdict::of(&report)?;
+    (verdict.grade == Grade::Good).then_some(report.grasp_from_object)
+}
