@@ -68,6 +68,16 @@ pub enum Cause {
 }
 
 impl Cause {
+    /// True where imprints, CAD models and true poses do not go together, and it is known why: what is made of all three is
+    /// wrong.
+    pub fn is_of_poses(&self) -> bool {
+        match self {
+            Self::Stored(read_as) => !read_as.to_string().starts_with("image"),
+            Self::Poses(_) | Self::OtherTool(_) | Self::Axes(..) | Self::NotItsModel(_) => true,
+            Self::SameImages | Self::NoReference | Self::Gray | Self::Unexplained => false,
+        }
+    }
+
     /// A word for tables.
     pub fn key(&self) -> String {
         match self {
@@ -141,24 +151,44 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
 
 /// Doubt about imprints, CAD models and true poses, which are judged together: each of the three may be what is wrong.
 fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
-    let registered = poses::Registered::of(felt, tools);
-    if registered.agree() {
-        return None;
-    }
-    let samples: Vec<&Sample> = felt.iter().map(|felt| felt.sample).collect();
-    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
-    let by_imprints = || imprints::judge(&samples, &named, tools);
-    let Some((mismatch, likeness)) = registered.mismatch(felt) else { return by_imprints().map(|(doubt, _)| doubt) };
-    if mismatch.is_rigid() {
+    let models = poses::models(felt, tools);
+    let registered = poses::Registered::of(felt, &models);
+    let mismatch = registered.mismatch(felt);
+    if let Some((mismatch, _)) = mismatch.filter(|(mismatch, _)| mismatch.is_rigid()) {
         // No mirror image and no factor of the imprints looks like this.
         return Some(registered.doubt(mismatch));
     }
-    // An explanation is better than none, and of two the likelier.
-    let margin = if mismatch == Mismatch::Unknown { -SAME } else { SAME };
-    match by_imprints() {
-        Some((doubt, explained)) if explained > likeness + margin => Some(doubt),
-        _ => Some(registered.doubt(mismatch)),
+    let samples: Vec<&Sample> = felt.iter().map(|felt| felt.sample).collect();
+    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    let by_imprints = imprints::judge(&samples, &named, tools, !registered.agree());
+    if let Some((mismatch, likeness)) = mismatch {
+        // An explanation is better than none, and of two the likelier.
+        let margin = if mismatch == Mismatch::Unknown { -SAME } else { SAME };
+        if by_imprints.as_ref().is_none_or(|(_, explained)| *explained <= likeness + margin) {
+            return Some(registered.doubt(mismatch));
+        }
     }
+    let (doubt, _) = by_imprints?;
+    // A cure is tried to the end before it is offered.
+    let cured = match &doubt.cause {
+        Cause::Stored(read_as) => {
+            let read: Vec<Sample> = samples.iter().map(|sample| ReadAs::all(&[*read_as], sample)).collect();
+            let read: Vec<Felt<'_>> = felt.iter().zip(&read).map(|(felt, sample)| Felt { sample, ..*felt }).collect();
+            registered.is_cured_by(&poses::Registered::of(&read, &models))
+        }
+        Cause::Axes(tools_of, axes) => {
+            let turned = tools_of.iter().filter_map(|name| Some((name.clone(), axes.apply(tools.get(name)?))));
+            let models = poses::models(felt, &tools.clone().into_iter().chain(turned).collect());
+            registered.is_cured_by(&poses::Registered::of(felt, &models))
+        }
+        Cause::OtherTool(list) => {
+            let other = list.iter().filter_map(|(name, other)| Some((name.clone(), tools.get(other)?.clone())));
+            let models = poses::models(felt, &tools.clone().into_iter().chain(other).collect());
+            registered.is_cured_by(&poses::Registered::of(felt, &models))
+        }
+        _ => true,
+    };
+    if cured { Some(doubt) } else { registered.unexplained() }
 }
 
 /// A sample with the readings of one kind of sensor alone: what is tried on it need not copy the other's pictures.

@@ -131,11 +131,12 @@ impl<'a> Pairs<'a> {
 }
 
 /// Doubt about the imprints of some pairs, or about their CAD models, with the mean likeness where it is mended; 0 where
-/// nothing mends it.
+/// nothing mends it. Other CAD models are tried where that is asked.
 pub(super) fn judge(
     samples: &[&Sample],
     named: &[Option<&str>],
     meshes: &BTreeMap<String, TriMesh>,
+    try_models: bool,
 ) -> Option<(Doubt, f64)> {
     let pairs = Pairs::of(samples, named, meshes);
     if pairs.samples.is_empty() {
@@ -144,7 +145,7 @@ pub(super) fn judge(
     let stored = pairs.scores(&[]);
     let read = best_reading(&pairs, &stored);
     let mean = stored.iter().sum::<f64>() / stored.len() as f64;
-    let models = tools_in_doubt(&pairs, &stored);
+    let models = if try_models { tools_in_doubt(&pairs, &stored) } else { Vec::new() };
     // CAD models are blamed where that explains more than any one reading of all pairs.
     let best_read = read.as_ref().map_or(mean, |(_, gain)| gain.read);
     if let Some((doubt, with)) = of_models(&pairs, meshes, &models, &stored)

@@ -25,11 +25,15 @@ use crate::verdict::{Grade, Verdict};
 const FEWEST: usize = 3;
 /// Share of the pairs with a truth whose registration must be good.
 const SURE: f64 = 0.5;
-/// Share of the good registrations that must be far from the truth, and with which an explanation must agree.
+/// Share of the good registrations that must be far from the truth.
+const FAR: f64 = 0.5;
+/// Share of them with which an explanation must agree.
 const MOST: f64 = 0.8;
+/// Poses this near to the truth, in the units of [`off`], are as good as any.
+const WELL: f64 = 0.4;
 /// A pose further from the truth contradicts it, radians and meters: good registrations are off by 0.6 degrees and 1 mm.
 const FAR_RAD: f64 = 2.5 * std::f64::consts::PI / 180.0;
-const FAR_M: f64 = 4e-3;
+const FAR_M: f64 = 6e-3;
 /// A frame is moved by at least this, meters.
 const MOVED_M: f64 = 3e-3;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
@@ -114,78 +118,108 @@ impl Mismatch {
     }
 }
 
-/// A pair whose registration is good, with its truth; both are `grasp_from_object`.
+/// A pair whose registration is good; both poses are `grasp_from_object`.
 #[derive(Clone, Copy, Debug)]
 struct Sure {
     /// Its position among the pairs that are looked at.
     at: usize,
-    truth: PlanarPose,
+    truth: Option<PlanarPose>,
     found: PlanarPose,
 }
 
+/// CAD models of the tools of some pairs, ready to register.
+pub(super) type Models<'a> = BTreeMap<&'a str, ToolModel>;
+
+/// The models of these pairs' tools, as far as they can be used.
+pub(super) fn models<'a>(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -> Models<'a> {
+    let named: BTreeMap<&str, &TriMesh> =
+        felt.iter().filter_map(|felt| Some((felt.tool?, tools.get(felt.tool?)?))).collect();
+    named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect()
+}
+
 /// Registrations of some pairs.
-pub(super) struct Registered<'a> {
+pub(super) struct Registered<'m, 'a> {
     sure: Vec<Sure>,
-    models: BTreeMap<&'a str, ToolModel>,
-    /// Pairs with a truth, a CAD model and cameras.
+    models: &'m Models<'a>,
+    /// Pairs with a CAD model and cameras, and those of them with a truth.
+    tried: usize,
     asked: usize,
 }
 
-impl<'a> Registered<'a> {
-    /// Registers the pairs that have a truth.
-    pub(super) fn of(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -> Self {
-        let named: BTreeMap<&str, &TriMesh> =
-            felt.iter().filter_map(|felt| Some((felt.tool?, tools.get(felt.tool?)?))).collect();
-        let models: BTreeMap<&str, ToolModel> =
-            named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect();
-        let with_truth: Vec<(usize, &Sample, &ToolModel, PlanarPose)> = (0..)
+impl<'m, 'a> Registered<'m, 'a> {
+    /// Registers the pairs.
+    pub(super) fn of(felt: &[Felt<'_>], models: &'m Models<'a>) -> Self {
+        let tried: Vec<(usize, &Sample, &ToolModel)> = (0..)
             .zip(felt)
-            .filter_map(|(at, felt)| Some((at, felt.sample, models.get(felt.tool?)?, felt.sample.grasp_from_object?)))
-            .filter(|(_, sample, ..)| sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()))
+            .filter_map(|(at, felt)| Some((at, felt.sample, models.get(felt.tool?)?)))
+            .filter(|(_, sample, _)| sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()))
             .collect();
-        let sure = with_truth
-            .par_iter()
-            .filter_map(|&(at, sample, model, truth)| Some(Sure { at, truth, found: good_pose(sample, model)? }));
-        let (sure, asked) = (sure.collect(), with_truth.len());
-        Self { sure, asked, models }
+        let asked = tried.iter().filter(|(_, sample, _)| sample.grasp_from_object.is_some()).count();
+        let sure = tried.par_iter().filter_map(|&(at, sample, model)| {
+            Some(Sure { at, truth: sample.grasp_from_object, found: good_pose(sample, model)? })
+        });
+        let sure = sure.collect();
+        Self { sure, models, tried: tried.len(), asked }
     }
 
-    /// True where there are enough of them to tell.
-    fn tell(&self) -> bool {
-        self.sure.len() >= FEWEST && self.sure.len() as f64 >= SURE * self.asked as f64
+    /// The good registrations with a truth: found and true pose.
+    fn known(&self) -> impl Iterator<Item = (&Sure, PlanarPose)> {
+        self.sure.iter().filter_map(|sure| Some((sure, sure.truth?)))
     }
 
-    /// True where good registrations agree with the truth on nearly all pairs: nothing is wrong with imprints, CAD models and
-    /// poses together.
+    fn near(&self) -> usize {
+        self.known().filter(|(sure, truth)| is_near(sure.found, *truth)).count()
+    }
+
+    /// True where every pair has a truth and a good registration that agrees with it: CAD models and poses are right.
     pub(super) fn agree(&self) -> bool {
-        self.asked > 0
-            && self.sure.iter().filter(|sure| is_near(sure.found, sure.truth)).count() as f64
-                >= MOST * self.asked as f64
+        self.tried > 0 && self.near() == self.tried
+    }
+
+    /// True where, after a cure, no fewer registrations are good and near the truth, and they are no further from it.
+    pub(super) fn is_cured_by(&self, cured: &Self) -> bool {
+        let off = |all: &Self| median(all.known().map(|(sure, truth)| off(sure.found, truth))).unwrap_or(f64::INFINITY);
+        cured.sure.len() >= self.sure.len() && cured.near() >= self.near() && off(cured) <= off(self).max(WELL)
+    }
+
+    /// Nothing that was tried mends what is wrong, as far as something is.
+    pub(super) fn unexplained(&self) -> Option<Doubt> {
+        ((self.sure.len() as f64) < SURE * self.tried as f64).then(|| Doubt {
+            cause: Cause::Unexplained,
+            what: format!(
+                "the imprints do not lie well on their CAD models: {} of {} registered poses are good, and nothing that was tried \
+                 mends it",
+                self.sure.len(),
+                self.tried
+            ),
+            hint: "check the cameras, the depths without contact, and the frames of CAD models and poses".into(),
+        })
     }
 
     /// The mismatch of truth and registrations where they contradict each other, with the mean likeness where it is mended.
     pub(super) fn mismatch(&self, felt: &[Felt<'_>]) -> Option<(Mismatch, f64)> {
-        let far = self.sure.iter().filter(|sure| !is_near(sure.found, sure.truth)).count();
-        if !self.tell() || (far as f64) < MOST * self.sure.len() as f64 {
+        let count = self.known().count();
+        let far = count - self.near();
+        if count < FEWEST || (count as f64) < SURE * self.asked as f64 || (far as f64) < FAR * count as f64 {
             return None;
         }
         let explained = self.explanations(felt).into_iter().filter_map(|(mismatch, truths)| {
             let off =
                 truths.iter().zip(&self.sure).map(|(truth, sure)| truth.map_or(f64::INFINITY, |t| off(sure.found, t)));
             let near = off.clone().filter(|off| *off <= 1.0).count();
-            (near as f64 >= MOST * self.sure.len() as f64).then_some((near, median(off)?, mismatch, truths))
+            (near as f64 >= MOST * count as f64).then_some((near, median(off)?, mismatch, truths))
         });
         let best = explained.max_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
         let (mismatch, truths) = match best {
             Some((_, _, mismatch, truths)) => (mismatch, truths),
-            None => (Mismatch::Unknown, self.sure.iter().map(|sure| Some(sure.found)).collect()),
+            None => (Mismatch::Unknown, self.known().map(|(sure, _)| Some(sure.found)).collect()),
         };
         Some((mismatch, self.likeness(felt, &truths)))
     }
 
-    /// The mean likeness of the sure pairs at these poses.
+    /// The mean likeness of the good registrations with a truth at these poses.
     fn likeness(&self, felt: &[Felt<'_>], poses: &[Option<PlanarPose>]) -> f64 {
-        let one = |(sure, pose): (&Sure, &Option<PlanarPose>)| {
+        let one = |((sure, _), pose): ((&Sure, PlanarPose), &Option<PlanarPose>)| {
             let (felt, pose) = (felt[sure.at], (*pose)?);
             let mut sample = felt.sample.clone();
             for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
@@ -193,62 +227,62 @@ impl<'a> Registered<'a> {
             }
             Some(likeness(&sample, &self.models.get(felt.tool?)?.field, pose))
         };
-        let found: f64 = self.sure.iter().zip(poses).filter_map(one).sum();
-        found / self.sure.len().max(1) as f64
+        let found: f64 = self.known().zip(poses).filter_map(one).sum();
+        found / self.known().count().max(1) as f64
     }
 
-    /// What may be wrong with the truth, and the truths of the sure pairs if it is.
+    /// What may be wrong with the truth, and the truths of the good registrations if it is.
     fn explanations(&self, felt: &[Felt<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
-        let labs: Vec<PlanarPose> = self.sure.iter().map(|sure| sure.truth.inverse()).collect();
-        let all = |of: &dyn Fn(&Sure) -> PlanarPose| self.sure.iter().map(|sure| Some(of(sure))).collect::<Vec<_>>();
+        let known: Vec<(Sure, PlanarPose)> = self.known().map(|(sure, truth)| (*sure, truth)).collect();
+        let all = |of: &dyn Fn(&Sure, PlanarPose) -> PlanarPose| {
+            known.iter().map(|(sure, truth)| Some(of(sure, *truth))).collect::<Vec<_>>()
+        };
         let with_angle = |of: &dyn Fn(f64) -> f64| {
-            all(&|sure| {
-                let lab = sure.truth.inverse();
+            all(&|_, truth| {
+                let lab = truth.inverse();
                 PlanarPose { theta_rad: of(lab.theta_rad), ..lab }.inverse()
             })
         };
-        let mut tried = vec![(Mismatch::Inverse, all(&|sure| sure.truth.inverse()))];
+        let mut tried = vec![(Mismatch::Inverse, all(&|_, truth| truth.inverse()))];
         for factor in [2.0, 0.5, 1f64.to_degrees(), 1f64.to_radians()] {
             tried.push((Mismatch::Factor(factor), with_angle(&|theta| theta / factor)));
         }
-        let same = labs.iter().all(|lab| angle_error(lab.theta_rad, labs[0].theta_rad) < SAME_RAD);
-        if same {
+        let first = known.first().map_or(0.0, |(_, truth)| truth.theta_rad);
+        if known.iter().all(|(_, truth)| angle_error(truth.theta_rad, first) < SAME_RAD) {
             // Whatever the angles are, they are not these.
-            tried.push((Mismatch::Constant, all(&|sure| sure.found)));
-        } else if let Some(off) = median(
-            labs.iter().zip(&self.sure).map(|(lab, sure)| wrap_angle(lab.theta_rad - sure.found.inverse().theta_rad)),
-        ) {
+            tried.push((Mismatch::Constant, all(&|sure, _| sure.found)));
+        } else if let Some(off) =
+            median(known.iter().map(|(sure, truth)| wrap_angle(sure.found.theta_rad - truth.theta_rad)))
+        {
             tried.push((Mismatch::Angle(off), with_angle(&|theta| theta - off)));
         }
         for on in [-1, 1] {
-            let truths = self.sure.iter().map(|sure| (felt[sure.at].beside?)(on));
+            let truths = known.iter().map(|(sure, _)| (felt[sure.at].beside?)(on));
             tried.push((Mismatch::Neighbor(on), truths.collect()));
         }
         // One rigid motion on the side of the gripper, or of the object; a mere turn is that of the angles.
         let moves = |motion: &PlanarPose| motion.y_m.hypot(motion.z_m) > MOVED_M;
-        if let Some(motion) =
-            typical(self.sure.iter().map(|sure| sure.found.compose(sure.truth.inverse()))).filter(moves)
-        {
+        let of_gripper = typical(known.iter().map(|(sure, truth)| sure.found.compose(truth.inverse())));
+        if let Some(motion) = of_gripper.filter(moves) {
             let mismatch = Mismatch::GraspFrame(-DVec2::new(motion.y_m, motion.z_m), -motion.theta_rad);
-            tried.push((mismatch, all(&|sure| motion.compose(sure.truth))));
+            tried.push((mismatch, all(&|_, truth| motion.compose(truth))));
         }
-        if let Some(motion) =
-            typical(self.sure.iter().map(|sure| sure.truth.inverse().compose(sure.found))).filter(moves)
-        {
+        let of_object = typical(known.iter().map(|(sure, truth)| truth.inverse().compose(sure.found)));
+        if let Some(motion) = of_object.filter(moves) {
             let mismatch = Mismatch::ObjectFrame(-DVec2::new(motion.y_m, motion.z_m));
-            tried.push((mismatch, all(&|sure| sure.truth.compose(motion))));
+            tried.push((mismatch, all(&|_, truth| truth.compose(motion))));
         }
         tried
     }
 
     /// The doubt about the true poses, in words.
     pub(super) fn doubt(&self, mismatch: Mismatch) -> Doubt {
-        let angle = median(self.sure.iter().map(|sure| angle_error(sure.found.theta_rad, sure.truth.theta_rad)));
-        let place = median(self.sure.iter().map(|sure| place_error(sure.found, sure.truth)));
+        let angle = median(self.known().map(|(sure, truth)| angle_error(sure.found.theta_rad, truth.theta_rad)));
+        let place = median(self.known().map(|(sure, truth)| place_error(sure.found, truth)));
         let what = format!(
             "the true poses contradict the imprints: registered without them, {} of {} poses are good, and they are a median of \
              {}° and {} mm away from the stored ones; {}",
-            self.sure.len(),
+            self.known().count(),
             self.asked,
             fixed(angle.unwrap_or(f64::NAN).to_degrees(), 1),
             fixed(1e3 * place.unwrap_or(f64::NAN), 1),

@@ -13,7 +13,7 @@ use crate::models::Models;
 use crate::predict::Generating;
 use crate::tool::tool_file;
 use touch2touch_core::dataset::{PairId, Problem};
-use touch2touch_core::doubt::{Cause, Doubt, Felt, Placed, judge};
+use touch2touch_core::doubt::{Doubt, Felt, Placed, judge};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::read_as::{ReadAs, also, list};
@@ -112,13 +112,13 @@ pub fn notes(dataset: &Dataset) -> Vec<Problem> {
     problems(dataset, &examine_reading(dataset, PAIRS, None, &JobCx::unwatched()))
 }
 
-/// Refuses true poses that contradict the imprints, for whoever would make masks of them.
+/// Refuses true poses and CAD models that contradict the imprints, for whoever would make masks of them.
 ///
 /// # Errors
 /// In words, with what seems wrong.
 pub(crate) fn check_truth(dataset: &Dataset, what: &str) -> Result<(), TaskError> {
     let doubts = examine_reading(dataset, PAIRS, None, &JobCx::unwatched());
-    match doubts.into_iter().find(|doubt| matches!(doubt.cause, Cause::Poses(_))) {
+    match doubts.into_iter().find(|doubt| doubt.cause.is_of_poses()) {
         Some(doubt) => Err(TaskError::new(what, doubt.what).with_hint(doubt.hint)),
         None => Ok(()),
     }
@@ -158,4 +158,17 @@ pub fn placed(samples: &[&Sample], (models, generating): Generator<'_>, cx: &Job
             .collect()
     };
     Some(samples.iter().zip(made).map(one).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn masks_are_not_made_of_poses_that_contradict_the_imprints() {
+        assert!(check_truth(&Dataset::demo(), "Train").is_ok());
+        let negated = Dataset::demo().reading(vec![ReadAs::NegateTheta]);
+        let refused = check_truth(&negated, "Train").unwrap_err();
+        assert!(refused.why.contains("theta has the other sign"), "{refused:?}");
+    }
 }
