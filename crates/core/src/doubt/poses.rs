@@ -30,10 +30,10 @@ const FAR: f64 = 0.5;
 /// Share of them with which an explanation must agree.
 const MOST: f64 = 0.8;
 /// Poses this near to the truth, in the units of [`off`], are as good as any.
-const WELL: f64 = 0.4;
+const WELL: f64 = 0.3;
 /// A pose further from the truth contradicts it, radians and meters: good registrations are off by 0.6 degrees and 1 mm.
 const FAR_RAD: f64 = 2.5 * std::f64::consts::PI / 180.0;
-const FAR_M: f64 = 6e-3;
+const FAR_M: f64 = 10e-3;
 /// A frame is moved by at least this, meters.
 const MOVED_M: f64 = 3e-3;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
