@@ -176,10 +176,13 @@ impl<'m, 'a> Registered<'m, 'a> {
         self.tried > 0 && self.near() == self.tried
     }
 
-    /// True where, after a cure, no fewer registrations are good and near the truth, and they are no further from it.
+    /// True where, after a cure, most registrations are good and near the truth, no fewer than before, and no further from it.
     pub(super) fn is_cured_by(&self, cured: &Self) -> bool {
         let off = |all: &Self| median(all.known().map(|(sure, truth)| off(sure.found, truth))).unwrap_or(f64::INFINITY);
-        cured.sure.len() >= self.sure.len() && cured.near() >= self.near() && off(cured) <= off(self).max(WELL)
+        let most = |count: usize, before: usize, of: usize| count >= before && count as f64 >= SURE * of as f64;
+        most(cured.sure.len(), self.sure.len(), self.tried)
+            && most(cured.near(), self.near(), self.asked)
+            && (self.asked == 0 || off(cured) <= off(self).max(WELL))
     }
 
     /// Nothing that was tried mends what is wrong, as far as something is.
