@@ -233,7 +233,7 @@ impl Models {
             }
         }
         if scale == Scale::Assumed {
-            notes.push("pictures have no camera, pose or tool: no angle, tool or Fréchet distance".into());
+            notes.push("pictures: no tool or Fréchet distance, and no angle where the tools are not named".into());
             return notes;
         }
         notes.push(match self.common.mask_recipe().ok() {
