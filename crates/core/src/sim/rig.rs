@@ -42,7 +42,7 @@ fn footprint(finger: PadId) -> Window {
     *Rig::lab().color_window(finger).expect("the lab's rig has a window for each finger")
 }
 
-/// The (y, z) in the grasp frame, meters, of a place `flat` on the finger's gel ([`Lens::flat`]).
+/// The (y, z) in the grasp frame, meters, of a place `flat` on the finger's gel ([`Lens::flat`](super::Lens::flat)).
 pub fn gelslim_yz(finger: PadId, flat: DVec2) -> DVec2 {
     DVec2::new(-outward(finger) * flat.y, flat.x)
 }

@@ -33,6 +33,7 @@ use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ss
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::{Sample, Scale};
+use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::Grade;
 
 /// A prediction that waits for its image figures.
@@ -289,7 +290,9 @@ impl<'a> Tool<'a> {
         let both = found.zip(truth);
         let apart = both.map(|(found, truth)| PoseDifference::between(found.grasp_from_object, truth));
         Ok(Judged {
-            angle_error_rad: truth.map(|_| apart.map_or(f64::NAN, |apart| apart.angle_rad)),
+            // As a pose tells its own error, bit for bit.
+            angle_error_rad: truth
+                .map(|truth| found.map_or(f64::NAN, |found| angle_error(found.angle_rad, truth.inverse().theta_rad))),
             position_error_m: apart.map(|apart| apart.position_m),
             verdict: found.and_then(|found| Some(found.verdict.as_ref()?.grade)),
         })
