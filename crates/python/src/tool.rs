@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use glam::DVec3;
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
@@ -65,7 +66,9 @@ impl Tool {
     /// Corners of the model (V, 3), meters, object frame.
     #[getter]
     fn vertices<'py>(&self, py: Python<'py>) -> PyResult<Array<'py, f64>> {
-        points(py, &self.model.mesh.vertices)
+        // As the file has them: the model measures x from its middle.
+        let in_file = |vertex: &DVec3| *vertex + DVec3::X * self.model.middle_x_m;
+        points(py, &self.model.mesh.vertices.iter().map(in_file).collect::<Vec<_>>())
     }
 
     /// Corners of each triangle (F, 3), counter-clockwise seen from outside.
