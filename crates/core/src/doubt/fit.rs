@@ -5,11 +5,11 @@ use glam::{DVec2, DVec3};
 use crate::align::{AlignConfig, Rung, align};
 use crate::blur::gaussian;
 use crate::cloud::{lift, lift_pixel};
-use crate::contact::{rest_and_top, threshold};
+use crate::contact::{rest_and_top, threshold, without_grain};
 use crate::field::DistanceField;
 use crate::frames::PlanarPose;
 use crate::grid::{DepthMap, Grid, Mask};
-use crate::sample::Sample;
+use crate::sample::{PadTouch, Sample};
 use crate::units::angle_error;
 
 /// Every so many pixels in either direction are looked at.
@@ -73,8 +73,8 @@ pub(super) fn correlation(a: &[f64], b: &[f64]) -> f64 {
     if size > 0.0 && size.is_finite() { dot(a, b) / size } else { 0.0 }
 }
 
-/// The registered pose of the tool, with contact by depth alone; `None` where there is none.
-pub(super) fn registered(sample: &Sample, field: &DistanceField) -> Option<PlanarPose> {
+/// Contact points by depth alone, grasp frame, meters.
+pub(super) fn contact_points(sample: &Sample) -> Option<Vec<DVec3>> {
     let mut points: Vec<DVec3> = Vec::new();
     for touch in sample.pads.iter().flatten() {
         let Some((depth, camera)) = touch.depth().zip(touch.camera()) else { continue };
@@ -82,6 +82,21 @@ pub(super) fn registered(sample: &Sample, field: &DistanceField) -> Option<Plana
         let contact: Mask = threshold(&depth.imprint, rest + CONTACT_SHARE * (top - rest));
         points.extend(lift(&depth.imprint, camera, Some(&contact)).ok()?.points);
     }
+    Some(points)
+}
+
+/// The sample with its imprints' grain taken away.
+pub(super) fn grainless(sample: &Sample) -> Sample {
+    let mut sample = sample.clone();
+    for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
+        depth.imprint = without_grain(&depth.imprint, 1);
+    }
+    sample
+}
+
+/// The registered pose of the tool, with contact by depth alone; `None` where there is none.
+pub(super) fn registered(sample: &Sample, field: &DistanceField) -> Option<PlanarPose> {
+    let points = contact_points(sample)?;
     let yz: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
     let config = AlignConfig::default();
     // Under a wrong reading nothing fits, and a grid would be searched in vain.

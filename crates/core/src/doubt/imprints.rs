@@ -5,13 +5,12 @@ use std::fmt;
 
 use glam::DVec3;
 
-use super::fit::{angle_error_rad, likeness, registered};
+use super::fit::{angle_error_rad, grainless, likeness, registered};
 use super::{Cause, Doubt, Gain, median};
-use crate::contact::without_grain;
 use crate::field::DistanceField;
 use crate::mesh::TriMesh;
 use crate::read_as::{Depths, Lay, ReadAs};
-use crate::sample::{PadTouch, Sample};
+use crate::sample::Sample;
 use crate::units::counted;
 
 /// Mean likeness of imprints that lie on their tools. Simulated ones have 0.6 to 0.85, wrongly read ones 0.5 and less.
@@ -101,11 +100,7 @@ impl<'a> Pairs<'a> {
             if !sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()) {
                 continue;
             }
-            let mut sample = (*sample).clone();
-            for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
-                depth.imprint = without_grain(&depth.imprint, 1);
-            }
-            taken.push(sample);
+            taken.push(grainless(sample));
             tools.push(tool);
         }
         Self { samples: taken, tools, fields }

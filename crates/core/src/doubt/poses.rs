@@ -5,18 +5,18 @@
 
 use std::collections::BTreeMap;
 
-use glam::{DVec2, DVec3};
+use glam::DVec2;
 use rayon::prelude::*;
 
-use super::fit::likeness;
+use super::fit::{contact_points, grainless, likeness};
 use super::{Cause, Doubt, Felt, median};
 use crate::align::{Ask, Contacts, PadImage};
-use crate::cloud::lift;
-use crate::contact::{rest_and_top, threshold, without_grain};
+use crate::contact::rest_and_top;
 use crate::frames::PlanarPose;
+use crate::manual::PoseDifference;
 use crate::mesh::TriMesh;
 use crate::pose::{Registration, register_with};
-use crate::sample::{PadTouch, Sample};
+use crate::sample::Sample;
 use crate::tool::ToolModel;
 use crate::units::{angle_error, fixed, wrap_angle};
 use crate::verdict::{Grade, Verdict};
@@ -36,12 +36,10 @@ const FAR_RAD: f64 = 2.5 * std::f64::consts::PI / 180.0;
 const FAR_M: f64 = 10e-3;
 /// A frame is moved by at least this, meters.
 const MOVED_M: f64 = 3e-3;
-/// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
-const CONTACT_SHARE: f32 = 0.7;
 /// True angles that differ by less are all the same, radians.
 const SAME_RAD: f64 = 1e-3;
 
-/// How true poses differ from where the tool was felt.
+/// Difference of true poses from where the tool was felt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mismatch {
     /// Each is the inverse.
@@ -52,7 +50,7 @@ pub enum Mismatch {
     Factor(f64),
     /// All angles are the same.
     Constant,
-    /// Where a pair's pose should be, that of the pair so many places on is right.
+    /// The pose stored with the pair so many places on is right.
     Neighbor(isize),
     /// They are of another grasp frame: moved by this along y and z, meters, and turned by this, radians.
     GraspFrame(DVec2, f64),
@@ -121,7 +119,7 @@ impl Mismatch {
 /// A pair whose registration is good; both poses are `grasp_from_object`.
 #[derive(Clone, Copy, Debug)]
 struct Sure {
-    /// Its position among the pairs that are looked at.
+    /// Position among the pairs that are looked at.
     at: usize,
     truth: Option<PlanarPose>,
     found: PlanarPose,
@@ -163,7 +161,7 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 
     /// The good registrations with a truth: found and true pose.
-    fn known(&self) -> impl Iterator<Item = (&Sure, PlanarPose)> {
+    fn known(&self) -> impl Iterator<Item = (&Sure, PlanarPose)> + Clone {
         self.sure.iter().filter_map(|sure| Some((sure, sure.truth?)))
     }
 
@@ -207,8 +205,8 @@ impl<'m, 'a> Registered<'m, 'a> {
             return None;
         }
         let explained = self.explanations(felt).into_iter().filter_map(|(mismatch, truths)| {
-            let off =
-                truths.iter().zip(&self.sure).map(|(truth, sure)| truth.map_or(f64::INFINITY, |t| off(sure.found, t)));
+            let both = truths.iter().zip(self.known());
+            let off = both.map(|(truth, (sure, _))| truth.map_or(f64::INFINITY, |truth| off(sure.found, truth)));
             let near = off.clone().filter(|off| *off <= 1.0).count();
             (near as f64 >= MOST * count as f64).then_some((near, median(off)?, mismatch, truths))
         });
@@ -223,18 +221,14 @@ impl<'m, 'a> Registered<'m, 'a> {
     /// The mean likeness of the good registrations with a truth at these poses.
     fn likeness(&self, felt: &[Felt<'_>], poses: &[Option<PlanarPose>]) -> f64 {
         let one = |((sure, _), pose): ((&Sure, PlanarPose), &Option<PlanarPose>)| {
-            let (felt, pose) = (felt[sure.at], (*pose)?);
-            let mut sample = felt.sample.clone();
-            for depth in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
-                depth.imprint = without_grain(&depth.imprint, 1);
-            }
-            Some(likeness(&sample, &self.models.get(felt.tool?)?.field, pose))
+            let felt = felt[sure.at];
+            Some(likeness(&grainless(felt.sample), &self.models.get(felt.tool?)?.field, (*pose)?))
         };
         let found: f64 = self.known().zip(poses).filter_map(one).sum();
         found / self.known().count().max(1) as f64
     }
 
-    /// What may be wrong with the truth, and the truths of the good registrations if it is.
+    /// Explanations of what is wrong with the truth, and the truths of the good registrations if it is.
     fn explanations(&self, felt: &[Felt<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
         let known: Vec<(Sure, PlanarPose)> = self.known().map(|(sure, truth)| (*sure, truth)).collect();
         let all = |of: &dyn Fn(&Sure, PlanarPose) -> PlanarPose| {
@@ -280,8 +274,9 @@ impl<'m, 'a> Registered<'m, 'a> {
 
     /// The doubt about the true poses, in words.
     pub(super) fn doubt(&self, mismatch: Mismatch) -> Doubt {
-        let angle = median(self.known().map(|(sure, truth)| angle_error(sure.found.theta_rad, truth.theta_rad)));
-        let place = median(self.known().map(|(sure, truth)| place_error(sure.found, truth)));
+        let apart = self.known().map(|(sure, truth)| PoseDifference::between(sure.found, truth));
+        let angle = median(apart.clone().map(|apart| apart.angle_rad));
+        let place = median(apart.map(|apart| apart.position_m));
         let what = format!(
             "the true poses contradict the imprints: registered without them, {} of {} poses are good, and they are a median of \
              {}° and {} mm away from the stored ones; {}",
@@ -295,13 +290,10 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 }
 
-fn place_error(a: PlanarPose, b: PlanarPose) -> f64 {
-    (a.y_m - b.y_m).hypot(a.z_m - b.z_m)
-}
-
 /// Distance of two poses; from 1 on they contradict each other.
 fn off(a: PlanarPose, b: PlanarPose) -> f64 {
-    (angle_error(a.theta_rad, b.theta_rad) / FAR_RAD).max(place_error(a, b) / FAR_M)
+    let apart = PoseDifference::between(a, b);
+    (apart.angle_rad / FAR_RAD).max(apart.position_m / FAR_M)
 }
 
 fn is_near(a: PlanarPose, b: PlanarPose) -> bool {
@@ -319,15 +311,11 @@ fn typical(motions: impl Iterator<Item = PlanarPose> + Clone) -> Option<PlanarPo
 
 /// The registered pose, from membranes and contact by depth alone, where the verdict on it is good.
 fn good_pose(sample: &Sample, tool: &ToolModel) -> Option<PlanarPose> {
-    let mut points: Vec<DVec3> = Vec::new();
-    let mut images = Vec::new();
-    for touch in sample.pads.iter().flatten() {
-        let Some((depth, camera)) = touch.depth().zip(touch.camera()) else { continue };
-        let Some([rest, top]) = rest_and_top(&depth.imprint) else { continue };
-        let contact = threshold(&depth.imprint, rest + CONTACT_SHARE * (top - rest));
-        points.extend(lift(&depth.imprint, camera, Some(&contact)).ok()?.points);
-        images.push(PadImage { imprint: &depth.imprint, camera, predicted: false });
-    }
+    let points = contact_points(sample)?;
+    let felt = sample.pads.iter().flatten().filter_map(|touch| touch.depth().zip(touch.camera()));
+    let felt = felt.filter(|(depth, _)| rest_and_top(&depth.imprint).is_some());
+    let images = felt.map(|(depth, camera)| PadImage { imprint: &depth.imprint, camera, predicted: false });
+    let images: Vec<_> = images.collect();
     let contacts = Contacts { points: &points, images: &images };
     let ask = Ask { evidence: true, ..Ask::default() };
     let report = register_with(&*Registration::Joint.method(), contacts, tool, ask).ok()?;

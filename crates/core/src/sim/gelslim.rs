@@ -260,33 +260,36 @@ fn shade(image: &mut RgbGrid, config: &GelSlimConfig, gel: &Gel, frame: &Frame, 
     }
 }
 
+/// Places on the gel, meters, by the cell of a finger's marker lattice and the marker's own shift, in cells.
+fn lattice(config: &GelSlimConfig, finger: PadId, lens: &Lens) -> impl Fn(DVec2, DVec2) -> DVec2 {
+    let (pitch, phase) = (config.marker_pitch_m, DVec2::from_array(config.marker_phase[finger.index()]));
+    let center = lens.flat(DVec2::from_array(lens.center_px));
+    let turn = DVec2::from_angle(config.marker_angle_rad[finger.index()] + lens.turn_rad);
+    move |cell, shift| center + turn.rotate(cell + phase + shift) * pitch
+}
+
 /// Places of the markers of one of the lab's GelSlims without contact, pixels of its picture.
 pub(crate) fn marker_places(finger: PadId) -> Vec<DVec2> {
     let config = GelSlimConfig::default();
     let lens = config.lenses[finger.index()];
-    let phase = DVec2::from_array(config.marker_phase[finger.index()]);
-    let center = lens.flat(DVec2::from_array(lens.center_px));
-    let turn = DVec2::from_angle(config.marker_angle_rad[finger.index()] + lens.turn_rad);
+    let place = lattice(&config, finger, &lens);
     let size = DVec2::new(lab::GELSLIM.width as f64, lab::GELSLIM.height as f64);
-    let cells = (-8..=8).flat_map(|j| (-8..=8).map(move |i| DVec2::new(f64::from(i), f64::from(j)) + phase));
-    let places = cells.map(|cell| lens.pixel(center + turn.rotate(cell) * config.marker_pitch_m));
+    let cells = (-8..=8).flat_map(|j| (-8..=8).map(move |i| DVec2::new(f64::from(i), f64::from(j))));
+    let places = cells.map(|cell| lens.pixel(place(cell, DVec2::ZERO)));
     places.filter(|px| px.cmpgt(DVec2::ZERO).all() && px.cmplt(size - 1.0).all()).collect()
 }
 
 /// Place on the gel and radius of each marker without contact, meters.
 fn marker_grid(config: &GelSlimConfig, finger: PadId, frame: &Frame) -> Vec<(DVec2, f64)> {
     let mut noise = Noise::new(config.sensor_seed, Stream::GelReference, 16 + finger.index());
-    let (pitch, phase) = (config.marker_pitch_m, DVec2::from_array(config.marker_phase[finger.index()]));
-    let center = frame.lens.flat(DVec2::from_array(frame.lens.center_px));
-    let turn = DVec2::from_angle(config.marker_angle_rad[finger.index()] + frame.lens.turn_rad);
+    let (pitch, at) = (config.marker_pitch_m, lattice(config, finger, &frame.lens));
     let extent = frame.lens.half_extent() + pitch;
     let reach = (extent.x / pitch) as i32 + 2;
     let mut markers = Vec::new();
     for j in -reach..=reach {
         for i in -reach..=reach {
             let jitter = DVec2::new(f64::from(noise.normal()), f64::from(noise.normal())) * 0.03;
-            let cell = DVec2::new(f64::from(i), f64::from(j)) + phase + jitter;
-            let place = center + turn.rotate(cell) * pitch;
+            let place = at(DVec2::new(f64::from(i), f64::from(j)), jitter);
             let size = config.marker_radius_m * (1.0 + 0.12 * f64::from(noise.normal()));
             if place.abs().cmple(extent).all() {
                 markers.push((place, size));

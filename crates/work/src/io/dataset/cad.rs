@@ -1,4 +1,4 @@
-//! Where the CAD models of a data set's tools lie.
+//! CAD files of a data set's tools: [`cad_files`].
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};

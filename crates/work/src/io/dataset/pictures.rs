@@ -137,7 +137,7 @@ pub(super) fn scan_folders(folder: &Path) -> Result<Option<Scan>, OpenError> {
     Ok(found.end(folder, rig))
 }
 
-/// What is found in one folder after the other.
+/// Touches found in one folder after the other.
 #[derive(Default)]
 struct Found {
     pairs: Vec<(PairEntry, Files)>,
