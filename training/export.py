@@ -150,6 +150,8 @@ def write(net, path, inputs, outputs, examples, f16=False):
     if f16:
         half.store(path)
     onnx.checker.check_model(str(path), full_check=True)
+    # A training on a GPU lets products be rounded; here graphs are compared.
+    torch.set_float32_matmul_precision("highest")
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = 1
     engine = onnxruntime.InferenceSession(str(path), options, providers=["CPUExecutionProvider"])

@@ -25,7 +25,7 @@ WRITING = 0.06
 # Minutes that exports and scores take, however little there is.
 AFTER = 0.5
 # Shards by folder: mix, seed, and how many there are at most. They are begun in proportion.
-MIXES = {"train": ("train", 1, 400), "depths": ("depths", 1, 80), "tools": ("seen", 500, 40), "tools_unseen": ("unseen", 501, 14)}
+MIXES = {"train": ("train", 1, 800), "depths": ("depths", 1, 200), "tools": ("seen", 500, 60), "tools_unseen": ("unseen", 501, 20)}
 HELD_OUT = {"seen": ("seen", 900, 1), "unseen": ("unseen", 901, 1)}
 # Grasps of a shard, and touches to wait for before the first stage begins.
 PER_SHARD, ENOUGH = 50, 600
@@ -38,8 +38,8 @@ BUNDLES = {"generator": ("generator_ldm", "condition_encoder.onnx", "--steps", 2
 class Writers:
     """Threads that each have the program write one shard after the other; those that are there are not written again."""
 
-    def __init__(self, program, folder, count, words):
-        self.program, self.folder, self.words = program, folder, words
+    def __init__(self, program, folder, count):
+        self.program, self.folder = program, folder
         self.running, self.failed, self.stopped = set(), "", False
         shards = [(k / total, name, mix, seed, f"{k + 1}/{total}") for name, (mix, seed, total) in (HELD_OUT | MIXES).items()
                   for k in range(total)]
@@ -54,7 +54,7 @@ class Writers:
                 if self.stopped or self.failed or shard[0] is None:
                     return
                 grasps = PER_SHARD * int(share.partition("/")[2])
-                words = ["training-data", "simulator", *self.words, "--mix", mix, "--seed", seed, "--grasps", grasps, "--per-shard", PER_SHARD,
+                words = ["training-data", "simulator", "--mix", mix, "--seed", seed, "--grasps", grasps, "--per-shard", PER_SHARD,
                          "--shard", share, "--out", self.folder / name]
                 process = subprocess.Popen([self.program, *map(str, words)], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
                                            text=True, env={**os.environ, "RAYON_NUM_THREADS": "1"})

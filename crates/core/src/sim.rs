@@ -10,7 +10,7 @@
 //! bar and adds noise. The gel is a sheet on an elastic foundation under three LEDs, seen through a lens that bends lines.
 //! There is no friction between membrane and tool and no light bouncing in the gel.
 //!
-//! One pair (both fingers, both sensors) costs about 0.2 s of one core in release, most of it for the rays of the camera.
+//! One pair (both fingers, both sensors) costs about 0.15 s of one core in release, most of it for the rays of the camera.
 //! `examples/contact_sheet.rs` draws the tiles of `docs/simulated_tiles.png`.
 
 mod condition;

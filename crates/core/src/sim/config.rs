@@ -64,6 +64,36 @@ pub struct BubbleConfig {
     pub texture_seed: u64,
 }
 
+impl BubbleConfig {
+    /// This bubble's noise and errors on the nominal bubble's shape.
+    pub(super) fn of_nominal_shape(self) -> Self {
+        let Self {
+            press_m,
+            dome_rise_m,
+            dome_fullness,
+            rim_semi_axes_m,
+            rim_centers_m,
+            rim_tilt,
+            pressure_per_m,
+            stiffening,
+            reference_m,
+            ..
+        } = Self::default();
+        Self {
+            press_m,
+            dome_rise_m,
+            dome_fullness,
+            rim_semi_axes_m,
+            rim_centers_m,
+            rim_tilt,
+            pressure_per_m,
+            stiffening,
+            reference_m,
+            ..self
+        }
+    }
+}
+
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {

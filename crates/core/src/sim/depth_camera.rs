@@ -40,17 +40,37 @@ impl Rays {
     }
 
     /// Depth at which the ray of a pixel first meets a surface that is nowhere lower than `lowest`, meters: behind a bar the
-    /// wall hides the membrane.
-    fn first_hit(&self, u: usize, v: usize, lowest: f64, surface: impl Fn(DVec2) -> f64) -> f64 {
+    /// wall hides the membrane. `floor` is cheaper to ask than `surface` and hardly ever above it.
+    fn first_hit(
+        &self,
+        [u, v]: [usize; 2],
+        lowest: f64,
+        floor: impl Fn(DVec2) -> f64,
+        surface: impl Fn(DVec2) -> f64,
+    ) -> f64 {
         let (origin, d) = (self.origin(), self.direction(u, v));
-        let above = |z: f64| {
+        let over = |z: f64, height: &dyn Fn(DVec2) -> f64| {
             let p = origin + d * z;
-            p.x - surface(DVec2::new(p.y, p.z))
+            p.x - height(DVec2::new(p.y, p.z))
         };
+        let above = |z: f64| over(z, &surface);
         // With the steepest slope known, a step of the remaining height over that rate cannot jump over the surface.
         let rate = d.x.abs() + MAX_SLOPE * DVec2::new(d.y, d.z).length();
-        let mut low = ((lowest - origin.x) / d.x.max(1e-3) - 1e-4).max(0.0);
+        let start = ((lowest - origin.x) / d.x.max(1e-3) - 1e-4).max(0.0);
+        let (mut low, mut next) = (start, start);
+        for _ in 0..300 {
+            let f = over(next, &floor);
+            if f >= 0.0 {
+                break;
+            }
+            low = next;
+            next += (-f / rate).max(1e-4);
+        }
         let mut f_low = above(low);
+        if f_low >= 0.0 {
+            low = start;
+            f_low = above(low);
+        }
         let (mut high, mut f_high) = (low, f_low);
         for _ in 0..300 {
             if f_high >= 0.0 {
@@ -78,7 +98,7 @@ impl Rays {
 pub(super) fn dome_depth(rays: &Rays, dome: &Dome) -> DepthMap {
     let lowest = dome.apex - dome.rise - (dome.tilt * dome.semi.y).abs();
     DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
-        rays.first_hit(u, v, lowest, |yz| dome.height(yz)) as f32
+        rays.first_hit([u, v], lowest, |_| f64::NEG_INFINITY, |yz| dome.height(yz)) as f32
     })
 }
 
@@ -87,7 +107,7 @@ pub(super) fn membrane_depth(rays: &Rays, membrane: &Membrane) -> (DepthMap, Mas
     let mut contact = Mask::filled(lab::BUBBLE.width, lab::BUBBLE.height, false);
     let lowest = membrane.lowest();
     let depth = DepthMap::from_fn(lab::BUBBLE.width, lab::BUBBLE.height, |u, v| {
-        let depth = rays.first_hit(u, v, lowest, |yz| membrane.height(yz));
+        let depth = rays.first_hit([u, v], lowest, |yz| membrane.floor(yz), |yz| membrane.height(yz));
         let hit = rays.origin() + rays.direction(u, v) * depth;
         let yz = DVec2::new(hit.y, hit.z);
         contact[(u, v)] = membrane.distance_to_tool(hit.x, yz, CONTACT_DISTANCE_M) <= CONTACT_DISTANCE_M;

@@ -43,11 +43,16 @@ pub fn grid_grasp(index: u64) -> Grasp {
 
 /// A grasp drawn uniformly from the range of the grid.
 pub fn random_grasp(seed: u64) -> Grasp {
+    random_grasp_within(seed, THETA_RANGE_RAD, POSITION_RANGE_M)
+}
+
+/// A grasp drawn uniformly: up to `theta_rad` turned either way, up to `position_m` off along x and y.
+pub(super) fn random_grasp_within(seed: u64, theta_rad: f64, position_m: f64) -> Grasp {
     let mut noise = Noise::new(seed, Stream::Grasp, 0);
     Grasp {
-        theta_rad: noise.uniform(-THETA_RANGE_RAD, THETA_RANGE_RAD),
-        x_m: noise.uniform(-POSITION_RANGE_M, POSITION_RANGE_M),
-        y_m: noise.uniform(-POSITION_RANGE_M, POSITION_RANGE_M),
+        theta_rad: noise.uniform(-theta_rad, theta_rad),
+        x_m: noise.uniform(-position_m, position_m),
+        y_m: noise.uniform(-position_m, position_m),
     }
 }
 

@@ -121,19 +121,30 @@ impl Membrane {
 
     /// Height of the membrane at `(y, z)`, meters.
     pub fn height(&self, yz: DVec2) -> f64 {
+        let (free, near_tool) = self.between_nodes(yz);
+        // Between the nodes the tool's edges are sharper than the grid.
+        let tool = if near_tool { self.tool.height(self.object_from_grasp.transform_yz(yz)) } else { None };
+        tool.map_or(free, |height| free.min(-height))
+    }
+
+    /// Height that the membrane is hardly ever below at `(y, z)`, without asking the tool, meters.
+    pub(super) fn floor(&self, yz: DVec2) -> f64 {
+        /// The membrane's slope times a node's distance.
+        const STEEP_M: f64 = 3e-3;
+        let (free, near_tool) = self.between_nodes(yz);
+        if near_tool { free - STEEP_M } else { free }
+    }
+
+    /// Height of the grid at `(y, z)`, and whether the tool is near.
+    fn between_nodes(&self, yz: DVec2) -> (f64, bool) {
         let at = (yz - self.origin) / self.sheet.step;
         let (columns, rows) = (self.sheet.columns, self.sheet.rows);
         if !(at.x >= 0.0 && at.y >= 0.0 && at.x < (columns - 1) as f64 && at.y < (rows - 1) as f64) {
-            return self.dome.rim(yz);
+            return (self.dome.rim(yz), false);
         }
-        let free = self.sheet.between(&self.height, at);
         let k = at.y as usize * columns + at.x as usize;
-        // Between the nodes the tool's edges are sharper than the grid.
-        if [k, k + 1, k + columns, k + columns + 1].iter().any(|&k| self.near_tool[k]) {
-            let tool = self.tool.height(self.object_from_grasp.transform_yz(yz));
-            return tool.map_or(free, |height| free.min(-height));
-        }
-        free
+        let near_tool = [k, k + 1, k + columns, k + columns + 1].iter().any(|&k| self.near_tool[k]);
+        (self.sheet.between(&self.height, at), near_tool)
     }
 
     /// Distance of the membrane's point `(n, y, z)` from the tool's surface, meters, negative inside; more than

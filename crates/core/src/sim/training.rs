@@ -1,9 +1,12 @@
 //! Touches to train on: the catalog's tools and drawn ones, felt by nominal and by drawn sensors.
 
+use std::f64::consts::PI;
+
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::{BubbleConfig, Condition, SimConfig, random_grasp};
+use super::grasp::{random_grasp, random_grasp_within};
+use super::{BubbleConfig, Condition, SimConfig};
 use crate::catalog;
 use crate::sample::Sample;
 
@@ -11,8 +14,9 @@ use crate::sample::Sample;
 const DRAWN_TOOLS: f64 = 0.4;
 /// Share of touches by nominal sensors in [`Mix::Train`].
 const NOMINAL: f64 = 0.4;
-/// Variation of the lab's grip, meters.
-const GRIP_M: f64 = 0.0022;
+/// Share of grasps at any angle in [`Mix::Train`] and [`Mix::Depths`], and how far off the middle they are at most, meters.
+const ANY_ANGLE: f64 = 0.25;
+const ANY_PLACE_M: f64 = 0.015;
 
 /// Mix that touches are drawn from.
 #[derive(
@@ -30,12 +34,12 @@ const GRIP_M: f64 = 0.0022;
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Mix {
-    /// The seen tools and drawn ones, most of them felt by drawn sensors; never an unseen tool.
+    /// The seen tools and drawn ones, most of them felt by drawn sensors; never an unseen tool. The bubble's shape and how deep
+    /// it is pressed are the nominal ones: no GelSlim image tells them, and a generator would learn them by heart.
     #[default]
     Train,
     /// The tools of [`Mix::Train`], felt by drawn sensors alone, with bubbles of any size pressed 2 to 15 mm deep: for
-    /// contact masks only. A GelSlim image does not tell how deep the bubble is pressed, so a generator would learn to
-    /// draw the mean of all.
+    /// contact masks only.
     Depths,
     /// The seen tools, felt by nominal sensors: for validation.
     Seen,
@@ -68,13 +72,14 @@ pub fn training_touch(seed: u64, index: u64, mix: Mix, condition: Condition) -> 
     let nominal = !train || rng.random_bool(if mix == Mix::Depths { 0.0 } else { NOMINAL });
     let spec = tool.map_or_else(|| catalog::random_tool(rng.random()), |i| catalog[i].clone());
     let mut config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
-    if mix == Mix::Depths {
-        config.bubble = of_any_depth(config.bubble, &mut rng);
-    } else if nominal && train {
-        // The lab's grip varies from touch to touch.
-        config.bubble.press_m += rng.random_range(-GRIP_M..GRIP_M);
+    match mix {
+        Mix::Depths => config.bubble = of_any_depth(config.bubble, &mut rng),
+        Mix::Train => config.bubble = config.bubble.of_nominal_shape(),
+        Mix::Seen | Mix::Unseen => {}
     }
-    let (grasp, noise) = (random_grasp(rng.random()), rng.random());
+    let any_angle = train && rng.random_bool(ANY_ANGLE);
+    let (grasp, noise) = (rng.random(), rng.random());
+    let grasp = if any_angle { random_grasp_within(grasp, PI, ANY_PLACE_M) } else { random_grasp(grasp) };
     let sample = condition.simulate(&condition.tool(&spec, index), grasp, noise, &config);
     Drawn { sample, tool, nominal }
 }

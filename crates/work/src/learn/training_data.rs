@@ -362,7 +362,8 @@ fn touch(sample: &Sample, pad: PadId, at: usize, tool: Option<usize>) -> Option<
         imprint,
         contact: None,
         grasp: at as u32,
-        pad: pad.index(),
+        // A pair that has one finger is its first pad, whichever it was taken by.
+        pad: sample.taken_by.unwrap_or(pad).index(),
         pose: place.map(|place| [place.theta_rad, place.y_m, place.z_m]),
         tool,
         origin: Origin::Measured,
