@@ -9,12 +9,14 @@
 //! * `fit`, `imprints`: what was pushed in against the tool's outline at the true pose, or where that is not known at the
 //!   registered one;
 //! * `poses`: true poses against good registrations;
+//! * `parts`: one finger, where the other one is right;
 //! * `images`: touched against untouched images, over all pairs;
 //! * `predictions`: what a generator makes of the images against what was measured.
 
 mod fit;
 mod images;
 mod imprints;
+mod parts;
 mod poses;
 mod predictions;
 
@@ -55,6 +57,14 @@ pub enum Cause {
     Axes(Vec<String>, Axes),
     /// CAD models of these tools are not theirs, and no other one is.
     NotItsModel(Vec<String>),
+    /// Some of the pairs were felt as another tool than they are named after.
+    OtherToolOfSome,
+    /// The color images of some of the pairs are those of the other finger.
+    SwappedInSome,
+    /// What one finger felt is wrong, and is to be read so if that is known.
+    Finger(Option<ReadAs>),
+    /// One finger felt nothing.
+    NothingFelt,
     /// The touched image is the untouched one, pixel by pixel.
     SameImages,
     /// The untouched image is a single color.
@@ -73,8 +83,14 @@ impl Cause {
     pub fn is_of_poses(&self) -> bool {
         match self {
             Self::Stored(read_as) => !read_as.to_string().starts_with("image"),
-            Self::Poses(_) | Self::OtherTool(_) | Self::Axes(..) | Self::NotItsModel(_) => true,
-            Self::SameImages | Self::NoReference | Self::Gray | Self::Unexplained => false,
+            Self::Finger(read_as) => read_as.is_none_or(|read_as| !read_as.to_string().starts_with("image")),
+            Self::Poses(_) | Self::OtherTool(_) | Self::Axes(..) | Self::NotItsModel(_) | Self::OtherToolOfSome => true,
+            Self::SameImages
+            | Self::NoReference
+            | Self::Gray
+            | Self::Unexplained
+            | Self::SwappedInSome
+            | Self::NothingFelt => false,
         }
     }
 
@@ -85,6 +101,11 @@ impl Cause {
             Self::OtherTool(_) => "other-tool".into(),
             Self::Axes(..) => "tool-axes".into(),
             Self::NotItsModel(_) => "not-its-model".into(),
+            Self::OtherToolOfSome => "other-tool-of-some".into(),
+            Self::SwappedInSome => "swapped-in-some".into(),
+            Self::Finger(None) => "finger".into(),
+            Self::Finger(Some(read_as)) => format!("finger-{read_as}"),
+            Self::NothingFelt => "nothing-felt".into(),
             Self::SameImages => "same-images".into(),
             Self::NoReference => "no-reference".into(),
             Self::Gray => "gray".into(),
@@ -103,6 +124,8 @@ pub struct Doubt {
     pub what: String,
     /// Remedy, in words.
     pub hint: String,
+    /// The pairs that it is about, by their position among those looked at; empty where it is about all.
+    pub pairs: Vec<usize>,
 }
 
 impl Doubt {
@@ -114,12 +137,13 @@ impl Doubt {
         }
     }
 
+    fn new(cause: Cause, what: String, hint: &str) -> Self {
+        Self { cause, what, hint: hint.into(), pairs: Vec::new() }
+    }
+
     fn stored(read_as: ReadAs, figures: &str) -> Self {
-        Self {
-            cause: Cause::Stored(read_as),
-            what: format!("{}: {figures}", read_as.mistake()),
-            hint: format!("correct what writes the files, or read them so with --read-as {read_as}"),
-        }
+        let hint = format!("correct what writes the files, or read them so with --read-as {read_as}");
+        Self::new(Cause::Stored(read_as), format!("{}: {figures}", read_as.mistake()), &hint)
     }
 }
 
@@ -153,6 +177,21 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
 fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
     let models = poses::models(felt, tools);
     let registered = poses::Registered::of(felt, &models);
+    let of_all = of_all_imprints(felt, tools, &models, &registered);
+    let explained = |doubt: &Doubt| !matches!(doubt.cause, Cause::Unexplained | Cause::Poses(Mismatch::Unknown));
+    if registered.agree() || of_all.as_ref().is_some_and(explained) {
+        return of_all;
+    }
+    parts::of_fingers(felt, tools, &models).or(of_all).or_else(|| registered.mostly_wrong())
+}
+
+/// Doubt about the imprints of all pairs and both fingers together.
+fn of_all_imprints(
+    felt: &[Felt<'_>],
+    tools: &BTreeMap<String, TriMesh>,
+    models: &poses::Models<'_>,
+    registered: &poses::Registered<'_, '_>,
+) -> Option<Doubt> {
     let mismatch = registered.mismatch(felt);
     if let Some((mismatch, _)) = mismatch.filter(|(mismatch, _)| mismatch.is_rigid()) {
         // No mirror image and no factor of the imprints looks like this.
@@ -174,7 +213,7 @@ fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<D
         Cause::Stored(read_as) => {
             let read: Vec<Sample> = samples.iter().map(|sample| ReadAs::all(&[*read_as], sample)).collect();
             let read: Vec<Felt<'_>> = felt.iter().zip(&read).map(|(felt, sample)| Felt { sample, ..*felt }).collect();
-            registered.is_cured_by(&poses::Registered::of(&read, &models))
+            registered.is_cured_by(&poses::Registered::of(&read, models))
         }
         Cause::Axes(tools_of, axes) => {
             let turned = tools_of.iter().filter_map(|name| Some((name.clone(), axes.apply(tools.get(name)?))));

@@ -99,6 +99,8 @@ pub enum ReadAs {
     ImageBgr(Images),
     /// The images times 255.
     Image255(Images),
+    /// 255 minus the images.
+    ImageNegative,
     /// The touched and the untouched image in each other's place.
     ImageSwapReference,
     /// The touched image as the difference.
@@ -121,6 +123,7 @@ impl fmt::Display for ReadAs {
             Self::ImageLay(lay) => write!(f, "image-{}", <&str>::from(lay)),
             Self::ImageBgr(images) => write!(f, "image-bgr={}", <&str>::from(images)),
             Self::Image255(images) => write!(f, "image-255={}", <&str>::from(images)),
+            Self::ImageNegative => f.write_str("image-negative"),
             Self::ImageSwapReference => f.write_str("image-swap-reference"),
             Self::ImageIsDifference(stored) => write!(f, "image-is-difference={}", <&str>::from(stored)),
             Self::ImageUnwrap => f.write_str("image-unwrap"),
@@ -131,7 +134,7 @@ impl fmt::Display for ReadAs {
 /// The keys, for people.
 pub(crate) const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
                         includes the depth without contact), scale-camera=FACTOR, negate-theta, image-swap-fingers, \
-                        image-mirror-columns, image-mirror-rows, image-turn, image-swap-reference, image-unwrap, \
+                        image-mirror-columns, image-mirror-rows, image-turn, image-negative, image-swap-reference, image-unwrap, \
                         image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped)";
 
 impl FromStr for ReadAs {
@@ -143,7 +146,7 @@ impl FromStr for ReadAs {
         let (bare, depths) = key.strip_prefix("whole-").map_or((key, Depths::Imprints), |bare| (bare, Depths::Whole));
         let factor = || {
             let factor = value.and_then(|value| value.parse::<f64>().ok());
-            let factor = factor.filter(|f| (1.0 / MOST..=MOST).contains(f));
+            let factor = factor.filter(|f| (1.0 / MOST..=MOST).contains(f) || (*f == -1.0 && bare == "scale-depth"));
             factor.ok_or_else(|| format!("{:?} takes a factor from {} to {MOST}", clip(text), 1.0 / MOST))
         };
         let images = || value.map_or(Ok(Images::Both), |value| value.parse().map_err(|_| unknown()));
@@ -153,6 +156,7 @@ impl FromStr for ReadAs {
             ("scale-camera", _) if bare == key => Self::ScaleCamera(factor()?),
             ("negate-theta", None) if bare == key => Self::NegateTheta,
             ("image-swap-fingers", None) if bare == key => Self::ImageSwapFingers,
+            ("image-negative", None) if bare == key => Self::ImageNegative,
             ("image-swap-reference", None) if bare == key => Self::ImageSwapReference,
             ("image-unwrap", None) if bare == key => Self::ImageUnwrap,
             ("image-bgr", _) if bare == key => Self::ImageBgr(images()?),
@@ -220,6 +224,7 @@ impl ReadAs {
         match self {
             Self::SwapFingers(depths) => format!("{} of the fingers are swapped", imprints(depths)),
             Self::Lay(depths, lay) => format!("{} are {}", imprints(depths), lay.text()),
+            Self::Scale(depths, factor) if factor < 0.0 => format!("{} have the other sign", imprints(depths)),
             Self::Scale(depths, factor) => format!("{} are {} times too large", imprints(depths), 1.0 / factor),
             Self::ScaleCamera(factor) => format!("the camera matrices are {} times too large", 1.0 / factor),
             Self::NegateTheta => "theta has the other sign".into(),
@@ -227,6 +232,7 @@ impl ReadAs {
             Self::ImageLay(lay) => format!("the color images are {}", lay.text()),
             Self::ImageBgr(which) => format!("{} are in the order blue, green, red", images(which)),
             Self::Image255(which) => format!("{} are on the scale 0..1", images(which)),
+            Self::ImageNegative => "the color images are negatives".into(),
             Self::ImageSwapReference => "touched and untouched images are swapped".into(),
             Self::ImageIsDifference(stored) => {
                 let how = match stored {
@@ -291,6 +297,13 @@ impl ReadAs {
             }),
             Self::ImageBgr(which) => of_images(sample, which, |pixel| pixel.swap(0, 2)),
             Self::Image255(which) => of_images(sample, which, |pixel| pixel.iter_mut().for_each(|v| *v *= 255.0)),
+            Self::ImageNegative => each_color(sample, |touch| {
+                let negative = |pixel: &mut [f32; 3]| pixel.iter_mut().for_each(|v| *v = 255.0 - *v);
+                if let Some(ColorImages { raw, reference }) = &mut touch.images {
+                    raw.as_mut_slice().iter_mut().chain(reference.as_mut_slice()).for_each(negative);
+                }
+                touch.difference = touch.difference.map(|p| p.map(|v| -v));
+            }),
             Self::ImageSwapReference => each_color(sample, |touch| {
                 if let Some(ColorImages { raw, reference }) = &mut touch.images {
                     std::mem::swap(raw, reference);

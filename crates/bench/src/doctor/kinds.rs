@@ -6,7 +6,7 @@ use glam::{DMat3, DVec3};
 
 use touch2touch_core::doubt::Cause;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::RgbGrid;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::read_as::{Depths, Images, Lay, ReadAs, Stored};
 use touch2touch_core::sample::{ColorTouch, PadTouch, Sample};
@@ -52,7 +52,7 @@ fn stored(name: &str, undone_by: &[&str], mistake: ReadAs) -> Kind {
 
 /// All ways.
 pub(super) fn kinds() -> Vec<Kind> {
-    imprints().into_iter().chain(poses()).chain(models()).chain(images()).collect()
+    imprints().into_iter().chain(poses()).chain(models()).chain(images()).chain(parts()).collect()
 }
 
 fn imprints() -> Vec<Kind> {
@@ -71,11 +71,54 @@ fn imprints() -> Vec<Kind> {
             all.push(stored(&format!("{of} x {factor}"), &[&named[0], &named[1]], ReadAs::Scale(depths, factor)));
         }
     }
+    all.push(stored("imprints negated", &["scale-depth=-1"], ReadAs::Scale(Depths::Imprints, -1.0)));
     for (factor, undone) in [(0.5, "2"), (0.8, "1.25"), (1.25, "0.8"), (2.0, "0.5")] {
         let named = format!("scale-camera={undone}");
         all.push(stored(&format!("K x {factor}"), &[&named], ReadAs::ScaleCamera(factor)));
     }
     all
+}
+
+/// A way to store what the first finger felt wrongly.
+fn finger(name: &str, named: &str, change: impl Fn(&mut PadTouch) + Send + Sync + 'static) -> Kind {
+    kind(&format!("one finger: {name}"), &[named], move |set| {
+        set.pairs.iter_mut().filter_map(|(_, sample)| sample.pads.iter_mut().flatten().next()).for_each(&change);
+    })
+}
+
+/// What is wrong with the first finger alone, or with every second pair.
+fn parts() -> Vec<Kind> {
+    let imprint = |name: &str, named: &str, change: fn(&DepthMap) -> DepthMap| {
+        finger(name, named, move |touch| {
+            if let Some(depth) = touch.depth_mut() {
+                depth.imprint = change(&depth.imprint);
+            }
+        })
+    };
+    let every_second = |name: &str, named: &str, change: fn(&mut Sample)| {
+        kind(&format!("every second pair: {name}"), &[named], move |set| {
+            set.pairs.iter_mut().skip(1).step_by(2).for_each(|(_, sample)| change(sample));
+        })
+    };
+    vec![
+        imprint("imprints mirrored", "finger-mirror-columns", |map| Lay::MirrorColumns.turn().apply(map)),
+        imprint("imprints turned", "finger-turn", |map| Lay::Turn.turn().apply(map)),
+        imprint("imprints negated", "finger-scale-depth=-1", |map| map.map(|v| -v)),
+        imprint("imprints constant", "nothing-felt", |map| map.map(|_| 0.004)),
+        finger("touched GelSlims are untouched", "same-images", |touch| {
+            if let Some(images) = touch.color_mut().and_then(|color| color.images.as_mut()) {
+                images.raw = images.reference.clone();
+            }
+        }),
+        every_second("GelSlims of the fingers swapped", "swapped-in-some", |sample| {
+            ReadAs::ImageSwapFingers.apply(sample)
+        }),
+        kind("every second pair: named after another tool", &["other-tool-of-some", "other-tool"], |set| {
+            let names: Vec<String> = set.pairs.iter().map(|(name, _)| name.clone()).collect();
+            let others = names.iter().cycle().skip(1).step_by(2);
+            set.pairs.iter_mut().step_by(2).zip(others).for_each(|((name, _), other)| name.clone_from(other));
+        }),
+    ]
 }
 
 /// A way to store true poses wrongly, from `object_from_grasp`, which the lab stores, to itself.
@@ -214,6 +257,7 @@ fn images() -> Vec<Kind> {
         gelslims("mirrored top to bottom", ReadAs::ImageLay(Lay::MirrorRows)),
         gelslims("turned by 180 degrees", ReadAs::ImageLay(Lay::Turn)),
         gelslims("both BGR", ReadAs::ImageBgr(Images::Both)),
+        gelslims("negatives", ReadAs::ImageNegative),
         gelslims("touched ones BGR", ReadAs::ImageBgr(Images::Touch)),
         gelslims("untouched ones BGR", ReadAs::ImageBgr(Images::Reference)),
         gelslims("touched and untouched swapped", ReadAs::ImageSwapReference),

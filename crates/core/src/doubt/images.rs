@@ -47,7 +47,11 @@ pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
     }
     let faces: Vec<Face> = images.iter().map(|images| Face::of(images)).collect();
     let colored = felt.iter().any(|felt| is_gelslim(&felt.sample.rig));
-    plain(&faces, colored).or_else(|| stored(&images, &faces)).or_else(|| swapped(felt)).or_else(|| laid(felt, &faces))
+    plain(&faces, colored)
+        .or_else(|| of_one_finger(felt))
+        .or_else(|| stored(&images, &faces))
+        .or_else(|| swapped(felt))
+        .or_else(|| laid(felt, &faces))
 }
 
 /// Figures of one touch that tell at a glance.
@@ -113,7 +117,7 @@ fn is_gelslim(rig: &Rig) -> bool {
 
 /// Doubt about what shows at a glance. `colored`: the sensor's light has colors.
 fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
-    let broken = |cause, what: String, hint: &str| Some(Doubt { cause, what, hint: hint.into() });
+    let broken = |cause, what: String, hint: &str| Some(Doubt::new(cause, what, hint));
     if let Some(of) = most(faces, |face| face.same && !face.touch.single()) {
         let what = format!("touched and untouched image are the same, pixel by pixel: {of}");
         return broken(Cause::SameImages, what, "store the image that was taken before the touch as the untouched one");
@@ -136,6 +140,18 @@ fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
         return broken(Cause::Gray, what, "store the camera's colors: without them no model can read the gel's slopes");
     }
     None
+}
+
+/// A finger whose touched images show no touch, where those of the other one do.
+fn of_one_finger(felt: &[Felt<'_>]) -> Option<Doubt> {
+    let rig = &felt.first()?.sample.rig;
+    rig.pads().find_map(|pad| {
+        let images = felt.iter().filter_map(|felt| felt.sample.pad(pad)?.color()?.images.as_ref());
+        let faces: Vec<Face> = images.map(Face::of).collect();
+        let of = most(&faces, |face| face.same || face.touch.single())?;
+        let what = format!("the touched images of the {} show no touch: {of}", rig.pad_name(pad));
+        Some(Doubt::new(Cause::SameImages, what, "check that finger's camera and what stores its images"))
+    })
 }
 
 /// Differences and wrapped values stored as images, channels in another order, an untouched image that is none.
@@ -179,11 +195,8 @@ fn stored(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
         }
     }
     if let Some(of) = without {
-        return Some(Doubt {
-            cause: Cause::NoReference,
-            what: format!("the untouched image is a single color: {of}"),
-            hint: "store the image that was taken before the touch".into(),
-        });
+        let what = format!("the untouched image is a single color: {of}");
+        return Some(Doubt::new(Cause::NoReference, what, "store the image that was taken before the touch"));
     }
     wrapped_around(images, faces)
 }
@@ -283,6 +296,8 @@ fn laid(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
         (2, true) if red > 0.0 => ReadAs::ImageBgr(Images::Both),
         (2, true) => ReadAs::ImageLay(Lay::MirrorRows),
         (0, true) => ReadAs::ImageLay(Lay::MirrorColumns),
+        // So does a negative turn it, and a GelSlim's light is no longer blue.
+        (2, false) if red > 0.0 => ReadAs::ImageNegative,
         (2, false) => ReadAs::ImageLay(Lay::Turn),
         _ => return None,
     };

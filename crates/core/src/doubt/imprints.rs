@@ -27,6 +27,8 @@ const NOTHING: f64 = 0.15;
 /// which must be beyond doubt. A poor membrane alone has half of it.
 const NOT_ITS_MODEL: f64 = 0.3;
 const OTHERS_LIE_ON: f64 = 0.55;
+/// Fewest pairs that are said to be another tool's.
+const SOME: usize = 2;
 /// Angles differ from here on, radians.
 const ANGLES_DIFFER_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -38,6 +40,7 @@ fn readings() -> Vec<ReadAs> {
         all.extend([Lay::MirrorColumns, Lay::MirrorRows, Lay::Turn].map(|lay| ReadAs::Lay(depths, lay)));
         all.extend([0.1, 0.5, 2.0, 10.0].map(|factor| ReadAs::Scale(depths, factor)));
     }
+    all.push(ReadAs::Scale(Depths::Imprints, -1.0));
     all.extend([0.5, 0.8, 1.25, 2.0].map(ReadAs::ScaleCamera));
     all
 }
@@ -83,6 +86,8 @@ impl fmt::Display for Axes {
 
 /// Pairs with a CAD model, their imprints without grain.
 struct Pairs<'a> {
+    /// Their positions among those looked at.
+    at: Vec<usize>,
     samples: Vec<Sample>,
     tools: Vec<&'a str>,
     fields: BTreeMap<&'a str, DistanceField>,
@@ -94,16 +99,17 @@ impl<'a> Pairs<'a> {
             .iter()
             .filter_map(|(name, mesh)| Some((name.as_str(), DistanceField::from_mesh(mesh).ok()?)))
             .collect();
-        let (mut taken, mut tools) = (Vec::new(), Vec::new());
-        for (sample, tool) in samples.iter().zip(named) {
+        let (mut at, mut taken, mut tools) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, (sample, tool)) in samples.iter().zip(named).enumerate() {
             let Some(tool) = tool.filter(|tool| fields.contains_key(tool)) else { continue };
             if !sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()) {
                 continue;
             }
+            at.push(index);
             taken.push(grainless(sample));
             tools.push(tool);
         }
-        Self { samples: taken, tools, fields }
+        Self { at, samples: taken, tools, fields }
     }
 
     /// The likeness of a sample, at its true pose where that is known.
@@ -154,14 +160,17 @@ pub(super) fn judge(
     if let Some(doubt) = one_model(&pairs, &models, &stored) {
         return Some((doubt, 0.0));
     }
-    let unexplained = || Doubt {
-        cause: Cause::Unexplained,
-        what: format!(
+    if let Some(doubt) = try_models.then(|| other_models_of_some(&pairs, &stored)).flatten() {
+        return Some((doubt, 0.0));
+    }
+    let unexplained = || {
+        let what = format!(
             "the imprints do not lie on their CAD models at the true poses (likeness {mean:.2} in {}, where sound data have 0.6), \
              and nothing that was tried explains it",
             counted(stored.len(), "pair")
-        ),
-        hint: "check that poses, CAD models and imprints are of the same grasps, and their frames".into(),
+        );
+        let hint = "check that poses, CAD models and imprints are of the same grasps, and their frames";
+        Doubt::new(Cause::Unexplained, what, hint)
     };
     (mean < NOTHING).then(|| (unexplained(), 0.0))
 }
@@ -176,16 +185,13 @@ fn one_model(pairs: &Pairs<'_>, doubted: &[(&str, f64)], stored: &[f64]) -> Opti
     }
     let said: Vec<String> = bad.iter().map(|(tool, score)| format!("{tool} {score:.2}")).collect();
     let names: Vec<String> = bad.iter().map(|(tool, _)| (*tool).to_owned()).collect();
-    Some(Doubt {
-        what: format!(
-            "the imprints of {} do not lie on their CAD models, where those of the others do (likeness {}): none of the other \
-             models fits either",
-            counted(bad.len(), "tool"),
-            said.join(", ")
-        ),
-        hint: "check that the CAD models are those tools', in the object frame".into(),
-        cause: Cause::NotItsModel(names),
-    })
+    let what = format!(
+        "the imprints of {} do not lie on their CAD models, where those of the others do (likeness {}): none of the other models \
+         fits either",
+        counted(bad.len(), "tool"),
+        said.join(", ")
+    );
+    Some(Doubt::new(Cause::NotItsModel(names), what, "check that the CAD models are those tools', in the object frame"))
 }
 
 /// The reading that explains the pairs best, if one does.
@@ -264,8 +270,8 @@ fn of_models(
             counted(names.len(), "tool"),
             names.join(", ")
         );
-        let hint = "export them in the object frame: x along the gripper's closing axis, z away from the wrist".into();
-        return Some((Doubt { cause: Cause::Axes(names, axes), what, hint }, by_axes));
+        let hint = "export them in the object frame: x along the gripper's closing axis, z away from the wrist";
+        return Some((Doubt::new(Cause::Axes(names, axes), what, hint), by_axes));
     }
     let list: Vec<(String, String)> =
         others.iter().map(|(tool, other, _)| ((*tool).to_owned(), (*other).to_owned())).collect();
@@ -276,8 +282,8 @@ fn of_models(
         counted(list.len(), "tool"),
         said.join(", ")
     );
-    let hint = "put the right files into tools_stls, or correct the names of the pairs".into();
-    Some((Doubt { cause: Cause::OtherTool(list), what, hint }, by_others))
+    let hint = "put the right files into tools_stls, or correct the names of the pairs";
+    Some((Doubt::new(Cause::OtherTool(list), what, hint), by_others))
 }
 
 /// For each tool in doubt the other one whose model its pairs lie on, with the gain.
@@ -292,6 +298,40 @@ fn other_models<'a>(pairs: &Pairs<'a>, doubted: &[(&'a str, f64)]) -> Vec<(&'a s
         }
     }
     better
+}
+
+/// Pairs that lie on the CAD models of other tools than their own, where the others of their tool do not.
+fn other_models_of_some(pairs: &Pairs<'_>, stored: &[f64]) -> Option<Doubt> {
+    let mut found: Vec<(usize, String)> = Vec::new();
+    for ((sample, tool), (at, as_is)) in pairs.samples.iter().zip(&pairs.tools).zip(pairs.at.iter().zip(stored)) {
+        if *as_is >= GOOD {
+            continue;
+        }
+        let others = pairs.fields.iter().filter(|(other, _)| *other != tool);
+        let scores = others.map(|(other, field)| (*other, Pairs::score(sample, field)));
+        let best = scores.max_by(|(_, a), (_, b)| a.total_cmp(b));
+        if let Some((other, _)) = best.filter(|(_, score)| *score >= LIES_ON && score - as_is >= CLEARLY_OF_TOOL) {
+            found.push((*at, format!("{tool} was felt as {other}")));
+        }
+    }
+    if found.len() < SOME {
+        return None;
+    }
+    let (at, mut said): (Vec<usize>, Vec<String>) = found.into_iter().unzip();
+    said.sort_unstable();
+    said.dedup();
+    let what = format!(
+        "{} of {} lie on the CAD models of other tools than their own ({})",
+        at.len(),
+        counted(pairs.samples.len(), "pair"),
+        said.join(", ")
+    );
+    let doubt = Doubt::new(
+        Cause::OtherToolOfSome,
+        what,
+        "correct the names of these pairs, and look at the others of the tool",
+    );
+    Some(Doubt { pairs: at, ..doubt })
 }
 
 /// The axes with which most of the tools in doubt are explained, and those with their gains.

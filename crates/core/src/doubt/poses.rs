@@ -139,9 +139,10 @@ pub(super) fn models<'a>(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -
 pub(super) struct Registered<'m, 'a> {
     sure: Vec<Sure>,
     models: &'m Models<'a>,
-    /// Pairs with a CAD model and cameras, and those of them with a truth.
+    /// Pairs with a CAD model and cameras, those of them with a truth, and those whose registration is wrong by its verdict.
     tried: usize,
     asked: usize,
+    wrong: usize,
 }
 
 impl<'m, 'a> Registered<'m, 'a> {
@@ -153,11 +154,24 @@ impl<'m, 'a> Registered<'m, 'a> {
             .filter(|(_, sample, _)| sample.pads.iter().flatten().any(|t| t.depth().is_some() && t.camera().is_some()))
             .collect();
         let asked = tried.iter().filter(|(_, sample, _)| sample.grasp_from_object.is_some()).count();
-        let sure = tried.par_iter().filter_map(|&(at, sample, model)| {
-            Some(Sure { at, truth: sample.grasp_from_object, found: good_pose(sample, model)? })
+        let found: Vec<Option<(Grade, PlanarPose)>> =
+            tried.par_iter().map(|(_, sample, model)| graded_pose(sample, model)).collect();
+        let wrong = found.iter().flatten().filter(|(grade, _)| *grade == Grade::Wrong).count();
+        let sure = tried.iter().zip(&found).filter_map(|((at, sample, _), found)| {
+            let (_, found) = found.filter(|(grade, _)| *grade == Grade::Good)?;
+            Some(Sure { at: *at, truth: sample.grasp_from_object, found })
         });
-        let sure = sure.collect();
-        Self { sure, models, tried: tried.len(), asked }
+        Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong }
+    }
+
+    /// Pairs with a CAD model and cameras.
+    pub(super) fn tried(&self) -> usize {
+        self.tried
+    }
+
+    /// Good registrations that are near the truth, where it is known.
+    pub(super) fn right(&self) -> usize {
+        self.sure.iter().filter(|sure| sure.truth.is_none_or(|truth| is_near(sure.found, truth))).count()
     }
 
     /// The good registrations with a truth: found and true pose.
@@ -185,16 +199,14 @@ impl<'m, 'a> Registered<'m, 'a> {
 
     /// Nothing that was tried mends what is wrong, as far as something is.
     pub(super) fn unexplained(&self) -> Option<Doubt> {
-        ((self.sure.len() as f64) < SURE * self.tried as f64).then(|| Doubt {
-            cause: Cause::Unexplained,
-            what: format!(
-                "the imprints do not lie well on their CAD models: {} of {} registered poses are good, and nothing that was tried \
-                 mends it",
-                self.sure.len(),
-                self.tried
-            ),
-            hint: "check the cameras, the depths without contact, and the frames of CAD models and poses".into(),
-        })
+        ((self.sure.len() as f64) < SURE * self.tried as f64)
+            .then(|| no_cure(&format!("{} of {} registered poses are good", self.sure.len(), self.tried)))
+    }
+
+    /// Most registrations are wrong by their own verdict, and nothing else shows.
+    pub(super) fn mostly_wrong(&self) -> Option<Doubt> {
+        (self.wrong >= FEWEST && self.wrong as f64 >= SURE * self.tried as f64)
+            .then(|| no_cure(&format!("{} of {} registered poses are wrong", self.wrong, self.tried)))
     }
 
     /// The mismatch of truth and registrations where they contradict each other, with the mean likeness where it is mended.
@@ -286,8 +298,19 @@ impl<'m, 'a> Registered<'m, 'a> {
             fixed(1e3 * place.unwrap_or(f64::NAN), 1),
             mismatch.text()
         );
-        Doubt { cause: Cause::Poses(mismatch), what, hint: mismatch.hint().into() }
+        Doubt::new(Cause::Poses(mismatch), what, mismatch.hint())
     }
+}
+
+/// Imprints and CAD models do not go together, and it is not known why.
+fn no_cure(figures: &str) -> Doubt {
+    let what =
+        format!("the imprints do not lie well on their CAD models: {figures}, and nothing that was tried mends it");
+    Doubt::new(
+        Cause::Unexplained,
+        what,
+        "check the cameras, the depths without contact, and the frames of CAD models and poses",
+    )
 }
 
 /// Distance of two poses; from 1 on they contradict each other.
@@ -309,8 +332,8 @@ fn typical(motions: impl Iterator<Item = PlanarPose> + Clone) -> Option<PlanarPo
     })
 }
 
-/// The registered pose, from membranes and contact by depth alone, where the verdict on it is good.
-fn good_pose(sample: &Sample, tool: &ToolModel) -> Option<PlanarPose> {
+/// The registered pose, from membranes and contact by depth alone, and the verdict on it.
+fn graded_pose(sample: &Sample, tool: &ToolModel) -> Option<(Grade, PlanarPose)> {
     let points = contact_points(sample)?;
     let felt = sample.pads.iter().flatten().filter_map(|touch| touch.depth().zip(touch.camera()));
     let felt = felt.filter(|(depth, _)| rest_and_top(&depth.imprint).is_some());
@@ -319,6 +342,5 @@ fn good_pose(sample: &Sample, tool: &ToolModel) -> Option<PlanarPose> {
     let contacts = Contacts { points: &points, images: &images };
     let ask = Ask { evidence: true, ..Ask::default() };
     let report = register_with(&*Registration::Joint.method(), contacts, tool, ask).ok()?;
-    let verdict = Verdict::of(&report)?;
-    (verdict.grade == Grade::Good).then_some(report.grasp_from_object)
+    Some((Verdict::of(&report)?.grade, report.grasp_from_object))
 }

@@ -1,7 +1,7 @@
 //! Predictions against measurements: which finger an image is of, and how it lies.
 
 use super::fit::{correlation, relief};
-use super::{Doubt, Gain, Predict};
+use super::{Cause, Doubt, Gain, Predict};
 use crate::grid::DepthMap;
 use crate::read_as::{Images, Lay, ReadAs};
 use crate::rig::{PadId, PerPad, Rig};
@@ -16,12 +16,18 @@ pub type Placed = PerPad<PerPad<DepthMap>>;
 const ALIKE: f64 = 0.3;
 /// By how much more a reading must have it.
 const CLEARLY: f64 = 0.12;
+/// Likeness of a single pair's prediction to the other finger's imprint, and by how much that must be more, for the pair to be
+/// called swapped; and the fewest such pairs.
+const SURELY_ALIKE: f64 = 0.5;
+const SURELY: f64 = 0.3;
+const SOME: usize = 2;
 /// From this likeness on nothing is tried.
 const GOOD: f64 = 0.6;
 
 /// Doubt about the images, seen by their predictions. `sound`: nothing was found in the images themselves.
 pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Option<Doubt> {
-    let both: Vec<&Sample> = samples.iter().filter(|sample| fingers(sample).len() == 2).collect();
+    let (at, both): (Vec<usize>, Vec<&Sample>) =
+        samples.iter().enumerate().filter(|(_, sample)| fingers(sample).len() == 2).unzip();
     if both.is_empty() {
         return None;
     }
@@ -45,7 +51,9 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
             consider(read_as, &scores(&both, &predicted, false));
         }
     }
-    let (read_as, gain) = best?;
+    let Some((read_as, gain)) = best else {
+        return swapped_in_some(&stored, &scores(&both, &predicted, true), &at);
+    };
     let figures = format!(
         "predictions look like the measured imprints with a likeness of {:.2} instead of {mean:.2}, better on {} of {}",
         gain.read,
@@ -53,6 +61,26 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
         counted(stored.len(), "pair")
     );
     Some(Doubt::stored(read_as, &figures))
+}
+
+/// Pairs whose predictions look like the imprints of the other finger alone.
+fn swapped_in_some(stored: &[f64], swapped: &[f64], at: &[usize]) -> Option<Doubt> {
+    let is_swapped = |i: &usize| swapped[*i] >= SURELY_ALIKE && swapped[*i] - stored[*i] >= SURELY;
+    let some: Vec<usize> = (0..stored.len()).filter(is_swapped).collect();
+    if some.len() < SOME {
+        return None;
+    }
+    let mean = |scores: &[f64]| some.iter().map(|i| scores[*i]).sum::<f64>() / some.len() as f64;
+    let what = format!(
+        "the color images of the fingers are swapped in {} of {}: their predictions look like the other finger's imprint with a \
+         likeness of {:.2}, like the own one's with {:.2}",
+        some.len(),
+        counted(stored.len(), "pair"),
+        mean(swapped),
+        mean(stored)
+    );
+    let doubt = Doubt::new(Cause::SwappedInSome, what, "correct these pairs, and look at those beside them");
+    Some(Doubt { pairs: some.iter().map(|i| at[*i]).collect(), ..doubt })
 }
 
 /// The pads with both sensors.

@@ -61,6 +61,7 @@ fn what_was_stored_wrongly_is_named() {
         (ReadAs::Scale(Depths::Imprints, 2.0), "scale-depth=0.5"),
         (ReadAs::ScaleCamera(1.25), "scale-camera=0.8"),
         (ReadAs::ImageBgr(Images::Reference), "image-bgr=reference"),
+        (ReadAs::ImageNegative, "image-negative"),
         (ReadAs::ImageSwapReference, "image-swap-reference"),
         (ReadAs::ImageLay(Lay::MirrorColumns), "image-mirror-columns"),
     ] {
@@ -89,22 +90,24 @@ fn predictions_tell_the_fingers_of_the_images() {
     // In place of a generator: the imprints of the fingers whose images they are.
     let sound = set(Condition::Plain, 3, &SimConfig::default());
     let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample, beside: None }).collect();
-    let predictor = |swapped: bool| {
+    let predictor = |is_swapped: fn(usize) -> bool| {
         move |samples: &[&Sample]| {
             let imprint =
                 |sample: &Sample, pad| -> Option<DepthMap> { Some(sample.pad(pad)?.depth()?.imprint.clone()) };
-            let of = |sample: &&Sample| -> Placed {
+            let of = |(at, sample): (usize, &&Sample)| -> Placed {
                 let pads = sample.rig.pad_list();
-                let from = |index: usize| if swapped { pads[pads.len() - 1 - index] } else { pads[index] };
+                let from = |index: usize| if is_swapped(at) { pads[pads.len() - 1 - index] } else { pads[index] };
                 (0..pads.len()).map(|index| Some(pads.iter().map(|_| imprint(sample, from(index))).collect())).collect()
             };
-            Some(samples.iter().map(of).collect())
+            Some(samples.iter().enumerate().map(of).collect())
         }
     };
-    assert!(judge(&felt, &BTreeMap::new(), Some(&mut predictor(false))).is_empty());
-    let swapped = judge(&felt, &BTreeMap::new(), Some(&mut predictor(true)));
+    assert!(judge(&felt, &BTreeMap::new(), Some(&mut predictor(|_| false))).is_empty());
+    let swapped = judge(&felt, &BTreeMap::new(), Some(&mut predictor(|_| true)));
     assert_eq!(swapped.iter().map(Doubt::read_as).collect::<Vec<_>>(), [Some(ReadAs::ImageSwapFingers)]);
     assert!(swapped[0].what.contains("3 of 3 pairs"), "{}", swapped[0].what);
+    let some = judge(&felt, &BTreeMap::new(), Some(&mut predictor(|at| at > 0)));
+    assert_eq!((some.len(), &some[0].cause, &some[0].pairs[..]), (1, &Cause::SwappedInSome, &[1, 2][..]));
 }
 
 #[test]
@@ -152,4 +155,60 @@ fn true_poses_that_contradict_the_imprints_are_named_with_their_mistake() {
             assert!(doubts[0].what.contains("° too large, or all CAD models are turned"), "{}", doubts[0].what);
         }
     }
+}
+
+/// A set with its first finger changed.
+fn with_first_finger(set: &Set, change: impl Fn(&mut PadTouch)) -> Set {
+    let pairs = set.pairs.iter().map(|(tool, sample)| {
+        let mut sample = sample.clone();
+        change(sample.pads.iter_mut().flatten().next().unwrap());
+        (tool.clone(), sample)
+    });
+    Set { pairs: pairs.collect(), tools: set.tools.clone() }
+}
+
+#[test]
+fn one_finger_that_is_wrong_is_named() {
+    let sound = set(Condition::Plain, 6, &SimConfig::default());
+    let imprint = |change: &dyn Fn(&DepthMap) -> DepthMap| {
+        with_first_finger(&sound, |touch| {
+            let depth = touch.depth_mut().unwrap();
+            depth.imprint = change(&depth.imprint);
+        })
+    };
+    let mapped =
+        |of: &dyn Fn(f32) -> f32| imprint(&|map| DepthMap::from_fn(map.width(), map.height(), |x, y| of(map[(x, y)])));
+    for (wrong, named) in [
+        (imprint(&|map| Lay::MirrorColumns.turn().apply(map)), "finger-mirror-columns"),
+        (imprint(&|map| Lay::Turn.turn().apply(map)), "finger-turn"),
+        (mapped(&|v| -v), "finger-scale-depth=-1"),
+        (mapped(&|_| 0.0), "nothing-felt"),
+    ] {
+        assert_eq!(wrong.judged(), [named]);
+    }
+    let untouched = with_first_finger(&sound, |touch| {
+        let color = touch.color_mut().unwrap();
+        let images = color.images.as_mut().unwrap();
+        images.raw = images.reference.clone();
+    });
+    assert_eq!(untouched.judged(), ["same-images"]);
+}
+
+#[test]
+fn pairs_under_another_tools_name_are_named() {
+    let mut set = Set { pairs: Vec::new(), tools: BTreeMap::new() };
+    for index in 0..6 {
+        let spec = &tools()[[2, 6][index as usize % 2]];
+        let sample = Condition::Plain.simulate(spec, random_grasp(0x00d0_0b90 + index), index, &SimConfig::default());
+        set.tools.insert(spec.name.clone(), spec.mesh());
+        set.pairs.push((spec.name.clone(), sample));
+    }
+    assert!(set.judged().is_empty());
+    let names = [set.pairs[1].0.clone(), set.pairs[2].0.clone()];
+    (set.pairs[2].0, set.pairs[1].0) = (names[0].clone(), names[1].clone());
+    let felt: Vec<Felt<'_>> =
+        set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None }).collect();
+    let doubts = judge(&felt, &set.tools, None);
+    assert_eq!(doubts.iter().map(|doubt| doubt.cause.key()).collect::<Vec<_>>(), ["other-tool-of-some"]);
+    assert_eq!(doubts[0].pairs, [1, 2], "{doubts:?}");
 }

@@ -111,6 +111,7 @@ impl FewInvalid {
 struct Turned {
     pairs: usize,
     mirrored: usize,
+    upside_down: usize,
     first: Option<(Turn, PathBuf)>,
 }
 
@@ -119,6 +120,7 @@ impl Turned {
         if laid != Turn::default() {
             self.pairs += 1;
             self.mirrored += usize::from(laid.mirrored);
+            self.upside_down += usize::from(laid.quarters % 4 == 2 && !laid.mirrored);
             self.first.get_or_insert_with(|| (laid, dataset.pair_files(id).first().cloned().unwrap_or_default()));
         }
     }
@@ -137,6 +139,16 @@ impl Turned {
                     "OpenCV has pixels as blue, green, red: write them as red, green, blue; pictures that are mirrored \
                        are read upright as they are"
                         .into(),
+            });
+        }
+        if self.upside_down == examined && examined > 1 {
+            return Some(Problem {
+                file,
+                what: format!(
+                    "all {examined} pairs lie upside down, or their GelSlim pictures are negatives; the light's colors tell"
+                ),
+                hint: "write negatives as 255 minus the picture; pictures that are turned are read upright as they are"
+                    .into(),
             });
         }
         Some(Problem {

@@ -56,10 +56,16 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
     let tools = dataset.index.tools();
     let mesh = |tool: &String| Some((tool.clone(), tool_file(dataset, tool).ok()?.mesh));
     let meshes: BTreeMap<String, TriMesh> = tools.par_iter().take(MOST_TOOLS).filter_map(mesh).collect();
-    match generator {
+    let mut doubts = match generator {
         Some(generator) => judge(&felt, &meshes, Some(&mut |samples| placed(samples, generator, cx))),
         None => judge(&felt, &meshes, None),
+    };
+    let name = |at: &usize| Some(dataset.index.get(loaded.get(*at)?.0)?.name.as_str());
+    for doubt in doubts.iter_mut().filter(|doubt| !doubt.pairs.is_empty()) {
+        let names: Vec<&str> = doubt.pairs.iter().filter_map(name).collect();
+        doubt.what = format!("{}; they are {}", doubt.what, names.join(", "));
     }
+    doubts
 }
 
 /// Reading of the data set that removes the doubts if they are true, as `--read-as` takes it; `None` where no reading

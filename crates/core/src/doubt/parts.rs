@@ -1,0 +1,85 @@
+//! One finger that is wrong where the other one is right: no reading of both mends it.
+
+use std::collections::BTreeMap;
+
+use super::poses::{Models, Registered};
+use super::{Cause, Doubt, Felt, imprints};
+use crate::contact::{FLAT_M, rise};
+use crate::mesh::TriMesh;
+use crate::rig::PadId;
+use crate::sample::Sample;
+use crate::units::counted;
+
+/// Fewest pairs that tell the fingers apart.
+const FEWEST: usize = 3;
+/// Share of the pairs in which the sound finger is right, and in which the other one may be.
+const RIGHT: f64 = 0.5;
+const STILL_RIGHT: f64 = 0.2;
+
+/// A finger of some pairs, alone.
+struct Alone {
+    pad: PadId,
+    samples: Vec<Sample>,
+    /// Pairs that can be registered by it, and those whose pose is good and near the truth.
+    tried: usize,
+    right: usize,
+}
+
+impl Alone {
+    fn of(felt: &[Felt<'_>], models: &Models<'_>, pad: PadId) -> Self {
+        let samples: Vec<Sample> = felt.iter().map(|felt| alone(felt.sample, pad)).collect();
+        let each = felt.iter().zip(&samples).map(|(felt, sample)| Felt { sample, ..*felt });
+        let registered = Registered::of(&each.collect::<Vec<_>>(), models);
+        let (tried, right) = (registered.tried(), registered.right());
+        Self { pad, samples, tried, right }
+    }
+
+    /// Pairs in which it felt something.
+    fn touched(&self) -> usize {
+        let imprints = self.samples.iter().filter_map(|sample| Some(&sample.pad(self.pad)?.depth()?.imprint));
+        imprints.filter(|imprint| rise(imprint) >= FLAT_M).count()
+    }
+
+    fn is_at_least(&self, share: f64) -> bool {
+        self.tried >= FEWEST && self.right as f64 >= share * self.tried as f64
+    }
+}
+
+/// Doubt about the imprints of one finger, where the other one's lie on the CAD models at the true poses.
+pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, models: &Models<'_>) -> Option<Doubt> {
+    let rig = &felt.first()?.sample.rig;
+    let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
+    let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
+    let wrong = fingers.iter().find(|finger| finger.tried >= FEWEST && !finger.is_at_least(STILL_RIGHT))?;
+    let [name, other] = [wrong, sound].map(|finger| rig.pad_name(finger.pad));
+    let touched = wrong.touched();
+    if (touched as f64) < STILL_RIGHT * wrong.tried as f64 {
+        let what = format!(
+            "the {name} felt something in {touched} of {}, the {other} in {}",
+            counted(wrong.tried, "pair"),
+            sound.touched()
+        );
+        return Some(Doubt::new(Cause::NothingFelt, what, "check that finger's camera and its depth without contact"));
+    }
+    let figures = format!(
+        "registered by the {name} alone, {} of {} poses are good and near the truth, by the {other} alone {} of {}",
+        wrong.right, wrong.tried, sound.right, sound.tried
+    );
+    let named: Vec<Option<&str>> = felt.iter().map(|felt| felt.tool).collect();
+    let samples: Vec<&Sample> = wrong.samples.iter().collect();
+    let read_as = imprints::judge(&samples, &named, tools, false).and_then(|(doubt, _)| doubt.read_as());
+    let how = read_as.map_or("its imprints do not lie on the CAD models".into(), super::ReadAs::mistake);
+    let what = format!("of the {name} alone {how}: {figures}");
+    Some(Doubt::new(Cause::Finger(read_as), what, "correct what writes that finger's files"))
+}
+
+/// The sample with one finger alone.
+fn alone(sample: &Sample, pad: PadId) -> Sample {
+    let mut sample = sample.clone();
+    for (other, touch) in sample.rig.clone().pads().zip(sample.pads.iter_mut()) {
+        if other != pad {
+            *touch = None;
+        }
+    }
+    sample
+}
