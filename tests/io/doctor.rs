@@ -98,23 +98,44 @@ fn good_data_has_no_problem_and_every_spoilt_one_is_found() {
 }
 
 #[test]
-fn exchanged_colors_of_pictures_are_named() {
+fn exchanged_colors_and_negatives_of_pictures_are_named() {
     // Pairs as a program saves them that stretches the difference around gray.
-    let said = |exchanged: bool| {
+    let said = |saved: fn([f32; 3]) -> [f32; 3]| {
         let dir = tempfile::tempdir().unwrap();
         for (number, tool) in catalog::tools().iter().take(3).enumerate() {
             let touch = sim::simulate(tool, sim::random_grasp(number as u64), number as u64, &SimConfig::default());
             let touch = touch.pad(lab::RIGHT).unwrap();
             let difference = resample::bilinear_rgb(&touch.color().unwrap().difference, 128, 128);
-            let tile = difference.map(|[r, g, b]| if exchanged { [*b, *g, *r] } else { [*r, *g, *b] });
-            let tile = tile.map(|pixel| pixel.map(|v| 120.0 + v));
+            let tile = difference.map(|pixel| saved(pixel.map(|v| 120.0 + v)));
             images::write_rgb8(&dir.path().join(format!("{number}_gelslim.png")), &tile).unwrap();
         }
         doctor(dir.path()).problems.iter().map(|p| p.what.clone()).collect::<Vec<_>>()
     };
-    let names = |said: &[String]| said.iter().any(|what| what.contains("red and blue are exchanged in all 3 pairs"));
-    assert!(names(&said(true)), "{:?}", said(true));
-    assert!(!names(&said(false)), "{:?}", said(false));
+    for (saved, named) in [
+        ((|[r, g, b]| [b, g, r]) as fn([f32; 3]) -> [f32; 3], Some("red and blue are exchanged in all 3 pairs")),
+        (
+            |pixel| pixel.map(|v| 255.0 - v),
+            Some("all 3 pairs lie upside down, or their GelSlim pictures are negatives"),
+        ),
+        (|pixel| pixel, None),
+    ] {
+        let said = said(saved);
+        assert_eq!(said.iter().any(|what| what.contains("light's colors")), named.is_some(), "{said:?}");
+        assert!(named.is_none_or(|named| said.iter().any(|what| what.contains(named))), "{said:?}");
+    }
+}
+
+#[test]
+fn test_pairs_that_are_in_the_training_set_are_named() {
+    let dir = tempfile::tempdir().unwrap();
+    write_tools(dir.path(), &[("rod", true, tetrahedron(0.05))]).unwrap();
+    for (layout, number, angle) in
+        [(Layout::Train, 0, 0.0), (Layout::Train, 1, 0.1), (Layout::Test, 0, 0.1), (Layout::Test, 1, 0.2)]
+    {
+        write_pair(dir.path(), layout, "rod", number, &touch(angle)).unwrap();
+    }
+    let said: Vec<String> = doctor(dir.path()).problems.into_iter().map(|p| p.what).collect();
+    assert!(said.iter().any(|what| what.starts_with("1 of 2 test pairs are also in the training set")), "{said:?}");
 }
 
 #[test]

@@ -1,12 +1,14 @@
 //! The doctor: loads every pair of a data set and lists what is wrong with it, in words that say what to do.
 
+use std::collections::HashMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use rayon::prelude::*;
 
 use super::dataset::{Dataset, Loaded, OpenError};
-use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::dataset::{PairId, Problem, Split};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::turn::Turn;
 
@@ -53,6 +55,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
     }
     let mut few = FewInvalid::default();
     let mut turned = Turned::default();
+    let mut repeated = Repeated::default();
     let mut examined = 0;
     let mut go_on = progress(0, total).is_continue();
     while go_on && examined < total {
@@ -61,6 +64,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
         for (id, look) in batch.iter().zip(found) {
             findings.extend(look.problems);
             turned.add(dataset, *id, look.laid);
+            repeated.add(dataset, *id, look.print);
             if look.few_invalid > 0 {
                 few.add(dataset, *id, look.few_invalid, look.pixels);
             }
@@ -71,6 +75,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
     if examined > 0 {
         findings.extend(few.problem(examined));
         findings.extend(turned.problem(examined));
+        findings.extend(repeated.problem(dataset));
     }
     DoctorReport { pairs: total, examined, problems: findings.into_list() }
 }
@@ -102,6 +107,42 @@ impl FewInvalid {
                 100.0 * share
             ),
             hint: "normal for a depth camera; these pixels are left out everywhere".into(),
+        })
+    }
+}
+
+/// Pairs of the training and of the test set by what their sensors felt.
+#[derive(Default)]
+struct Repeated {
+    train: HashMap<u64, PairId>,
+    test: Vec<(u64, PairId)>,
+}
+
+impl Repeated {
+    fn add(&mut self, dataset: &Dataset, id: PairId, print: u64) {
+        match dataset.index.get(id).map(|entry| entry.split) {
+            Some(Split::Train) => drop(self.train.insert(print, id)),
+            Some(Split::Test) => self.test.push((print, id)),
+            // Pairs of the training set are in `test/train_only` for their statistics.
+            Some(Split::TrainOnly | Split::None) | None => {}
+        }
+    }
+
+    fn problem(self, dataset: &Dataset) -> Option<Problem> {
+        let both: Vec<(PairId, PairId)> =
+            self.test.iter().filter_map(|(print, id)| Some((*id, *self.train.get(print)?))).collect();
+        let (test, train) = both.first()?;
+        Some(Problem {
+            file: dataset.pair_files(*test).first().cloned().unwrap_or_default(),
+            what: format!(
+                "{} of {} test pairs are also in the training set, this one as {}",
+                both.len(),
+                self.test.len(),
+                dataset.index.get(*train).map_or("?", |entry| &entry.name)
+            ),
+            hint:
+                "take them out of one of the two: what a model trained on them has there says nothing about new grasps"
+                    .into(),
         })
     }
 }
@@ -171,6 +212,8 @@ struct Look {
     pixels: usize,
     /// Turn in which its pictures lay.
     laid: Turn,
+    /// The same for equal readings, and practically never for others.
+    print: u64,
 }
 
 fn look_at(dataset: &Dataset, id: PairId) -> Look {
@@ -179,13 +222,18 @@ fn look_at(dataset: &Dataset, id: PairId) -> Look {
         Err(err) => return Look { problems: vec![err.to_problem()], ..Look::default() },
     };
     let (mut few_invalid, mut pixels) = (0, 0);
+    let mut print = DefaultHasher::new();
     for (pad, touch) in sample.pads.entries() {
+        if let Some(color) = touch.color() {
+            color.difference.as_slice().iter().flatten().for_each(|v| v.to_bits().hash(&mut print));
+        }
         let Some(bubble) = touch.depth() else { continue };
+        bubble.imprint.as_slice().iter().for_each(|v| v.to_bits().hash(&mut print));
         let invalid = invalid[pad].unwrap_or_default();
         pixels += bubble.imprint.len();
         if !invalid.are_many(bubble.imprint.len()) {
             few_invalid += invalid.total();
         }
     }
-    Look { problems: sample.notes, few_invalid, pixels, laid: sample.laid }
+    Look { problems: sample.notes, few_invalid, pixels, laid: sample.laid, print: print.finish() }
 }
