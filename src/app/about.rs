@@ -20,6 +20,7 @@ use touch2touch_work::about::{self, Cure, Examined, SAMPLE, Worth, WorthSetup};
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
+use touch2touch_work::io::doctor::MOST_PAIRS;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::predict::Generating;
 use touch2touch_work::recipe::Recipe;
@@ -183,7 +184,7 @@ impl Errand for Examine {
         let dataset = self.source.on_disk(Self::KIND.name())?;
         let generating = self.recipe.generating().ok();
         let generator = generating.map(|generating: Generating<'_>| (access.services.models(), generating));
-        about::examined(dataset, doubts::PAIRS, generator, cx).map(Arc::new)
+        about::examined(dataset, MOST_PAIRS, doubts::PAIRS, generator, cx).map(Arc::new)
     }
 
     fn ended(examined: &Self::End, state: &mut State, _: &mut Vec<Effect>) {

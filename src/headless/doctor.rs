@@ -1,4 +1,4 @@
-//! `touch2touch doctor PATH`: says what a data set is and what the models are worth on a sample of it, loads every pair and
+//! `touch2touch doctor PATH`: says what a data set is and what the models are worth on a sample of it, loads the pairs and
 //! lists what is wrong, and tries on a handful of pairs which other reading would explain them better.
 
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ use touch2touch_work::doubts;
 use touch2touch_work::export::DrawnMasks;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::io::dataset::{Dataset, OpenError};
-use touch2touch_work::io::doctor::DoctorReport;
+use touch2touch_work::io::doctor::{DoctorReport, MOST_PAIRS};
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::models::Models;
 use touch2touch_work::predict::Generating;
@@ -29,6 +29,9 @@ use touch2touch_work::recipe::Recipe;
 pub(super) struct DoctorArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
+    /// Load every pair of a large data set, not 2000 that are spread evenly.
+    #[arg(long)]
+    all: bool,
     /// Pairs on which other readings of the data are tried (fingers swapped, pictures mirrored, another tool's CAD model,
     /// ...), spread over the tools. 0 tries nothing.
     #[arg(long, value_name = "N", default_value_t = doubts::PAIRS)]
@@ -56,6 +59,8 @@ struct Report<'a> {
     /// Worth of the models on the sample; `null` where none was tried.
     worth: Option<&'a Worth>,
     pairs: usize,
+    /// Pairs that were loaded: 2000 at most, spread evenly, without `--all`.
+    examined: usize,
     problems: &'a [Finding],
     /// The readings that would set it right, for `--read-as`; `null` where there is none.
     read_as: Option<String>,
@@ -79,15 +84,20 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         }
         Err(err) => anyhow::bail!("{err}; {}", err.hint()),
     };
-    let said =
-        Report { about: &about, worth: worth.as_ref(), pairs: report.pairs, problems: &report.problems, read_as };
+    let DoctorReport { pairs, examined, ref problems } = report;
+    let said = Report { about: &about, worth: worth.as_ref(), pairs, examined, problems, read_as };
     output.finish(&said, || {
         let all: usize = report.problems.iter().map(|p| p.count).sum();
         let kinds = match report.problems.len() {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
-        let mut text = format!("{title}: {}, {}{kinds}\n", counted(report.pairs, "pair"), counted(all, "problem"));
+        let some = if examined < pairs && opened {
+            format!(" ({examined} read, spread evenly; --all reads all)")
+        } else {
+            String::new()
+        };
+        let mut text = format!("{title}: {}{some}, {}{kinds}\n", counted(pairs, "pair"), counted(all, "problem"));
         about.iter().for_each(|fact| text += &line(fact));
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
@@ -132,18 +142,19 @@ fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow
     Ok(about::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
 }
 
-/// Every pair examined; predictions are compared where a generator for these sensors is there.
+/// The pairs examined; predictions are compared where a generator for these sensors is there.
 fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Examined> {
     let cx = output.job();
+    let most = if args.all { usize::MAX } else { MOST_PAIRS };
     let bundle = (!args.no_predictions && args.tried > 0)
         .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
         .flatten();
     let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return Ok(about::examined(dataset, args.tried, None, &cx)?);
+        return Ok(about::examined(dataset, most, args.tried, None, &cx)?);
     };
     let models = Models::new(super::cache::store());
     let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    Ok(about::examined(dataset, args.tried, Some((&models, generating)), &cx)?)
+    Ok(about::examined(dataset, most, args.tried, Some((&models, generating)), &cx)?)
 }
 
 /// The other examples, by the names of their files.

@@ -12,7 +12,7 @@ use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{self, SimConfig};
 use touch2touch_work::io::dataset::{Dataset, ToolUnit};
-use touch2touch_work::io::doctor::{DoctorReport, examine};
+use touch2touch_work::io::doctor::{DoctorReport, MOST_PAIRS, examine};
 use touch2touch_work::io::images;
 use touch2touch_work::io::pt::read_text_lists;
 use touch2touch_work::io::simulated::{Layout, WriteError, write_pair, write_tools};
@@ -29,7 +29,7 @@ fn tetrahedron(size: f64) -> TriMesh {
 }
 
 fn doctor(root: &Path) -> DoctorReport {
-    examine(&Dataset::open(root).unwrap(), &mut |_, _| ControlFlow::Continue(()))
+    examine(&Dataset::open(root).unwrap(), MOST_PAIRS, &mut |_, _| ControlFlow::Continue(()))
 }
 
 /// Writes one spoilt touch and returns what the doctor says about it.
@@ -150,12 +150,16 @@ fn cad_in_millimeters_is_found_and_progress_can_end_it() {
     assert!(report.problems[0].what.contains("cannot be meters: scale it by 0.001"));
     let dataset = Dataset::open(dir.path()).unwrap();
     let mut calls = Vec::new();
-    let stopped = examine(&dataset, &mut |done, total| {
+    let stopped = examine(&dataset, MOST_PAIRS, &mut |done, total| {
         calls.push((done, total));
         if done > 0 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!((stopped.pairs, stopped.examined), (20, 16));
     assert_eq!(calls, [(0, 20), (16, 20)]);
+    // Of a large data set some are looked at, up to its end.
+    std::fs::write(dataset.pair_files(PairId(15)).first().unwrap(), "no tensor").unwrap();
+    let some = examine(&dataset, 4, &mut |_, _| ControlFlow::Continue(()));
+    assert_eq!((some.pairs, some.examined, some.problems.len()), (20, 4, 2), "{:#?}", some.problems);
     assert!(matches!(write_tools(dir.path(), &[("../x", true, tetrahedron(1.0))]), Err(WriteError::ToolName { .. })));
     let empty = Sample::default();
     assert!(matches!(write_pair(dir.path(), Layout::Train, "rod", 0, &empty), Err(WriteError::Incomplete { .. })));

@@ -149,7 +149,7 @@ fn of_one_finger(felt: &[Felt<'_>]) -> Option<Doubt> {
         let images = felt.iter().filter_map(|felt| felt.sample.pad(pad)?.color()?.images.as_ref());
         let faces: Vec<Face> = images.map(Face::of).collect();
         let of = most(&faces, |face| face.same || face.touch.single())?;
-        let what = format!("the touched images of the {} show no touch: {of}", rig.pad_name(pad));
+        let what = format!("the touched images of the {} finger show no touch: {of}", rig.pad_name(pad));
         Some(Doubt::new(Cause::SameImages, what, "check that finger's camera and what stores its images"))
     })
 }

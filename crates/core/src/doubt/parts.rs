@@ -51,7 +51,7 @@ pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, m
     let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
     let wrong = fingers.iter().find(|finger| finger.tried >= FEWEST && !finger.is_at_least(STILL_RIGHT))?;
-    let [name, other] = [wrong, sound].map(|finger| rig.pad_name(finger.pad));
+    let [name, other] = [wrong, sound].map(|finger| format!("{} finger", rig.pad_name(finger.pad)));
     let touched = wrong.touched();
     if (touched as f64) < STILL_RIGHT * wrong.tried as f64 {
         let what = format!(

@@ -27,7 +27,7 @@ const FEWEST: usize = 3;
 const SURE: f64 = 0.5;
 /// Share of the good registrations that must be far from the truth.
 const FAR: f64 = 0.5;
-/// Share of them with which an explanation must agree.
+/// Share of them with which an explanation must agree, and of all registrations that are wrong where the data are in doubt.
 const MOST: f64 = 0.8;
 /// Poses this near to the truth, in the units of [`off`], are as good as any.
 const WELL: f64 = 0.3;
@@ -205,7 +205,7 @@ impl<'m, 'a> Registered<'m, 'a> {
 
     /// Most registrations are wrong by their own verdict, and nothing else shows.
     pub(super) fn mostly_wrong(&self) -> Option<Doubt> {
-        (self.wrong >= FEWEST && self.wrong as f64 >= SURE * self.tried as f64)
+        (self.wrong >= FEWEST && self.wrong as f64 >= MOST * self.tried as f64)
             .then(|| no_cure(&format!("{} of {} registered poses are wrong", self.wrong, self.tried)))
     }
 

@@ -1,4 +1,4 @@
-//! [`examined`]: every pair read, and other readings of the data tried on a handful.
+//! [`examined`]: the pairs read, and other readings of the data tried on a handful.
 
 use std::ops::ControlFlow;
 
@@ -18,19 +18,20 @@ pub struct Examined {
     pub read_as: Option<String>,
 }
 
-/// Reads every pair and lists what is wrong, then tries on about `tried` pairs which other reading would explain them
+/// Reads the pairs, at most `most` of them, and lists what is wrong, then tries on about `tried` pairs which other reading would explain them
 /// better; with a generator, also by its predictions.
 ///
 /// # Errors
 /// If the job was told to stop.
 pub fn examined(
     dataset: &Dataset,
+    most: usize,
     tried: usize,
     generator: Option<Generator<'_>>,
     cx: &JobCx,
 ) -> Result<Examined, TaskError> {
     const WHAT: &str = "Examine the pairs";
-    let mut report = doctor::examine(dataset, &mut |done, total| {
+    let mut report = doctor::examine(dataset, most, &mut |done, total| {
         cx.progress(done as u64, total as u64, format!("{done} of {total} pairs"));
         if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });

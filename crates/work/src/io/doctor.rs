@@ -35,15 +35,23 @@ impl DoctorReport {
 
 /// Pairs loaded between two reports of progress.
 const BATCH: usize = 16;
+/// Most pairs that are loaded where nobody asks for all: what is wrong with more than a few shows in these, within a minute.
+pub const MOST_PAIRS: usize = 2000;
 
-/// Loads every pair, on all cores, and lists what is wrong. `progress` is told `(done, total)` on the calling
-/// thread and may end the examination.
+/// Loads the pairs, at most `most` that are spread evenly, on all cores, and lists what is wrong. `progress` is told
+/// `(done, total)` on the calling thread and may end the examination.
 ///
 /// It looks for files that cannot be read, wrong keys and shapes, NaN and infinities, imprints and CAD models that are
 /// not in meters, depths, intrinsics, quaternions, finger sides and poses that cannot be a bubble's, and pixels that do
 /// not survive the way from depth to cloud and back.
-pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> DoctorReport {
-    let total = dataset.index.pairs.len();
+pub fn examine(
+    dataset: &Dataset,
+    most: usize,
+    progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+) -> DoctorReport {
+    let pairs = dataset.index.pairs.len();
+    let total = pairs.min(most);
+    let id = |place: usize| PairId((place * pairs / total.max(1)) as u32);
     let mut findings = Findings::default();
     findings.extend(dataset.problems.iter().cloned());
     for tool in dataset.index.tools() {
@@ -59,7 +67,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
     let mut examined = 0;
     let mut go_on = progress(0, total).is_continue();
     while go_on && examined < total {
-        let batch: Vec<PairId> = (examined..total.min(examined + BATCH)).map(|id| PairId(id as u32)).collect();
+        let batch: Vec<PairId> = (examined..total.min(examined + BATCH)).map(id).collect();
         let found: Vec<_> = batch.par_iter().map(|&id| look_at(dataset, id)).collect();
         for (id, look) in batch.iter().zip(found) {
             findings.extend(look.problems);
@@ -77,7 +85,7 @@ pub fn examine(dataset: &Dataset, progress: &mut dyn FnMut(usize, usize) -> Cont
         findings.extend(turned.problem(examined));
         findings.extend(repeated.problem(dataset));
     }
-    DoctorReport { pairs: total, examined, problems: findings.into_list() }
+    DoctorReport { pairs, examined, problems: findings.into_list() }
 }
 
 /// Small numbers of invalid pixels, summed over pairs.
