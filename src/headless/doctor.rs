@@ -92,7 +92,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
             kinds if kinds == all => String::new(),
             kinds => format!(" of {kinds} kinds"),
         };
-        let some = if examined < pairs && opened {
+        let some = if examined < pairs {
             format!(" ({examined} read, spread evenly; --all reads all)")
         } else {
             String::new()

@@ -61,7 +61,7 @@ pub enum Cause {
     OtherToolOfSome,
     /// The color images of some of the pairs are those of the other finger.
     SwappedInSome,
-    /// What one finger felt is wrong, and is to be read so if that is known.
+    /// One finger's imprints are wrong, and are to be read so if that is known.
     Finger(Option<ReadAs>),
     /// One finger felt nothing.
     NothingFelt,
@@ -82,8 +82,8 @@ impl Cause {
     /// wrong.
     pub fn is_of_poses(&self) -> bool {
         match self {
-            Self::Stored(read_as) => !read_as.to_string().starts_with("image"),
-            Self::Finger(read_as) => read_as.is_none_or(|read_as| !read_as.to_string().starts_with("image")),
+            Self::Stored(read_as) | Self::Finger(Some(read_as)) => !read_as.to_string().starts_with("image"),
+            Self::Finger(None) => true,
             Self::Poses(_) | Self::OtherTool(_) | Self::Axes(..) | Self::NotItsModel(_) | Self::OtherToolOfSome => true,
             Self::SameImages
             | Self::NoReference

@@ -86,7 +86,7 @@ fn finger(name: &str, named: &str, change: impl Fn(&mut PadTouch) + Send + Sync 
     })
 }
 
-/// What is wrong with the first finger alone, or with every second pair.
+/// Mistakes of the first finger alone, or of every second pair.
 fn parts() -> Vec<Kind> {
     let imprint = |name: &str, named: &str, change: fn(&DepthMap) -> DepthMap| {
         finger(name, named, move |touch| {

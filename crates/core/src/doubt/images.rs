@@ -4,7 +4,7 @@ use super::{Cause, Doubt, Felt, median};
 use crate::grid::RgbGrid;
 use crate::read_as::{Images, Lay, ReadAs, Stored};
 use crate::resample::bilinear_rgb;
-use crate::rig::{PerPad, Rig, lab};
+use crate::rig::{PadId, PerPad, Rig, lab};
 use crate::sample::{ColorImages, ColorTouch, Sample};
 use crate::turn::Turn;
 use crate::units::counted;
@@ -39,16 +39,16 @@ const SIDE: usize = 128;
 
 /// Doubt about the color images of some pairs.
 pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
-    let touches: Vec<&ColorTouch> =
-        felt.iter().flat_map(|felt| felt.sample.pads.iter().flatten()).filter_map(|touch| touch.color()).collect();
-    let images: Vec<&ColorImages> = touches.iter().filter_map(|touch| touch.images.as_ref()).collect();
+    let touches = felt.iter().flat_map(|felt| felt.sample.pads.entries());
+    let (pads, images): (Vec<PadId>, Vec<&ColorImages>) =
+        touches.filter_map(|(pad, touch)| Some((pad, touch.color()?.images.as_ref()?))).unzip();
     if images.is_empty() {
         return None;
     }
     let faces: Vec<Face> = images.iter().map(|images| Face::of(images)).collect();
     let colored = felt.iter().any(|felt| is_gelslim(&felt.sample.rig));
     plain(&faces, colored)
-        .or_else(|| of_one_finger(felt))
+        .or_else(|| of_one_finger(&felt.first()?.sample.rig, &pads, &faces))
         .or_else(|| stored(&images, &faces))
         .or_else(|| swapped(felt))
         .or_else(|| laid(felt, &faces))
@@ -104,10 +104,11 @@ impl Face {
     }
 }
 
-fn most(faces: &[Face], shows: impl Fn(&Face) -> bool) -> Option<String> {
-    let count = faces.iter().filter(|face| shows(face)).count();
-    let enough = count > 0 && count as f64 >= MOST * faces.len() as f64;
-    enough.then(|| format!("{count} of {}", counted(faces.len(), "image")))
+fn most<'a>(faces: impl IntoIterator<Item = &'a Face>, shows: impl Fn(&Face) -> bool) -> Option<String> {
+    let shown: Vec<bool> = faces.into_iter().map(shows).collect();
+    let count = shown.iter().filter(|shown| **shown).count();
+    let enough = count > 0 && count as f64 >= MOST * shown.len() as f64;
+    enough.then(|| format!("{count} of {}", counted(shown.len(), "image")))
 }
 
 /// True where the color sensor is a GelSlim, of which is known that its light is colored, and where it comes from.
@@ -143,12 +144,10 @@ fn plain(faces: &[Face], colored: bool) -> Option<Doubt> {
 }
 
 /// A finger whose touched images show no touch, where those of the other one do.
-fn of_one_finger(felt: &[Felt<'_>]) -> Option<Doubt> {
-    let rig = &felt.first()?.sample.rig;
+fn of_one_finger(rig: &Rig, pads: &[PadId], faces: &[Face]) -> Option<Doubt> {
     rig.pads().find_map(|pad| {
-        let images = felt.iter().filter_map(|felt| felt.sample.pad(pad)?.color()?.images.as_ref());
-        let faces: Vec<Face> = images.map(Face::of).collect();
-        let of = most(&faces, |face| face.same || face.touch.single())?;
+        let own = pads.iter().zip(faces).filter(|(of, _)| **of == pad).map(|(_, face)| face);
+        let of = most(own, |face| face.same || face.touch.single())?;
         let what = format!("the touched images of the {} finger show no touch: {of}", rig.pad_name(pad));
         Some(Doubt::new(Cause::SameImages, what, "check that finger's camera and what stores its images"))
     })

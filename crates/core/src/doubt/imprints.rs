@@ -86,7 +86,7 @@ impl fmt::Display for Axes {
 
 /// Pairs with a CAD model, their imprints without grain.
 struct Pairs<'a> {
-    /// Their positions among those looked at.
+    /// Positions among the pairs that are looked at.
     at: Vec<usize>,
     samples: Vec<Sample>,
     tools: Vec<&'a str>,

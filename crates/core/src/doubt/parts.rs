@@ -76,7 +76,7 @@ pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, m
 /// The sample with one finger alone.
 fn alone(sample: &Sample, pad: PadId) -> Sample {
     let mut sample = sample.clone();
-    for (other, touch) in sample.rig.clone().pads().zip(sample.pads.iter_mut()) {
+    for (other, touch) in sample.rig.pads().zip(sample.pads.iter_mut()) {
         if other != pad {
             *touch = None;
         }

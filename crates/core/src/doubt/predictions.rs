@@ -41,7 +41,8 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
             best = Some((read_as, gain));
         }
     };
-    consider(ReadAs::ImageSwapFingers, &scores(&both, &predicted, true));
+    let swapped = scores(&both, &predicted, true);
+    consider(ReadAs::ImageSwapFingers, &swapped);
     if sound && mean < GOOD {
         let lays = [Lay::MirrorColumns, Lay::MirrorRows, Lay::Turn].map(ReadAs::ImageLay);
         let others = [ReadAs::ImageBgr(Images::Both), ReadAs::ImageSwapReference];
@@ -52,7 +53,7 @@ pub(super) fn judge(samples: &[Sample], sound: bool, predict: Predict<'_>) -> Op
         }
     }
     let Some((read_as, gain)) = best else {
-        return swapped_in_some(&stored, &scores(&both, &predicted, true), &at);
+        return swapped_in_some(&stored, &swapped, &at);
     };
     let figures = format!(
         "predictions look like the measured imprints with a likeness of {:.2} instead of {mean:.2}, better on {} of {}",

@@ -67,28 +67,17 @@ pub struct BubbleConfig {
 impl BubbleConfig {
     /// This bubble's noise and errors on the nominal bubble's shape.
     pub(super) fn of_nominal_shape(self) -> Self {
-        let Self {
-            press_m,
-            dome_rise_m,
-            dome_fullness,
-            rim_semi_axes_m,
-            rim_centers_m,
-            rim_tilt,
-            pressure_per_m,
-            stiffening,
-            reference_m,
-            ..
-        } = Self::default();
+        let nominal = Self::default();
         Self {
-            press_m,
-            dome_rise_m,
-            dome_fullness,
-            rim_semi_axes_m,
-            rim_centers_m,
-            rim_tilt,
-            pressure_per_m,
-            stiffening,
-            reference_m,
+            press_m: nominal.press_m,
+            dome_rise_m: nominal.dome_rise_m,
+            dome_fullness: nominal.dome_fullness,
+            rim_semi_axes_m: nominal.rim_semi_axes_m,
+            rim_centers_m: nominal.rim_centers_m,
+            rim_tilt: nominal.rim_tilt,
+            pressure_per_m: nominal.pressure_per_m,
+            stiffening: nominal.stiffening,
+            reference_m: nominal.reference_m,
             ..self
         }
     }

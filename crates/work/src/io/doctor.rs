@@ -1,4 +1,4 @@
-//! The doctor: loads every pair of a data set and lists what is wrong with it, in words that say what to do.
+//! The doctor: loads the pairs of a data set and lists what is wrong with it, in words that say what to do.
 
 use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash as _, Hasher as _};
