@@ -2,7 +2,7 @@
 
 use std::fs::File;
 use std::io::{ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde::Serialize;
 
@@ -48,6 +48,7 @@ impl MaskStore {
         self.make_folder(WHAT)?;
         let mut bytes = serde_json::to_vec(line).map_err(|err| io(err.into()))?;
         bytes.push(b'\n');
+        unshare(&file).map_err(io)?;
         let mut out = files::append(&file).map_err(io)?;
         // A line cut short by a crash is closed, so that this one stands by itself.
         let length = out.metadata().map_err(io)?.len();
@@ -72,5 +73,68 @@ impl MaskStore {
             Err(err) if err.kind() == ErrorKind::NotFound => Ok(Vec::new()),
             read => read.map_err(|source| StoreError::Io { file, what: "read the journal", source }),
         }
+    }
+}
+
+/// Gives a journal that a copy of the data set shares (hard links, as `cp -al` makes them) a file of its own: what is appended
+/// would be in both. Masks and reviews are new files each time.
+#[cfg(unix)]
+fn unshare(file: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::MetadataExt as _;
+    if !file.symlink_metadata().is_ok_and(|there| there.is_file() && there.nlink() > 1) {
+        return Ok(());
+    }
+    let mut shared = files::open(file)?;
+    atomic::write(file, |own| std::io::copy(&mut shared, own).map(drop))
+}
+
+#[cfg(not(unix))]
+fn unshare(_file: &Path) -> std::io::Result<()> {
+    Ok(())
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use crate::io::masks::{StoredMask, StoredReview};
+    use touch2touch_core::grid::Mask;
+    use touch2touch_core::label::{Marks, Provenance};
+    use touch2touch_core::rig::lab;
+
+    #[test]
+    fn copies_of_a_data_set_that_share_their_files_keep_their_own_labels() {
+        let dir = tempfile::tempdir().unwrap();
+        let [one, copy] = ["one", "copy"].map(|name| MaskStore::in_folder(dir.path().join(name)));
+        let mask = |on| StoredMask {
+            mask: Mask::from_fn(4, 4, |_, _| on),
+            marks: Marks::all([4, 4], Provenance::told("drawn")),
+            person: String::new(),
+            saved_unix_s: 0,
+        };
+        let finger = lab::LEFT;
+        one.append_journal("p", &1).unwrap();
+        one.save("p", finger, Some(&mask(true))).unwrap();
+        one.save_review("p", &StoredReview { review: "done".into(), ..StoredReview::default() }).unwrap();
+        drop(one.hold().unwrap());
+        std::fs::create_dir(copy.folder()).unwrap();
+        for entry in std::fs::read_dir(one.folder()).unwrap().flatten() {
+            std::fs::hard_link(entry.path(), copy.folder().join(entry.file_name())).unwrap();
+        }
+        let held = copy.hold().unwrap();
+        copy.append_journal("p", &2).unwrap();
+        copy.append_journal("p", &3).unwrap();
+        copy.save("p", finger, Some(&mask(false))).unwrap();
+        copy.save_review("p", &StoredReview { review: "flagged".into(), ..StoredReview::default() }).unwrap();
+        drop(held);
+        one.append_journal("p", &4).unwrap();
+        assert_eq!(
+            (one.journal("p").unwrap(), copy.journal("p").unwrap()),
+            (b"1\n4\n".to_vec(), b"1\n2\n3\n".to_vec())
+        );
+        let stored = |store: &MaskStore| {
+            (store.load("p", finger).unwrap().unwrap().mask[(0, 0)], store.load_review("p").unwrap().unwrap().review)
+        };
+        assert_eq!(stored(&one), (true, "done".to_owned()));
+        assert_eq!(stored(&copy), (false, "flagged".to_owned()));
     }
 }
