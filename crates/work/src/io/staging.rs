@@ -126,12 +126,33 @@ impl Drop for Claim {
     }
 }
 
-/// Removes what killed runs left in `parent`. A run that was killed between moving the previous export away and putting
+/// Gives up a claim whose run was killed, and says so. Locked while it is removed: nobody takes it over meanwhile.
+fn release(file: &Path) {
+    if !file.symlink_metadata().is_ok_and(|there| there.is_file()) || atomic::is_newborn(file) {
+        return;
+    }
+    let Ok(lock) = files::open(file) else { return };
+    let abandoned = lock.try_lock().is_ok() && file.symlink_metadata().is_ok_and(|there| same_file(&there, &lock));
+    if abandoned && std::fs::remove_file(file).is_ok() {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let target = file.with_file_name(name.trim_start_matches(CLAIM));
+        log::warn!(
+            "a run that was stopped before it could write {} left a mark there, which is removed",
+            target.display()
+        );
+    }
+}
+
+/// Removes what killed runs left in `parent`, their claims too. A run that was killed between moving the previous export away and putting
 /// the new one in its place gets the previous one back.
 pub(crate) fn sweep(parent: &Path) {
     let Ok(entries) = std::fs::read_dir(parent) else { return };
     for entry in entries.flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
+        if name.starts_with(CLAIM) {
+            release(&entry.path());
+            continue;
+        }
         let ours = name.starts_with(PREFIX) || name.starts_with(OLD_PREFIX);
         if !ours || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
             continue;
@@ -231,6 +252,28 @@ mod tests {
             std::os::unix::fs::symlink(dir.path().join("nowhere"), dir.path().join(format!("{CLAIM}link"))).unwrap();
             assert!(Claim::of(&dir.path().join("link")).is_err(), "a link is not followed");
         }
+    }
+
+    #[test]
+    fn claims_of_killed_runs_go_with_what_they_left_and_those_of_running_ones_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let at = |name: &str| dir.path().join(name);
+        let claim = |name: &str| at(&format!("{CLAIM}{name}"));
+        let old = |file: &Path| {
+            let open = File::options().write(true).open(file).unwrap();
+            open.set_modified(std::time::SystemTime::now() - std::time::Duration::from_secs(60)).unwrap();
+        };
+        for name in ["killed", "newborn"] {
+            std::fs::write(claim(name), "").unwrap();
+        }
+        let running = Claim::of(&at("running")).unwrap().unwrap();
+        [claim("killed"), claim("running")].iter().for_each(|file| old(file));
+        sweep(dir.path());
+        let left = ["killed", "newborn", "running"].map(|name| claim(name).exists());
+        assert_eq!(left, [false, true, true]);
+        assert!(Claim::of(&at("running")).unwrap().is_none());
+        drop(running);
+        assert!(Claim::of(&at("killed")).unwrap().is_some());
     }
 
     #[test]

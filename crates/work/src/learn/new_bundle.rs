@@ -26,6 +26,7 @@ pub(crate) fn claim(what: &str, out: &Path) -> Result<Claim, TaskError> {
     let place = std::path::absolute(out).map_err(|err| io(out, err))?;
     let parent = place.parent().unwrap_or(&place);
     std::fs::create_dir_all(parent).map_err(|err| io(parent, err))?;
+    staging::sweep(parent);
     Claim::of(&place).map_err(|err| io(out, err))?.ok_or_else(|| {
         TaskError::new(what, format!("a bundle is being made in {} already", out.display()))
             .with_hint("Wait for the other run, or name another folder.")
