@@ -3,22 +3,29 @@
 
 mod kinds;
 
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
-use self::kinds::{Kind, Set, kinds};
+use self::kinds::{Kind, Set, kinds, near};
 use super::Machine;
 use touch2touch::headless::JsonArgs;
 use touch2touch::headless::RuntimeArg;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::catalog::{ToolSpec, tools};
-use touch2touch_core::doubt::{Doubt, Felt, judge};
-use touch2touch_core::rig::Rig;
+use touch2touch_core::doubt::{Doubt, Felt, judge, worth};
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::read_as::ReadAs;
+use touch2touch_core::rig::{Rig, lab};
+use touch2touch_core::sample::{DepthTouch, Sample};
 use touch2touch_core::sim::{Condition, SimConfig, random_grasp};
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::doubts::{Generator, PAIRS, placed};
+use touch2touch_work::io::cases::{Case, CaseSet};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::models::Models;
 use touch2touch_work::predict::Generating;
@@ -35,6 +42,9 @@ pub(super) struct DoctorArgs {
     /// Sound data sets of each condition.
     #[arg(long, default_value_t = 6, value_parser = clap::value_parser!(u32).range(0..=1000))]
     sound: u32,
+    /// Sound sets of this folder of cases too, which have no GelSlims.
+    #[arg(long, value_name = "DIR")]
+    cases: Option<PathBuf>,
     /// Only ways with this in their name.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
@@ -64,6 +74,8 @@ struct Row {
     noticed: usize,
     /// Other causes that were named.
     otherwise: Vec<String>,
+    /// Sets whose poses are worse when they are read as was said.
+    worsened: usize,
 }
 
 #[derive(Serialize)]
@@ -71,6 +83,8 @@ struct Report {
     machine: Machine,
     pairs: u32,
     spoilt: Vec<Row>,
+    /// Sets that are slightly off, and that no reading mends: named where nothing wrong was said.
+    near: Vec<Row>,
     sound: Vec<Row>,
     /// Of all spoilt sets, those that were named rightly, and those noticed.
     named_share: f64,
@@ -78,14 +92,17 @@ struct Report {
     /// Sound sets, and those of which something was said.
     sound_sets: usize,
     false_alarms: usize,
+    /// Sets of any kind that are worse when they are read as was said.
+    worsened: usize,
 }
 
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     let machine = Machine::now();
-    let kinds: Vec<Kind> =
-        kinds().into_iter().filter(|kind| args.only.as_ref().is_none_or(|text| kind.name.contains(text))).collect();
+    let meant = |kind: &Kind| args.only.as_ref().is_none_or(|text| kind.name.contains(text));
+    let [kinds, near] = [kinds(), near()].map(|all| all.into_iter().filter(meant).collect::<Vec<Kind>>());
     let conditions = Condition::iter().count() * args.sound as usize;
-    let output = Output::new(args.json.common(), "judging", kinds.len() * args.sets as usize + conditions);
+    let all = (kinds.len() + near.len()) * args.sets as usize + conditions;
+    let output = Output::new(args.json.common(), "judging", all);
     let models = Models::new(None);
     let bundle = (!args.no_generator).then(|| bundles::find(&[]).take(BundleKind::Generator, None, &Rig::lab()));
     let bundle = bundle.transpose()?;
@@ -94,33 +111,40 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         .as_ref()
         .zip(config.as_ref())
         .map(|(bundle, config)| (&models, Generating { bundle, engine: args.runtime.choice(), config }));
-    let mut spoilt: Vec<Row> = kinds.iter().map(|kind| Row::new(&kind.name)).collect();
-    for number in 0..args.sets {
-        let sound = sound_set(args, Condition::Plain, number);
-        let judged: Vec<Vec<Doubt>> = kinds
-            .par_iter()
-            .map(|kind| {
-                let doubts = doubts(&kind.of(&sound), generator);
+    let judged = |kinds: &[Kind]| {
+        let mut rows: Vec<Row> = kinds.iter().map(|kind| Row::new(&kind.name)).collect();
+        for number in 0..args.sets {
+            let sound = sound_set(args, Condition::Plain, number);
+            rows.par_iter_mut().zip(kinds).for_each(|(row, kind)| {
+                let set = kind.of(&sound);
+                row.add(&set, &doubts(&set, generator), |doubt| kind.is(&doubt.cause));
                 output.step(&kind.name);
-                doubts
-            })
-            .collect();
-        for ((row, kind), doubts) in spoilt.iter_mut().zip(&kinds).zip(judged) {
-            row.add(&doubts, |doubt| kind.is(&doubt.cause));
+            });
         }
-    }
+        rows
+    };
+    let (spoilt, mut near) = (judged(&kinds), judged(&near));
+    near.iter_mut().for_each(|row| row.named += row.sets - row.noticed);
     let mut sound: Vec<Row> = Vec::new();
     for condition in Condition::iter() {
         let mut row = Row::new(condition.key());
-        let judged: Vec<Vec<Doubt>> = (0..args.sound)
+        let sets: Vec<(Set, Vec<Doubt>)> = (0..args.sound)
             .into_par_iter()
             .map(|number| {
-                let doubts = doubts(&sound_set(args, condition, number), generator);
+                let set = sound_set(args, condition, number);
+                let doubts = doubts(&set, generator);
                 output.step(condition.key());
-                doubts
+                (set, doubts)
             })
             .collect();
-        judged.iter().for_each(|doubts| row.add(doubts, |_| false));
+        sets.iter().for_each(|(set, doubts)| row.add(set, doubts, |_| false));
+        sound.push(row);
+    }
+    if let Some(folder) = &args.cases {
+        let mut row = Row::new(&folder.display().to_string());
+        for set in sets_of_cases(folder, args.pairs as usize)? {
+            row.add(&set, &doubts(&set, generator), |_| false);
+        }
         sound.push(row);
     }
     let share = |of: fn(&Row) -> usize| {
@@ -133,7 +157,9 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         noticed_share: share(|row| row.noticed),
         sound_sets: sound.iter().map(|row| row.sets).sum(),
         false_alarms: sound.iter().map(|row| row.noticed).sum(),
+        worsened: spoilt.iter().chain(&near).chain(&sound).map(|row| row.worsened).sum(),
         spoilt,
+        near,
         sound,
     };
     args.json.write(&report)?;
@@ -143,14 +169,21 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
 
 impl Row {
     fn new(kind: &str) -> Self {
-        Self { kind: kind.to_owned(), sets: 0, named: 0, noticed: 0, otherwise: Vec::new() }
+        Self { kind: kind.to_owned(), sets: 0, named: 0, noticed: 0, otherwise: Vec::new(), worsened: 0 }
     }
 
-    fn add(&mut self, doubts: &[Doubt], right: impl Fn(&Doubt) -> bool) {
+    fn add(&mut self, set: &Set, doubts: &[Doubt], right: impl Fn(&Doubt) -> bool) {
         self.sets += 1;
         self.noticed += usize::from(!doubts.is_empty());
         self.named += usize::from(!doubts.is_empty() && doubts.iter().all(&right));
         self.otherwise.extend(doubts.iter().filter(|doubt| !right(doubt)).map(|doubt| doubt.cause.key()));
+        let cure: Vec<ReadAs> = doubts.iter().filter_map(Doubt::read_as).collect();
+        if !cure.is_empty() {
+            let mut read = set.clone();
+            read.pairs.iter_mut().for_each(|(_, sample)| *sample = ReadAs::all(&cure, sample));
+            let [before, after] = [set, &read].map(|set| with_felt(set, |felt| worth(felt, &set.tools)));
+            self.worsened += usize::from(after.is_worse_than(&before));
+        }
     }
 }
 
@@ -177,20 +210,40 @@ fn sound_set(args: &DoctorArgs, condition: Condition, number: u32) -> Set {
     set
 }
 
+/// Sets of so many cases each, one after the other.
+fn sets_of_cases(folder: &Path, pairs: usize) -> anyhow::Result<Vec<Set>> {
+    let CaseSet { cases, tools } = CaseSet::open(folder)?;
+    let name = |tool: usize| format!("tool_{tool:02}");
+    let tools: BTreeMap<String, TriMesh> = tools.into_iter().map(|(tool, mesh)| (name(tool), mesh)).collect();
+    let pair = |(_, case): &(String, Case)| {
+        let mut sample = Sample { grasp_from_object: Some(case.grasp_from_object), ..Sample::default() };
+        for ((pad, imprint), camera) in sample.rig.pad_list().into_iter().zip(&case.imprints).zip(&case.cameras) {
+            let touch = DepthTouch { imprint: imprint.clone(), camera: Some(camera.clone()), truth: None };
+            sample.pads[pad].get_or_insert_default().set(lab::BUBBLE_ID, touch);
+        }
+        (name(case.tool), sample)
+    };
+    let sets = cases.chunks(pairs).map(|some| Set { pairs: some.iter().map(pair).collect(), tools: tools.clone() });
+    Ok(sets.collect())
+}
+
 fn doubts(set: &Set, generator: Option<Generator<'_>>) -> Vec<Doubt> {
+    with_felt(set, |felt| match generator {
+        Some(generator) => {
+            judge(felt, &set.tools, Some(&mut |samples| placed(samples, generator, &JobCx::unwatched())))
+        }
+        None => judge(felt, &set.tools, None),
+    })
+}
+
+fn with_felt<T>(set: &Set, then: impl FnOnce(&[Felt<'_>]) -> T) -> T {
     let count = set.pairs.len() as isize;
     let beside: Vec<_> = (0..count)
         .map(|at| move |on: isize| set.pairs[(at + on).rem_euclid(count) as usize].1.grasp_from_object)
         .collect();
     let felt = set.pairs.iter().zip(&beside);
-    let felt: Vec<Felt<'_>> =
-        felt.map(|((tool, sample), beside)| Felt { tool: Some(tool), sample, beside: Some(beside) }).collect();
-    match generator {
-        Some(generator) => {
-            judge(&felt, &set.tools, Some(&mut |samples| placed(samples, generator, &JobCx::unwatched())))
-        }
-        None => judge(&felt, &set.tools, None),
-    }
+    let felt = felt.map(|((tool, sample), beside)| Felt { tool: Some(tool), sample, beside: Some(beside) });
+    then(&felt.collect::<Vec<_>>())
 }
 
 fn text(report: &Report) -> String {
@@ -201,21 +254,27 @@ fn text(report: &Report) -> String {
             otherwise.sort();
             otherwise.dedup();
             let said = if otherwise.is_empty() { String::new() } else { format!("  also: {}", otherwise.join(", ")) };
+            let worse =
+                if row.worsened > 0 { format!("  WORSE WITH THE CURE: {}", row.worsened) } else { String::new() };
             *text += &format!(
-                "{:<66} {:>2} of {:>2} named, {:>2} noticed{said}\n",
+                "{:<66} {:>2} of {:>2} named, {:>2} noticed{worse}{said}\n",
                 row.kind, row.named, row.sets, row.noticed
             );
         }
     };
     rows(&mut text, &report.spoilt);
+    text += "\nslightly off, where no reading helps (named: nothing wrong was said)\n";
+    rows(&mut text, &report.near);
     text += "\nsound, by condition\n";
     rows(&mut text, &report.sound);
     text += &format!(
-        "\n{:.1} % of the spoilt sets are named rightly, {:.1} % noticed; {} of {} sound ones are doubted\n",
+        "\n{:.1} % of the spoilt sets are named rightly, {:.1} % noticed; {} of {} sound ones are doubted; {} sets \
+         are worse when they are read as was said\n",
         100.0 * report.named_share,
         100.0 * report.noticed_share,
         report.false_alarms,
-        report.sound_sets
+        report.sound_sets,
+        report.worsened
     );
     text
 }

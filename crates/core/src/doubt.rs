@@ -29,7 +29,7 @@ use super::rig::PerPad;
 use super::sample::{PadTouch, Reading, Sample};
 
 pub use imprints::Axes;
-pub use poses::Mismatch;
+pub use poses::{Mismatch, Worth};
 pub use predictions::{Placed, likeness};
 
 /// The true pose, `grasp_from_object`, of the pair so many places after one.
@@ -171,6 +171,11 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
         doubts.extend(predictions::judge(&read, sound, predict));
     }
     doubts
+}
+
+/// What registering some pairs comes to: before and after a cure it tells what the cure is worth.
+pub fn worth(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
+    poses::Registered::of(felt, &poses::models(felt, tools)).worth()
 }
 
 /// Doubt about imprints, CAD models and true poses, which are judged together: each of the three may be what is wrong.

@@ -78,6 +78,88 @@ pub enum Stored {
     Wrapped,
 }
 
+/// Three numbers that stand for a pixel in place of red, green and blue, each on the scale 0..255.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Colors {
+    /// Green, blue, red.
+    Gbr,
+    /// Blue, red, green.
+    Brg,
+    /// Luma and both color differences of ITU-R BT.601 over the full range, as JPEG and Pillow have them.
+    #[strum(serialize = "ycbcr")]
+    YCbCr,
+    /// The same in OpenCV's order.
+    #[strum(serialize = "ycrcb")]
+    YCrCb,
+    /// Hue in steps of two degrees, as OpenCV has it, saturation and value.
+    Hsv,
+    /// Hue over 0..255, as Pillow has it, saturation and value.
+    HsvFull,
+}
+
+impl Colors {
+    /// Red, green and blue.
+    pub fn decoded(self, [a, b, c]: [f32; 3]) -> [f32; 3] {
+        match self {
+            Self::Gbr => [c, a, b],
+            Self::Brg => [b, c, a],
+            Self::YCbCr => from_luma(a, b, c),
+            Self::YCrCb => from_luma(a, c, b),
+            Self::Hsv => from_hue(a / 30.0, b / 255.0, c),
+            Self::HsvFull => from_hue(a * 6.0 / 256.0, b / 255.0, c),
+        }
+    }
+
+    /// The bytes that a file in these colors holds.
+    pub fn encoded(self, [r, g, b]: [f32; 3]) -> [f32; 3] {
+        let value = r.max(g).max(b);
+        let range = value - r.min(g).min(b);
+        let sixth = match range {
+            0.0 => 0.0,
+            _ if value == r => ((g - b) / range).rem_euclid(6.0),
+            _ if value == g => (b - r) / range + 2.0,
+            _ => (r - g) / range + 4.0,
+        };
+        let saturation = if value > 0.0 { 255.0 * range / value } else { 0.0 };
+        let luma = 0.299 * r + 0.587 * g + 0.114 * b;
+        let [blue, red] = [128.0 + (b - luma) / 1.772, 128.0 + (r - luma) / 1.402];
+        let stored = match self {
+            Self::Gbr => [g, b, r],
+            Self::Brg => [b, r, g],
+            Self::YCbCr => [luma, blue, red],
+            Self::YCrCb => [luma, red, blue],
+            Self::Hsv => [(30.0 * sixth).round() % 180.0, saturation, value],
+            Self::HsvFull => [(256.0 / 6.0 * sixth).round() % 256.0, saturation, value],
+        };
+        stored.map(|v| v.round().clamp(0.0, 255.0))
+    }
+
+    fn text(self) -> &'static str {
+        match self {
+            Self::Gbr => "in the order green, blue, red",
+            Self::Brg => "in the order blue, red, green",
+            Self::YCbCr => "in YCbCr",
+            Self::YCrCb => "in YCrCb",
+            Self::Hsv => "in HSV (OpenCV's)",
+            Self::HsvFull => "in HSV (Pillow's)",
+        }
+    }
+}
+
+fn from_luma(y: f32, cb: f32, cr: f32) -> [f32; 3] {
+    let (blue, red) = (cb - 128.0, cr - 128.0);
+    [y + 1.402 * red, y - 0.344_136 * blue - 0.714_136 * red, y + 1.772 * blue]
+}
+
+/// From the sixth of the circle of colors, the saturation 0..1 and the value.
+fn from_hue(sixth: f32, saturation: f32, value: f32) -> [f32; 3] {
+    [5.0, 3.0, 1.0].map(|channel: f32| {
+        let k = (channel + sixth).rem_euclid(6.0);
+        value - value * saturation * k.min(4.0 - k).clamp(0.0, 1.0)
+    })
+}
+
 /// One way to read data otherwise than they are stored.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ReadAs {
@@ -99,6 +181,8 @@ pub enum ReadAs {
     ImageBgr(Images),
     /// The images times 255.
     Image255(Images),
+    /// Both images in these colors.
+    ImageColors(Colors),
     /// 255 minus the images.
     ImageNegative,
     /// The touched and the untouched image in each other's place.
@@ -123,6 +207,7 @@ impl fmt::Display for ReadAs {
             Self::ImageLay(lay) => write!(f, "image-{}", <&str>::from(lay)),
             Self::ImageBgr(images) => write!(f, "image-bgr={}", <&str>::from(images)),
             Self::Image255(images) => write!(f, "image-255={}", <&str>::from(images)),
+            Self::ImageColors(colors) => write!(f, "image-colors={}", <&str>::from(colors)),
             Self::ImageNegative => f.write_str("image-negative"),
             Self::ImageSwapReference => f.write_str("image-swap-reference"),
             Self::ImageIsDifference(stored) => write!(f, "image-is-difference={}", <&str>::from(stored)),
@@ -135,7 +220,8 @@ impl fmt::Display for ReadAs {
 pub(crate) const KEYS: &str = "swap-fingers, mirror-columns, mirror-rows, turn, scale-depth=FACTOR (each also as whole-..., which \
                         includes the depth without contact), scale-camera=FACTOR, negate-theta, image-swap-fingers, \
                         image-mirror-columns, image-mirror-rows, image-turn, image-negative, image-swap-reference, image-unwrap, \
-                        image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped)";
+                        image-bgr=, image-255= (touch, reference or both), image-is-difference= (signed, gray or wrapped), image-colors= (gbr, brg, ycbcr, \
+                        ycrcb, hsv or hsv-full)";
 
 impl FromStr for ReadAs {
     type Err = String;
@@ -161,6 +247,7 @@ impl FromStr for ReadAs {
             ("image-unwrap", None) if bare == key => Self::ImageUnwrap,
             ("image-bgr", _) if bare == key => Self::ImageBgr(images()?),
             ("image-255", _) if bare == key => Self::Image255(images()?),
+            ("image-colors", Some(colors)) if bare == key => Self::ImageColors(colors.parse().map_err(|_| unknown())?),
             ("image-is-difference", Some(stored)) if bare == key => {
                 Self::ImageIsDifference(stored.parse().map_err(|_| unknown())?)
             }
@@ -189,6 +276,7 @@ pub fn also(known: &[ReadAs], more: ReadAs) -> Vec<ReadAs> {
         ReadAs::Scale(..)
             | ReadAs::ScaleCamera(_)
             | ReadAs::Image255(_)
+            | ReadAs::ImageColors(_)
             | ReadAs::ImageIsDifference(_)
             | ReadAs::ImageUnwrap
     );
@@ -232,6 +320,7 @@ impl ReadAs {
             Self::ImageLay(lay) => format!("the color images are {}", lay.text()),
             Self::ImageBgr(which) => format!("{} are in the order blue, green, red", images(which)),
             Self::Image255(which) => format!("{} are on the scale 0..1", images(which)),
+            Self::ImageColors(colors) => format!("the color images are {}", colors.text()),
             Self::ImageNegative => "the color images are negatives".into(),
             Self::ImageSwapReference => "touched and untouched images are swapped".into(),
             Self::ImageIsDifference(stored) => {
@@ -297,6 +386,15 @@ impl ReadAs {
             }),
             Self::ImageBgr(which) => of_images(sample, which, |pixel| pixel.swap(0, 2)),
             Self::Image255(which) => of_images(sample, which, |pixel| pixel.iter_mut().for_each(|v| *v *= 255.0)),
+            // A difference by itself does not say what it is the difference of.
+            Self::ImageColors(colors) => each_color(sample, |touch| {
+                let Some(images) = &touch.images else { return };
+                let [raw, reference] =
+                    [&images.raw, &images.reference].map(|image| image.map(|pixel| colors.decoded(*pixel)));
+                if let Some(read) = ColorTouch::from_images(raw, reference) {
+                    *touch = read;
+                }
+            }),
             Self::ImageNegative => each_color(sample, |touch| {
                 let negative = |pixel: &mut [f32; 3]| pixel.iter_mut().for_each(|v| *v = 255.0 - *v);
                 if let Some(ColorImages { raw, reference }) = &mut touch.images {
@@ -423,7 +521,24 @@ mod tests {
         all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::ImageBgr));
         all.extend([Images::Touch, Images::Reference, Images::Both].map(ReadAs::Image255));
         all.extend([Stored::Signed, Stored::Gray, Stored::Wrapped].map(ReadAs::ImageIsDifference));
+        all.extend(Colors::iter().map(ReadAs::ImageColors));
         all
+    }
+
+    #[test]
+    fn colors_come_back_from_what_a_file_in_others_holds() {
+        // By OpenCV 4.10 and Pillow 11.
+        assert_eq!(Colors::Hsv.encoded([30.0, 90.0, 200.0]), [109.0, 217.0, 200.0]);
+        assert_eq!(Colors::YCrCb.encoded([30.0, 90.0, 200.0]), [85.0, 89.0, 193.0]);
+        for pixel in
+            [[30.0, 90.0, 200.0], [200.0, 30.0, 90.0], [90.0, 200.0, 30.0], [128.0; 3], [0.0; 3], [255.0, 0.0, 0.0]]
+        {
+            for colors in Colors::iter() {
+                let back = colors.decoded(colors.encoded(pixel));
+                let off = pixel.iter().zip(back).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+                assert!(off < 5.0, "{colors:?}: {pixel:?} became {back:?}");
+            }
+        }
     }
 
     #[test]

@@ -3,13 +3,14 @@
 use std::collections::BTreeMap;
 
 use glam::{DMat3, DVec3};
+use strum::IntoEnumIterator as _;
 
 use touch2touch_core::doubt::Cause;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::read_as::{Depths, Images, Lay, ReadAs, Stored};
-use touch2touch_core::sample::{ColorTouch, PadTouch, Sample};
+use touch2touch_core::read_as::{Colors, Depths, Images, Lay, ReadAs, Stored};
+use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 
 /// Pairs with their tools, and the tools' CAD models.
 #[derive(Clone)]
@@ -79,11 +80,79 @@ fn imprints() -> Vec<Kind> {
     all
 }
 
+/// A way to store all depth touches slightly wrongly.
+fn depths(name: &str, named: &[&str], change: impl Fn(&mut DepthTouch) + Send + Sync + 'static) -> Kind {
+    kind(name, named, move |set| {
+        let touches = set.pairs.iter_mut().flat_map(|(_, sample)| sample.pads.iter_mut().flatten());
+        touches.filter_map(PadTouch::depth_mut).for_each(&change);
+    })
+}
+
+/// Small faults that no reading mends. That nothing goes together is always true of them.
+pub(super) fn near() -> Vec<Kind> {
+    let moved = ["unexplained", "poses-unknown", "poses-grasp-frame", "poses-object-frame", "poses-angle"];
+    let unknown = &moved[..2];
+    let reference = |factor: f32| {
+        depths(&format!("depths without contact x {factor}"), unknown, move |touch| {
+            if let Some(camera) = &mut touch.camera {
+                camera.depth_reference = camera.depth_reference.map(|v| v * factor);
+            }
+        })
+    };
+    let model = |name: &str, by_m: DVec3| {
+        kind(&format!("CAD models 3 mm off along {name}"), &moved, move |set| {
+            set.tools.values_mut().flat_map(|mesh| &mut mesh.vertices).for_each(|vertex| *vertex += by_m);
+        })
+    };
+    let back = |by_m: f64| {
+        depths(&format!("cameras {} mm further back", 1e3 * by_m), unknown, move |touch| {
+            if let Some(camera) = &mut touch.camera {
+                // Along its optical axis.
+                camera.grasp_from_camera.translation -= by_m * camera.grasp_from_camera.matrix3.z_axis;
+            }
+        })
+    };
+    let crop = |by_px: f64| {
+        depths(&format!("center of the camera matrix {by_px} px off"), &moved, move |touch| {
+            if let Some(camera) = &mut touch.camera {
+                camera.intrinsics.cx += by_px;
+            }
+        })
+    };
+    vec![
+        depths("imprints x 1.15", unknown, |touch| touch.imprint = touch.imprint.map(|v| 1.15 * v)),
+        stored("imprints and references x 1.15", unknown, ReadAs::Scale(Depths::Whole, 1.15)),
+        reference(1.1),
+        reference(0.95),
+        model("x", DVec3::X * 3e-3),
+        model("y", DVec3::Y * 3e-3),
+        model("z", DVec3::Z * 3e-3),
+        back(0.005),
+        back(0.008),
+        depths("imprints 6 px off their references", &moved, |touch| {
+            let map = &touch.imprint;
+            let [width, height] = map.size();
+            touch.imprint = DepthMap::from_fn(width, height, |x, y| map[(x.saturating_sub(6), y)]);
+        }),
+        crop(6.0),
+        crop(12.0),
+    ]
+}
+
 /// A way to store what the first finger felt wrongly.
 fn finger(name: &str, named: &str, change: impl Fn(&mut PadTouch) + Send + Sync + 'static) -> Kind {
     kind(&format!("one finger: {name}"), &[named], move |set| {
         set.pairs.iter_mut().filter_map(|(_, sample)| sample.pads.iter_mut().flatten().next()).for_each(&change);
     })
+}
+
+fn lay_images(touch: &mut PadTouch, lay: Lay) {
+    let Some(color) = touch.color_mut() else { return };
+    let Some(images) = &color.images else { return };
+    let [raw, reference] = [&images.raw, &images.reference].map(|image| lay.turn().apply(image));
+    if let Some(laid) = ColorTouch::from_images(raw, reference) {
+        *color = laid;
+    }
 }
 
 /// Mistakes of the first finger alone, or of every second pair.
@@ -110,6 +179,10 @@ fn parts() -> Vec<Kind> {
                 images.raw = images.reference.clone();
             }
         }),
+        finger("GelSlims mirrored top to bottom", "finger-image-mirror-rows", |touch| {
+            lay_images(touch, Lay::MirrorRows)
+        }),
+        finger("GelSlims turned", "finger-image-turn", |touch| lay_images(touch, Lay::Turn)),
         every_second("GelSlims of the fingers swapped", "swapped-in-some", |sample| {
             ReadAs::ImageSwapFingers.apply(sample)
         }),
@@ -205,7 +278,11 @@ fn models() -> Vec<Kind> {
 }
 
 /// A way to store the color images of all touches wrongly, from touched and untouched image.
-fn images_of(name: &str, named: &[&str], change: fn(&RgbGrid, &RgbGrid) -> (RgbGrid, RgbGrid)) -> Kind {
+fn images_of(
+    name: &str,
+    named: &[&str],
+    change: impl Fn(&RgbGrid, &RgbGrid) -> (RgbGrid, RgbGrid) + Send + Sync + 'static,
+) -> Kind {
     kind(name, named, move |set| {
         for color in set.pairs.iter_mut().flat_map(|(_, sample)| sample.pads.iter_mut().flatten()) {
             let Some(color) = PadTouch::color_mut(color) else { continue };
@@ -274,6 +351,14 @@ fn images() -> Vec<Kind> {
         images_of("GelSlims: white untouched image", &["no-reference"], |a, b| (a.clone(), each(b, |_| 255.0))),
         images_of("GelSlims: gray", &["gray"], |a, b| (gray(a), gray(b))),
     ];
+    for colors in Colors::iter() {
+        let named = ReadAs::ImageColors(colors).to_string();
+        let name = format!("GelSlims: {}", <&str>::from(colors));
+        all.push(images_of(&name, &[&named], move |a, b| {
+            let stored = |image: &RgbGrid| image.map(|pixel| colors.encoded(*pixel));
+            (stored(a), stored(b))
+        }));
+    }
     let differences: [(&str, &str, Store); 3] = [
         ("signed", &signs, |v| v),
         ("gray added", &grays, |v| (v + 128.0).clamp(0.0, 255.0)),

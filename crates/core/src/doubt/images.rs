@@ -1,11 +1,16 @@
 //! Touched against untouched images of some pairs: what no camera takes, and what another reading sets right.
 
+use std::borrow::Cow;
+
+use strum::IntoEnumIterator as _;
+
 use super::{Cause, Doubt, Felt, median};
+use crate::evaluation::mean;
 use crate::grid::RgbGrid;
-use crate::read_as::{Images, Lay, ReadAs, Stored};
+use crate::read_as::{Colors, Images, Lay, ReadAs, Stored};
 use crate::resample::bilinear_rgb;
 use crate::rig::{PadId, PerPad, Rig, lab};
-use crate::sample::{ColorImages, ColorTouch, Sample};
+use crate::sample::{ColorImages, ColorTouch};
 use crate::turn::Turn;
 use crate::units::counted;
 use crate::upright;
@@ -34,6 +39,9 @@ const VARIES_LEVELS: f64 = 1.0;
 /// Sure readings of the light that it takes, and the share of them that must agree.
 const LIGHTS: usize = 3;
 const LIGHTS_AGREE: f64 = 0.75;
+/// By how much more consistent the light must be in other colors. Lights at 120 degrees from each other whose channels change
+/// places look like ones that are turned by a quarter, and by 30 degrees more.
+const CLEARER: f64 = 0.05;
 /// Side of the square that the light is read from, pixels.
 const SIDE: usize = 128;
 
@@ -51,7 +59,7 @@ pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
         .or_else(|| of_one_finger(&felt.first()?.sample.rig, &pads, &faces))
         .or_else(|| stored(&images, &faces))
         .or_else(|| swapped(felt))
-        .or_else(|| laid(felt, &faces))
+        .or_else(|| by_light(felt, &faces))
 }
 
 /// Figures of one touch that tell at a glance.
@@ -280,36 +288,95 @@ fn area(image: &RgbGrid) -> RgbGrid {
     })
 }
 
-/// Images that lie otherwise than the light says.
-fn laid(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
-    let turns: Vec<Turn> = felt.iter().flat_map(|felt| of_light(felt.sample)).collect();
-    let upright = turns.iter().filter(|turn| **turn == Turn::default()).count();
-    let best = Turn::all().max_by_key(|turn| turns.iter().filter(|t| *t == turn).count())?;
-    let agree = turns.iter().filter(|turn| **turn == best).count();
-    if best == Turn::default() || agree < LIGHTS || (agree as f64) < LIGHTS_AGREE * turns.len() as f64 {
+/// Images that lie otherwise than the light says, or are in other colors.
+fn by_light(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
+    // Only a GelSlim's light is known.
+    let gelslims: Vec<&Felt<'_>> = felt.iter().filter(|felt| is_gelslim(&felt.sample.rig)).collect();
+    let touches = gelslims.iter().flat_map(|felt| felt.sample.pads.entries());
+    let touches: Vec<(PadId, &ColorTouch)> = touches.filter_map(|(pad, touch)| Some((pad, touch.color()?))).collect();
+    let light = Light::of(touches.iter().map(|(pad, color)| (*pad, Cow::Borrowed(&color.difference))));
+    if light.is_upright() {
         return None;
     }
     let red = median(faces.iter().map(|face| face.reference.median[0] - face.reference.median[2]))?;
-    let read_as = match (best.quarters % 4, best.mirrored) {
+    let laid = |light: &Light| match light.agreed()? {
         // Red and blue stand on either side, so that exchanging them mirrors the light; but a GelSlim's is blue.
-        (2, true) if red > 0.0 => ReadAs::ImageBgr(Images::Both),
-        (2, true) => ReadAs::ImageLay(Lay::MirrorRows),
-        (0, true) => ReadAs::ImageLay(Lay::MirrorColumns),
+        Turn { quarters: 2, mirrored: true } if red > 0.0 => Some(ReadAs::ImageBgr(Images::Both)),
+        Turn { quarters: 2, mirrored: true } => Some(ReadAs::ImageLay(Lay::MirrorRows)),
+        Turn { quarters: 0, mirrored: true } => Some(ReadAs::ImageLay(Lay::MirrorColumns)),
         // So does a negative turn it, and a GelSlim's light is no longer blue.
-        (2, false) if red > 0.0 => ReadAs::ImageNegative,
-        (2, false) => ReadAs::ImageLay(Lay::Turn),
-        _ => return None,
+        Turn { quarters: 2, mirrored: false } if red > 0.0 => Some(ReadAs::ImageNegative),
+        Turn { quarters: 2, mirrored: false } => Some(ReadAs::ImageLay(Lay::Turn)),
+        _ => None,
     };
-    let figures = format!("by the light {agree} of {} lie so, and {upright} upright", counted(turns.len(), "image"));
-    Some(Doubt::stored(read_as, &figures))
+    let decoded = Colors::iter().map(|colors| (colors, Light::decoded(&touches, colors)));
+    let decoded = decoded.filter(|(_, read)| read.is_upright() && read.consistency > light.consistency + CLEARER);
+    if let Some((colors, read)) = decoded.max_by(|(_, a), (_, b)| a.consistency.total_cmp(&b.consistency)) {
+        let figures = format!("read otherwise, by the light {}, as they are {}", read.upright(), light.upright());
+        return Some(Doubt::stored(ReadAs::ImageColors(colors), &figures));
+    }
+    if let Some(read_as) = laid(&light) {
+        return Some(Doubt::stored(read_as, &format!("by the light {}", light.upright())));
+    }
+    let rig = &gelslims.first()?.sample.rig;
+    rig.pads().find_map(|pad| {
+        let own = light.of_finger(pad);
+        let read_as = laid(&own)?;
+        let what =
+            format!("of the {} finger alone {}: by the light {}", rig.pad_name(pad), read_as.mistake(), own.upright());
+        Some(Doubt::new(Cause::Finger(Some(read_as)), what, "correct what writes that finger's files"))
+    })
 }
 
-/// Turns of the images of a sample, read from their light, where it tells surely. Only a GelSlim's light is known.
-fn of_light(sample: &Sample) -> Vec<Turn> {
-    if !is_gelslim(&sample.rig) {
-        return Vec::new();
+/// How some images lie, read from their light.
+struct Light {
+    /// Where that is sure.
+    turns: Vec<(PadId, Turn)>,
+    /// Mean share of the gel's slopes without curl, where there is a touch to read.
+    consistency: f64,
+}
+
+impl Light {
+    fn of<'a>(differences: impl Iterator<Item = (PadId, Cow<'a, RgbGrid>)>) -> Self {
+        let read = |(pad, image): (PadId, Cow<'_, RgbGrid>)| {
+            Some((pad, upright::best(&bilinear_rgb(&area(&image), SIDE, SIDE))?))
+        };
+        let readings: Vec<_> = differences.filter_map(read).collect();
+        let consistency = mean(readings.iter().map(|(_, reading)| reading.consistency)).unwrap_or(0.0);
+        let turns = readings.into_iter().filter(|(_, reading)| reading.is_sure());
+        Self { turns: turns.map(|(pad, reading)| (pad, reading.turn)).collect(), consistency }
     }
-    let colors = sample.pads.iter().flatten().filter_map(|touch| touch.color());
-    let read = |color: &ColorTouch| upright::best(&bilinear_rgb(&area(&color.difference), SIDE, SIDE));
-    colors.filter_map(read).filter(|reading| reading.is_sure()).map(|reading| reading.turn).collect()
+
+    /// The light of images in other colors than it is thought.
+    fn decoded(touches: &[(PadId, &ColorTouch)], colors: Colors) -> Self {
+        Self::of(touches.iter().filter_map(|(pad, color)| {
+            let ColorImages { raw, reference } = color.images.as_ref()?;
+            // What is linear commutes with the mean over pixels; a hue does not, but changes little from pixel to pixel.
+            let [raw, reference] = [raw, reference].map(|image| area(image).map(|pixel| colors.decoded(*pixel)));
+            Some((*pad, Cow::Owned(ColorTouch::from_images(raw, reference)?.difference)))
+        }))
+    }
+
+    fn of_finger(&self, pad: PadId) -> Self {
+        Self { turns: self.turns.iter().filter(|(of, _)| *of == pad).copied().collect(), ..*self }
+    }
+
+    fn lie(&self, turn: Turn) -> usize {
+        self.turns.iter().filter(|(_, of)| *of == turn).count()
+    }
+
+    /// The turn in which most images lie.
+    fn agreed(&self) -> Option<Turn> {
+        let best = Turn::all().max_by_key(|turn| self.lie(*turn))?;
+        let agree = self.lie(best);
+        (agree >= LIGHTS && agree as f64 >= LIGHTS_AGREE * self.turns.len() as f64).then_some(best)
+    }
+
+    fn is_upright(&self) -> bool {
+        self.agreed() == Some(Turn::default())
+    }
+
+    fn upright(&self) -> String {
+        format!("{} of {} lie upright", self.lie(Turn::default()), counted(self.turns.len(), "image"))
+    }
 }

@@ -6,11 +6,11 @@ use std::fmt;
 use glam::DVec3;
 
 use super::fit::{angle_error_rad, grainless, likeness, registered};
-use super::{Cause, Doubt, Gain, median};
+use super::{Cause, Doubt, Gain, SAME, median};
 use crate::field::DistanceField;
 use crate::mesh::TriMesh;
 use crate::read_as::{Depths, Lay, ReadAs};
-use crate::sample::Sample;
+use crate::sample::{PadTouch, Sample};
 use crate::units::counted;
 
 /// Mean likeness of imprints that lie on their tools. Simulated ones have 0.6 to 0.85, wrongly read ones 0.5 and less.
@@ -29,6 +29,8 @@ const NOT_ITS_MODEL: f64 = 0.3;
 const OTHERS_LIE_ON: f64 = 0.55;
 /// Fewest pairs that are said to be another tool's.
 const SOME: usize = 2;
+/// Motions of the cameras that are tried beside a factor, meters along their axes.
+const CAMERAS_M: [f64; 6] = [-8e-3, -5e-3, -3e-3, 3e-3, 5e-3, 8e-3];
 /// Angles differ from here on, radians.
 const ANGLES_DIFFER_RAD: f64 = 0.5 * std::f64::consts::PI / 180.0;
 
@@ -155,6 +157,9 @@ pub(super) fn judge(
         return Some((doubt, with));
     }
     if let Some((read_as, gain)) = read {
+        if let Some((doubt, likeness)) = cameras_moved(&pairs, &stored, read_as, &gain) {
+            return Some((doubt, likeness));
+        }
         return Some((Doubt::stored(read_as, &figures(&pairs, &stored, read_as, &gain)), gain.read));
     }
     if let Some(doubt) = one_model(&pairs, &models, &stored) {
@@ -203,6 +208,43 @@ fn best_reading(pairs: &Pairs<'_>, stored: &[f64]) -> Option<(ReadAs, Gain)> {
         .map(|read_as| (read_as, Gain::between(stored, &pairs.scores(&[read_as]))))
         .filter(|(_, gain)| gain.explains(LIES_ON, CLEARLY))
         .max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))
+}
+
+/// Doubt about the place of the cameras, where that explains the pairs as well as a factor does: no cure is near.
+fn cameras_moved(pairs: &Pairs<'_>, stored: &[f64], read_as: ReadAs, gain: &Gain) -> Option<(Doubt, f64)> {
+    if !matches!(read_as, ReadAs::Scale(_, factor) | ReadAs::ScaleCamera(factor) if factor > 0.0) {
+        return None;
+    }
+    let score = |forward_m: f64| {
+        let moved = pairs.samples.iter().map(|sample| with_cameras_moved(sample, forward_m));
+        let scores = moved.zip(&pairs.tools).map(|(sample, tool)| Pairs::score(&sample, &pairs.fields[*tool]));
+        (forward_m, Gain::between(stored, &scores.collect::<Vec<_>>()))
+    };
+    let (forward_m, rival) = CAMERAS_M.map(score).into_iter().max_by(|(_, a), (_, b)| a.read.total_cmp(&b.read))?;
+    (rival.explains(LIES_ON, CLEARLY) && rival.read >= gain.read - SAME).then(|| {
+        let what = format!(
+            "the imprints lie off their CAD models: with the depth cameras {:.0} mm further {} they have a likeness of {:.2} \
+             instead of {:.2}; that {} would explain it no better",
+            1e3 * forward_m.abs(),
+            if forward_m > 0.0 { "forward" } else { "back" },
+            rival.read,
+            rival.read - rival.mean,
+            read_as.mistake()
+        );
+        let hint = "check the places of the cameras in the gripper, the depths without contact, and the unit of the depths";
+        (Doubt::new(Cause::Unexplained, what, hint), rival.read)
+    })
+}
+
+/// The sample with its depth cameras moved along their optical axes.
+fn with_cameras_moved(sample: &Sample, forward_m: f64) -> Sample {
+    let mut sample = sample.clone();
+    for touch in sample.pads.iter_mut().flatten().filter_map(PadTouch::depth_mut) {
+        if let Some(pose) = touch.camera.as_mut().map(|camera| &mut camera.grasp_from_camera) {
+            pose.translation += forward_m * pose.matrix3.z_axis;
+        }
+    }
+    sample
 }
 
 /// Figures by which a reading of the imprints is better, in words.

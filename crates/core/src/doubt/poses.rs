@@ -34,6 +34,8 @@ const WELL: f64 = 0.3;
 /// A pose further from the truth contradicts it, radians and meters: good registrations are off by 0.6 degrees and 1 mm.
 const FAR_RAD: f64 = 2.5 * std::f64::consts::PI / 180.0;
 const FAR_M: f64 = 10e-3;
+/// Growth of the largest error of an angle that is more than chance, radians.
+const WORSE_RAD: f64 = 1.0 * std::f64::consts::PI / 180.0;
 /// A frame is moved by at least this, meters.
 const MOVED_M: f64 = 3e-3;
 /// True angles that differ by less are all the same, radians.
@@ -135,6 +137,29 @@ pub(super) fn models<'a>(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -
     named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect()
 }
 
+/// What registering some pairs came to, by the verdicts and the truth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Worth {
+    /// Pairs with a CAD model and cameras.
+    pub tried: usize,
+    /// Poses that are good by their verdict.
+    pub good: usize,
+    /// Poses that are wrong by it.
+    pub wrong: usize,
+    /// Largest error of an angle, radians; 0 where no truth is known.
+    pub largest_error_rad: f64,
+}
+
+impl Worth {
+    /// True where a cure that leads from the other to this spoils data: fewer poses are good, more are wrong, or the largest
+    /// error of an angle clearly grows.
+    pub fn is_worse_than(&self, before: &Self) -> bool {
+        self.good < before.good
+            || self.wrong > before.wrong
+            || self.largest_error_rad > before.largest_error_rad + WORSE_RAD
+    }
+}
+
 /// Registrations of some pairs.
 pub(super) struct Registered<'m, 'a> {
     sure: Vec<Sure>,
@@ -143,6 +168,8 @@ pub(super) struct Registered<'m, 'a> {
     tried: usize,
     asked: usize,
     wrong: usize,
+    /// Largest error of a registered angle, radians; 0 where no truth is known.
+    largest_error_rad: f64,
 }
 
 impl<'m, 'a> Registered<'m, 'a> {
@@ -161,7 +188,18 @@ impl<'m, 'a> Registered<'m, 'a> {
             let (_, found) = found.filter(|(grade, _)| *grade == Grade::Good)?;
             Some(Sure { at: *at, truth: sample.grasp_from_object, found })
         });
-        Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong }
+        let errors = tried.iter().zip(&found).filter_map(|((_, sample, _), found)| {
+            let (truth, (_, found)) = sample.grasp_from_object.zip(*found)?;
+            Some(angle_error(found.theta_rad, truth.theta_rad))
+        });
+        let largest_error_rad = errors.fold(0.0, f64::max);
+        Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong, largest_error_rad }
+    }
+
+    /// Figures that a cure must not worsen.
+    pub(super) fn worth(&self) -> Worth {
+        let Self { tried, wrong, largest_error_rad, .. } = *self;
+        Worth { tried, good: self.sure.len(), wrong, largest_error_rad }
     }
 
     /// Pairs with a CAD model and cameras.
@@ -192,7 +230,8 @@ impl<'m, 'a> Registered<'m, 'a> {
     pub(super) fn is_cured_by(&self, cured: &Self) -> bool {
         let off = |all: &Self| median(all.known().map(|(sure, truth)| off(sure.found, truth))).unwrap_or(f64::INFINITY);
         let most = |count: usize, before: usize, of: usize| count >= before && count as f64 >= SURE * of as f64;
-        most(cured.sure.len(), self.sure.len(), self.tried)
+        !cured.worth().is_worse_than(&self.worth())
+            && most(cured.sure.len(), self.sure.len(), self.tried)
             && most(cured.near(), self.near(), self.asked)
             && (self.asked == 0 || off(cured) <= off(self).max(WELL))
     }

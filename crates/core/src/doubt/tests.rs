@@ -4,8 +4,9 @@ use strum::IntoEnumIterator as _;
 
 use super::*;
 use crate::catalog::tools;
-use crate::grid::DepthMap;
-use crate::read_as::{Depths, Images, Lay};
+use crate::grid::{DepthMap, RgbGrid};
+use crate::read_as::{Colors, Depths, Images, Lay};
+use crate::sample::ColorTouch;
 use crate::sim::{Condition, SimConfig, random_grasp};
 
 struct Set {
@@ -71,6 +72,43 @@ fn what_was_stored_wrongly_is_named() {
         // Read as is said, nothing is left to say.
         assert!(sound.stored(mistake).stored(wrong[0].parse().unwrap()).judged().is_empty(), "{mistake}");
     }
+}
+
+#[test]
+fn images_in_other_colors_and_those_of_one_finger_that_lie_otherwise_are_named() {
+    let sound = set(Condition::Plain, 4, &SimConfig::default());
+    let change = |of: &dyn Fn(usize, &RgbGrid) -> RgbGrid| {
+        let mut set = Set { pairs: sound.pairs.clone(), tools: sound.tools.clone() };
+        for (_, sample) in &mut set.pairs {
+            for (finger, touch) in sample.pads.iter_mut().enumerate() {
+                let Some(color) = touch.as_mut().and_then(PadTouch::color_mut) else { continue };
+                let Some(images) = &color.images else { continue };
+                let [raw, reference] = [&images.raw, &images.reference].map(|image| of(finger, image));
+                *color = ColorTouch::from_images(raw, reference).unwrap();
+            }
+        }
+        set
+    };
+    for colors in Colors::iter() {
+        let wrong = change(&|_, image| image.map(|pixel| colors.encoded(*pixel)));
+        let cure = ReadAs::ImageColors(colors);
+        assert_eq!(wrong.judged(), [cure.to_string()]);
+        assert!(wrong.stored(cure).judged().is_empty(), "{cure}");
+    }
+    let one = change(&|finger, image| if finger == 1 { Lay::Turn.turn().apply(image) } else { image.clone() });
+    assert_eq!(one.judged(), ["finger-image-turn"]);
+}
+
+#[test]
+fn a_cure_is_worth_what_it_does_to_the_poses() {
+    let sound = set(Condition::Plain, 4, &SimConfig::default());
+    let worth = |set: &Set| {
+        let felt = set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None });
+        super::worth(&felt.collect::<Vec<_>>(), &set.tools)
+    };
+    let (as_is, twice) = (worth(&sound), worth(&sound.stored(ReadAs::Scale(Depths::Imprints, 2.0))));
+    assert_eq!((as_is.tried, as_is.good, as_is.wrong), (4, 4, 0));
+    assert!(!as_is.is_worse_than(&as_is) && twice.is_worse_than(&as_is), "{as_is:?}, {twice:?}");
 }
 
 #[test]
