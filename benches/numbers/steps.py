@@ -48,6 +48,16 @@ class Bench:
         return folder
 
 
+    def without_names(self, named):
+        """The pictures of a folder, without the file that names their tools."""
+        folder = self.out / "unnamed"
+        folder.mkdir(exist_ok=True)
+        for picture in named.glob("*.png"):
+            (folder / picture.name).unlink(missing_ok=True)
+            (folder / picture.name).symlink_to(picture.resolve())
+        return folder
+
+
 @dataclass(frozen=True)
 class Step:
     """A measurement: a word, what it is, what it needs to be given, and the function that makes its figures."""
@@ -205,17 +215,18 @@ def trials(bench):
 
 
 def real(bench):
-    """Real pairs: as shipped, fitted and tuned on pairs that are left out, and what lies beside them."""
-    pairs = bench.places["real"]
+    """Real pairs: as shipped, fitted and tuned, on grasps and on tools that were left out, and what lies beside them."""
+    named = bench.places["real"]
     keys = ("before", "closed_form", "after", "pairs", "touches", "steps", "seconds", "fit_seconds")
     fits = {}
-    for steps in (0, 50, 200):
-        answer = bench.verb("adapt", pairs, *GENERATOR, "--tune", steps, "--validate", 3)
-        fits[str(steps)] = {key: answer[key] for key in keys}
+    # Whole tools are left out where they are named.
+    for left_out, pairs in (("tools", named), ("grasps", bench.without_names(named))):
+        answers = {steps: bench.verb("adapt", pairs, *GENERATOR, "--tune", steps, "--validate", 3) for steps in (0, 50)}
+        fits[left_out] = {str(steps): {key: answer[key] for key in keys} for steps, answer in answers.items()}
     fitted = bench.out / "fitted_real"
-    bench.verb("adapt", pairs, *GENERATOR, "--validate", 0, "--force", "--replace", "--out", fitted)
+    bench.verb("adapt", named, *GENERATOR, "--validate", 0, "--force", "--replace", "--out", fitted)
     demo = bench.verb("evaluate", "demo", *GENERATOR, "--bundle", fitted, "--grasps", 8)
-    return {"fits": fits, "stored": table(bench.verb("evaluate", pairs, *GENERATOR)), "demo": table(demo)}
+    return {"fits": fits, "stored": table(bench.verb("evaluate", named, *GENERATOR)), "demo": table(demo)}
 
 
 STEPS = (

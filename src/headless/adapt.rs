@@ -48,7 +48,7 @@ pub(super) struct AdaptArgs {
     limit: LimitArgs,
     #[command(flatten)]
     mask: MaskArgs,
-    /// The registration that gives the angles, where the data have poses.
+    /// The registration that gives the angles, where tools and cameras are known.
     #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
     registration: RegistrationChoice,
     #[command(flatten)]

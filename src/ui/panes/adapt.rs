@@ -198,7 +198,7 @@ const FIGURES: [FitColumn; 7] = [
     }),
     ("seen dB", "PSNR inside the GelSlim's window", |s| Some(format!("{:.1}", s.seen?.psnr_db?))),
     ("invented dB", "PSNR outside the GelSlim's window", |s| Some(format!("{:.1}", s.invented?.psnr_db?))),
-    ("angle °", "Mean error of the in-hand angle, degrees, where the data have poses", |s| {
+    ("angle °", "Mean error of the in-hand angle, degrees; of pictures from the measured imprint's", |s| {
         Some(format!("{:.1}", s.angle.as_ref()?.mean_deg?))
     }),
 ];

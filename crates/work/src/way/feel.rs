@@ -20,10 +20,11 @@ use crate::job::JobCx;
 use crate::labels::{ImprintOf, ImprintSource, PairLabels};
 use touch2touch_core::align::{Ask, Contacts, Register};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_core::sample::Sample;
+use touch2touch_core::sample::{Sample, Scale};
 use touch2touch_core::which_tool::{Candidate, which_tool};
 
 /// A pair with what is known of it.
@@ -86,6 +87,27 @@ impl Felt {
     /// Imprints that no recipe makes, such as the mean of several. Nobody can have drawn on them.
     pub fn of_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
         Self::with_imprints(&Recipe { hand: false, ..recipe.clone() }, imprints)
+    }
+
+    /// The pose that one from other imprints is compared with: the true one, or that of the measured imprints of pictures,
+    /// which know no true pose.
+    ///
+    /// # Errors
+    /// If the mask of the measured imprints cannot be made.
+    pub(crate) fn compared_with(
+        touch: Touch<'_>,
+        recipe: &Recipe,
+        models: &Models,
+        cx: &JobCx,
+    ) -> Result<Option<PlanarPose>, TaskError> {
+        if touch.sample.scale == Scale::Measured {
+            return Ok(touch.sample.grasp_from_object);
+        }
+        let imprints = touch.sample.pads.clone().map(|touch| Some(touch?.depth()?.imprint.clone()));
+        let recipe = Recipe { imprint: ImprintSource::Measured, generator: None, ..recipe.clone() };
+        let felt = Self::with_imprints(&recipe, imprints);
+        let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, cx)?;
+        Ok(felt.pose().ok().map(|found| found.grasp_from_object))
     }
 
     /// The part of it that another recipe makes just so.

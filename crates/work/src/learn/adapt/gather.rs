@@ -28,6 +28,8 @@ pub(super) struct FitTouch {
     pub(super) name: String,
     pub(super) tool: Option<String>,
     pub(super) pad: PadId,
+    /// Where the sample holds the touch, which is not its finger in picture pairs.
+    pub(super) of_sample: PadId,
     pub(super) scale: Scale,
     /// Meters, at the decoder's size and in its orientation.
     pub(super) prediction: DepthMap,
@@ -159,6 +161,7 @@ fn read(
         name: name.to_owned(),
         tool: tool.map(str::to_owned),
         pad,
+        of_sample: pad,
         scale: sample.scale,
         prediction: Grid::filled(0, 0, 0.0),
         unfitted: Grid::filled(0, 0, 0.0),

@@ -14,13 +14,13 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
-use touch2touch_core::sample::Scale;
+use touch2touch_core::units::angle_error;
 
 /// Most grasps that are posed: enough for a mean, and a matter of seconds.
 const MOST_GRASPS: usize = 100;
 
-/// The errors of the angle over grasps whose every touch has a picture; `None` where no truth, camera or CAD model is
-/// known. A grasp without a pose counts as a failure. `tools` are those of the data set.
+/// The errors of the angle over grasps whose every touch has a picture, from the true pose or that of the measured imprints;
+/// `None` where no camera or CAD model is known. A grasp without a pose counts as a failure. `tools` are those of the data set.
 pub(super) fn angles(
     dataset: &Dataset,
     setup: &AdaptSetup,
@@ -37,24 +37,25 @@ pub(super) fn angles(
         let own = &pictures[at..at + grasp.len()];
         at += grasp.len();
         let first = &grasp[0];
-        let (Some(tool), false, 0) = (&first.tool, first.scale == Scale::Assumed, number % stride) else { continue };
+        let (Some(tool), 0) = (&first.tool, number % stride) else { continue };
         cx.check(WHAT)?;
         let Ok(sample) = dataset.load(first.id) else { continue };
-        if sample.grasp_from_object.is_none() || sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
+        if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             continue;
         }
         let Some(tool) = tools.get(tool) else { continue };
-        let mut imprints = PerPad::<DepthMap>::default();
-        for (touch, picture) in grasp.iter().zip(own) {
-            imprints[touch.pad] = picture.map(|picture| touch.imprint(picture));
-        }
-        // What people drew on a prediction is of that picture, and each of these is another one.
         let nothing = PairLabels::default();
         let touch = Touch { dataset, pair: first.id, sample: &sample, tool: Ok(tool), labels: &nothing };
+        let cx = &cx.quiet();
+        let Some(truth) = Felt::compared_with(touch, &setup.recipe, models, cx)? else { continue };
+        let mut imprints = PerPad::<DepthMap>::default();
+        for (touch, picture) in grasp.iter().zip(own) {
+            imprints[touch.of_sample] = picture.map(|picture| touch.imprint(picture));
+        }
         let felt = Felt::of_imprints(&setup.recipe, imprints);
-        let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, &cx.quiet());
-        let error = felt.ok().and_then(|felt| felt.pose().ok()?.error_rad);
-        errors.push(error.unwrap_or(f64::NAN));
+        let felt = felt.reach_asking(touch, Stage::Pose, Ask::default(), models, cx);
+        let found = felt.ok().and_then(|felt| Some(felt.pose().ok()?.angle_rad));
+        errors.push(found.map_or(f64::NAN, |found| angle_error(found, truth.inverse().theta_rad)));
     }
     Ok((!errors.is_empty()).then(|| AngleSummary::from_errors(&errors)))
 }

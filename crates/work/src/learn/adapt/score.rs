@@ -36,7 +36,7 @@ pub struct Scored {
     pub seen: Option<Part>,
     /// Outside.
     pub invented: Option<Part>,
-    /// Of the in-hand angle, where the data have poses.
+    /// Of the in-hand angle, where tools and cameras are known: from the true pose, or from that of the measured imprints.
     #[serde(rename = "angle")]
     pub angle: Option<AngleSummary>,
 }

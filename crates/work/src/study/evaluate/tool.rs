@@ -18,9 +18,9 @@ use crate::infer::features::FeatureExtractor;
 use crate::io::caught::caught;
 use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
 use crate::job::JobCx;
-use crate::labels::{ImprintSource, PairLabels};
+use crate::labels::PairLabels;
 use crate::models;
-use crate::recipe::{Recipe, Stage};
+use crate::recipe::Stage;
 use crate::tool::load_tool;
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
@@ -270,22 +270,14 @@ impl<'a> Tool<'a> {
         }
     }
 
-    /// The error of the angle from both fingers and the verdict on the pose. Pictures know no true pose: what the measured
-    /// imprints give stands for it.
+    /// The error of the angle from both fingers and the verdict on the pose.
     fn angle(&self, felt: Felt, touch: Touch<'_>, models: &models::Models, cx: &JobCx) -> Result<Judged, String> {
         if touch.sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
             return Ok(Judged::default());
         }
-        let pose = |felt: Felt| felt.reach(touch, Stage::Pose, models, &cx.quiet()).map_err(|err| err.why);
-        let truth = match touch.sample.scale {
-            Scale::Measured => touch.sample.grasp_from_object,
-            Scale::Assumed => {
-                let measured = touch.sample.pads.clone().map(|touch| Some(touch?.depth()?.imprint.clone()));
-                let recipe = Recipe { imprint: ImprintSource::Measured, generator: None, ..felt.recipe().clone() };
-                pose(Felt::with_imprints(&recipe, measured))?.pose().ok().map(|found| found.grasp_from_object)
-            }
-        };
-        let felt = pose(felt)?;
+        let cx = &cx.quiet();
+        let truth = Felt::compared_with(touch, felt.recipe(), models, cx).map_err(|err| err.why)?;
+        let felt = felt.reach(touch, Stage::Pose, models, cx).map_err(|err| err.why)?;
         let found = felt.pose().ok();
         let both = found.zip(truth);
         let apart = both.map(|(found, truth)| PoseDifference::between(found.grasp_from_object, truth));
