@@ -33,6 +33,18 @@ pub fn pictures() -> Option<PathBuf> {
     std::fs::create_dir_all(&folder).ok().map(|()| folder)
 }
 
+/// The folders in which this computer's fonts lie, the user's own first.
+pub(crate) fn fonts() -> Vec<PathBuf> {
+    let own = [dirs::font_dir(), dirs::home_dir().map(|home| home.join(".fonts"))];
+    let shared = std::env::var_os("XDG_DATA_DIRS").filter(|dirs| !dirs.is_empty());
+    let shared = shared.unwrap_or_else(|| "/usr/local/share:/usr/share".into());
+    let of_system = ["/System/Library/Fonts", "/Library/Fonts", "C:\\Windows\\Fonts"].map(PathBuf::from);
+    let shared: Vec<PathBuf> = std::env::split_paths(&shared).map(|folder| folder.join("fonts")).collect();
+    let mut all: Vec<PathBuf> = own.into_iter().flatten().chain(shared).chain(of_system).collect();
+    all.retain(|folder| folder.is_dir());
+    all
+}
+
 /// Asks the system to show a file's folder, or a folder, in its own window; returns at once.
 ///
 /// # Errors

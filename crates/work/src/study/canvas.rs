@@ -1,6 +1,7 @@
 //! One drawing, two files: SVG text and PNG pixels. Lines and letters are drawn, pictures are laid below them.
 
 use std::path::Path;
+use std::sync::Once;
 
 use anyhow::Context as _;
 use plotters::coord::Shift;
@@ -12,7 +13,7 @@ use crate::io::{atomic, images};
 use touch2touch_core::grid::{Grid, RgbGrid};
 
 /// Family of the letters; a viewer of the SVG takes its own.
-pub(crate) const FAMILY: &str = "sans-serif";
+const FAMILY: &str = "sans-serif";
 /// Pixels of the drawing per pixel of the PNG along one side: their mean smooths edges, which the backend does not.
 pub(crate) const FINE: usize = 2;
 
@@ -52,6 +53,7 @@ pub struct Paper<'a, B: DrawingBackend> {
     /// The area.
     pub area: &'a DrawingArea<B, Shift>,
     scale: f64,
+    family: &'static str,
 }
 
 impl<B: DrawingBackend> Paper<'_, B> {
@@ -75,9 +77,14 @@ impl<B: DrawingBackend> Paper<'_, B> {
         color.stroke_width(self.wide(units))
     }
 
+    /// The font with letters of a height in units.
+    pub(crate) fn font(&self, units: f64) -> FontDesc<'static> {
+        (self.family, units * self.scale).into_font()
+    }
+
     /// Letters of a height in units.
     pub fn letters(&self, units: f64, color: RGBColor) -> TextStyle<'static> {
-        (FAMILY, units * self.scale).into_font().color(&color)
+        self.font(units).color(&color)
     }
 
     /// A line between places in units.
@@ -92,21 +99,45 @@ impl<B: DrawingBackend> Paper<'_, B> {
     }
 }
 
-fn draw<B: DrawingBackend, D: Drawing>(backend: B, scale: f64, drawing: &D) -> anyhow::Result<()>
+fn draw<B: DrawingBackend, D: Drawing>(backend: B, scale: f64, family: &'static str, drawing: &D) -> anyhow::Result<()>
 where
     B::ErrorType: 'static,
 {
     register_font(FAMILY, FontStyle::Normal, fonts::REGULAR).ok().context("the built-in font cannot be read")?;
     let area = backend.into_drawing_area();
-    drawing.draw(&Paper { area: &area, scale })?;
+    drawing.draw(&Paper { area: &area, scale, family })?;
     Ok(area.present()?)
+}
+
+/// What is drawn, without the pictures and the ground.
+fn lines_and_letters<D: Drawing>(drawing: &D) -> anyhow::Result<String> {
+    let mut out = String::new();
+    let [width, height] = drawing.size();
+    draw(SVGBackend::with_string(&mut out, (width, height)), 1.0, FAMILY, drawing)?;
+    Ok(out)
+}
+
+/// The family that has the letters of a drawing: where some are East Asian, a font of this computer.
+fn family<D: Drawing>(drawing: &D) -> anyhow::Result<&'static str> {
+    static SAID: Once = Once::new();
+    let letters = fonts::east_asian(&lines_and_letters(drawing)?);
+    if letters.is_empty() {
+        return Ok(FAMILY);
+    }
+    let Some(font) = fonts::covering(&letters) else {
+        let lacking =
+            "Chinese, Japanese or Korean letters are boxes in the PNG, because no font of this computer has them";
+        SAID.call_once(|| log::warn!("{lacking}. {}", fonts::ADVICE));
+        return Ok(FAMILY);
+    };
+    register_font(font.name, FontStyle::Normal, font.bytes).ok().context("a font of this computer cannot be read")?;
+    Ok(font.name)
 }
 
 /// The drawing as SVG text; pictures lie in it as PNG files.
 pub fn svg<D: Drawing>(drawing: &D) -> anyhow::Result<String> {
-    let mut out = String::new();
     let [width, height] = drawing.size();
-    draw(SVGBackend::with_string(&mut out, (width, height)), 1.0, drawing)?;
+    let mut out = lines_and_letters(drawing)?;
     // XML has no place for control letters, which a name may hold.
     out.retain(|letter| !letter.is_control() || letter == '\n');
     // Behind the opening tag, and so below everything else.
@@ -135,7 +166,7 @@ pub fn pixels<D: Drawing>(drawing: &D, scale: f64) -> anyhow::Result<RgbGrid> {
     for raster in drawing.rasters() {
         lay(raster, scale, &mut bytes, fine);
     }
-    draw(BitMapBackend::with_buffer(&mut bytes, (fine[0] as u32, fine[1] as u32)), scale, drawing)?;
+    draw(BitMapBackend::with_buffer(&mut bytes, (fine[0] as u32, fine[1] as u32)), scale, family(drawing)?, drawing)?;
     Ok(RgbGrid::from_fn(w, h, |x, y| {
         std::array::from_fn(|c| {
             let at = |i: usize| bytes[((y * FINE + i / FINE) * fine[0] + x * FINE + i % FINE) * 3 + c];
@@ -210,6 +241,30 @@ mod tests {
         assert_eq!(image[(110, 70)], [255.0; 3]);
         let ink = (0..60).flat_map(|x| (50..80).map(move |y| (x, y))).filter(|&p| image[p][0] < 128.0).count();
         assert!(ink > 40, "the text has ink: {ink}");
+    }
+
+    struct Word(&'static str);
+
+    impl Drawing for Word {
+        fn size(&self) -> [u32; 2] {
+            [40, 40]
+        }
+
+        fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
+            paper.text([5.0, 5.0], &paper.letters(24.0, BLACK), self.0)
+        }
+    }
+
+    #[test]
+    fn east_asian_letters_are_drawn_where_this_computer_has_a_font() {
+        for pair in [["\u{6f22}", "\u{4e00}"], ["\u{304b}", "\u{3044}"], ["\u{d55c}", "\u{c544}"]] {
+            // Letters that no font has are the same box.
+            let [a, b] = pair.map(|word| pixels(&Word(word), 1.0).unwrap());
+            let letters: Vec<char> = pair.concat().chars().collect();
+            assert_eq!(a != b, fonts::covering(&letters).is_some(), "{pair:?}");
+            assert!(svg(&Word(pair[0])).unwrap().contains(pair[0]));
+        }
+        assert_ne!(pixels(&Word("a"), 1.0).unwrap(), pixels(&Word("b"), 1.0).unwrap());
     }
 
     struct Tiled(Vec<Raster>);

@@ -351,8 +351,8 @@ impl Drawing for FigureLayout {
             for (line, x, color, letters) in
                 [(&lines[0], MARGIN + 5.0, weak, LETTERS[1]), (&lines[1], MARGIN + 17.0, ink, LETTERS[0])]
             {
-                let style = (super::super::canvas::FAMILY, letters * paper.scale())
-                    .into_font()
+                let style = paper
+                    .font(letters)
                     .transform(FontTransform::Rotate270)
                     .color(&color)
                     .pos(Pos::new(HPos::Center, VPos::Center));
