@@ -7,9 +7,10 @@ use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Pane, PredictCommand, TasksCommand};
+use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
+use touch2touch::app::library::Place;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{GelView, Theme, Workspace};
@@ -244,14 +245,29 @@ fn no_pane_asks_for_what_it_does_not_show() {
 }
 
 #[test]
-fn a_wrong_path_is_said_once_and_what_is_open_stays() {
+fn a_wrong_path_is_said_where_it_was_typed_and_what_is_open_stays() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     let pairs = rig.harness.state().state().library.pairs().len();
     rig.key(Modifiers::CTRL, Key::O);
     rig.harness.get_by_label("Path").type_text("/nowhere/at/all");
     rig.harness.step();
     rig.settle();
+    rig.harness.key_press(Key::Enter);
+    rig.settle();
+    rig.harness.get_by_label("There is nothing at /nowhere/at/all");
+    // It can be typed on: the box has the focus.
+    for letter in ["/", "x"] {
+        rig.harness.event(eframe::egui::Event::Text(letter.into()));
+        rig.settle();
+    }
     rig.click("Use this path");
+    rig.harness.get_by_label("There is nothing at /nowhere/at/all/x");
+    rig.harness.key_press(Key::Escape);
+    rig.settle();
+    assert!(rig.harness.query_by_label("Use this path").is_none());
+    assert_eq!(rig.harness.state().state().log.unseen().count(), 0);
+    // What was opened before and is gone is said in the log.
+    rig.send(LibraryCommand::Open(Place::Path("/nowhere/at/all".into())));
     rig.shoot("test-notice");
     let state = rig.harness.state().state();
     assert_eq!(state.library.pairs().len(), pairs);
