@@ -9,7 +9,7 @@ mod window;
 
 pub use parts::{theme, widget};
 pub use window::app;
-pub use window::app::{Options, StudioApp};
+pub use window::app::{Loss, Options, StudioApp};
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -19,6 +19,8 @@ use eframe::egui_wgpu::WgpuSetup;
 
 use crate::app::services::live::LiveServices;
 use crate::gpu::Gpu;
+use touch2touch_work::io::caught::caught;
+use window::lost::start_again;
 
 /// Size of the window on the first start, points. eframe makes it smaller where the screen is.
 const WINDOW: [f32; 2] = [1600.0, 960.0];
@@ -54,13 +56,20 @@ pub fn run(open: Option<PathBuf>, reset: bool) -> Result<(), String> {
     }
     let mut options = Options::new(Arc::new(LiveServices::new()), open);
     options.reset = reset;
-    eframe::run_native("touch2touch", native, Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))))).map_err(
-        |err| {
+    let loss = options.loss.clone();
+    let start: eframe::AppCreator<'_> = Box::new(move |cc| Ok(Box::new(StudioApp::new(cc, options))));
+    // A frame on a device that is lost may panic.
+    let ended = caught(|| eframe::run_native("touch2touch", native, start));
+    if let Some(why) = loss.why() {
+        return Err(start_again(why));
+    }
+    ended
+        .map_err(|bug| format!("The window ended by an internal error, which is a bug; everything is saved: {bug}"))?
+        .map_err(|err| {
             format!(
                 "The window cannot be opened: {err}. The studio needs a display (X11 or Wayland) and a Vulkan or GL \
                  driver (on Debian or Ubuntu: mesa-vulkan-drivers); the command line works without either (touch2touch \
                  --help)."
             )
-        },
-    )
+        })
 }

@@ -67,8 +67,11 @@ impl Gpu {
     pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
         let required_limits = match adapter.get_info().backend {
             wgpu::Backend::Gl => adapter.limits(),
-            // Room for the pictures of large screens.
-            _ => wgpu::Limits { max_texture_dimension_2d: 8192, ..wgpu::Limits::default() },
+            // Room for a window as large as the adapter can draw.
+            _ => {
+                let max_texture_dimension_2d = adapter.limits().max_texture_dimension_2d;
+                wgpu::Limits { max_texture_dimension_2d, ..wgpu::Limits::default() }
+            }
         };
         wgpu::DeviceDescriptor { label: Some("touch2touch window"), required_limits, ..Default::default() }
     }

@@ -6,6 +6,7 @@ pub(crate) mod bars;
 pub(crate) mod export;
 pub(crate) mod fuzzy;
 pub(crate) mod layout;
+pub(crate) mod lost;
 pub(crate) mod palette;
 pub(crate) mod pane;
 pub(crate) mod screenshot;

@@ -6,6 +6,9 @@ use touch2touch::app::settings::prefer;
 use eframe::egui::{Event, Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::labels::{Question, Review};
+use touch2touch::app::library::Place;
+use touch2touch::app::services::Services as _;
+use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Workspace;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
@@ -121,6 +124,30 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
     let found = recover(&dataset, &labels, &config.join("recovered"));
     assert_eq!((found.pairs.len(), found.failed), (1, Vec::new()));
     assert_eq!(labels.reviews().states.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+}
+
+#[test]
+fn a_lost_graphics_device_closes_the_window_unasked_with_everything_kept() {
+    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
+    stick(&mut rig);
+    let pair = rig.harness.state().state().pair_name().to_owned();
+    rig.harness.state().loss().say("the driver crashed");
+    let answers = rig.step_answering();
+    assert!(
+        answers.contains(&ViewportCommand::Close) && !answers.contains(&ViewportCommand::CancelClose),
+        "{answers:?}"
+    );
+    assert_eq!(rig.question(), None);
+    // All is on the disk although the process may die now.
+    let dataset = Dataset::open(&rig.data).unwrap();
+    let settings = LiveServices::with_config_folder(Some(rig.config.clone())).load_settings().0;
+    assert_eq!((settings.last.pair, settings.last.place), (pair, Some(Place::Path(rig.data.clone()))));
+    std::fs::remove_file(rig.data.join(FOLDER)).unwrap();
+    let labels = Labels::of(&dataset);
+    assert_eq!(recover(&dataset, &labels, &rig.config.join("recovered")).pairs.len(), 1);
+    assert_eq!(labels.reviews().states.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+    // Frames may come after it.
+    rig.step_answering();
 }
 
 #[test]

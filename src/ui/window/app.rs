@@ -12,13 +12,14 @@ use eframe::egui::{self, ThemePreference, ViewportCommand};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
 
+pub use super::lost::Loss;
 use super::pane::{Docking, Panes};
 use super::screenshot::Shot;
-use super::{about, bars, export, layout, palette, pane, shortcuts, unsaved};
+use super::{about, bars, export, layout, lost, palette, pane, shortcuts, unsaved};
 use crate::app::action::Action;
 use crate::app::command::{
-    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, UiRequest,
-    UnsavedCommand, ViewCommand,
+    Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand,
+    UiRequest, UnsavedCommand, ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
 use crate::app::export::Output;
@@ -36,10 +37,13 @@ use crate::ui::panes::log as log_pane;
 use crate::ui::parts::cx::{Cx, Shared};
 use crate::ui::parts::dialogs::Purpose;
 use crate::ui::parts::kept::KeptFrame;
+use crate::ui::parts::letters;
 use crate::ui::parts::scene_view::Device;
 use crate::ui::parts::theme;
 use crate::ui::parts::theme::{DARK, LIGHT};
 use touch2touch_core::rig::SensorKind;
+use touch2touch_work::error::TaskError;
+use touch2touch_work::fonts;
 use touch2touch_work::io::caught::caught;
 
 /// Options that the studio is started with.
@@ -57,6 +61,8 @@ pub struct Options {
     pub reset: bool,
     /// Folder that pictures are written to; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
+    /// Whether the graphics device was lost: whoever opened the window asks it when the window is closed.
+    pub loss: Loss,
     /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::kept`] saves).
     pub whole_frames: bool,
 }
@@ -71,6 +77,7 @@ impl Options {
             native_dialogs: true,
             reset: false,
             screenshots: None,
+            loss: Loss::default(),
             whole_frames: false,
         }
     }
@@ -102,12 +109,23 @@ pub struct StudioApp {
     ended: bool,
     shot_sender: Sender<(Shot, Arc<egui::ColorImage>)>,
     shots: Receiver<(Shot, Arc<egui::ColorImage>)>,
+    loss: Loss,
+    /// Letters that no font has; the first is said.
+    lacking: Receiver<char>,
+    lacks_letters: bool,
 }
 
 impl StudioApp {
     /// Gives the window its look, takes its graphics device and starts reading.
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::install(&cc.egui_ctx);
+        let lacking = letters::install(&cc.egui_ctx);
+        if let Some(state) = &cc.wgpu_render_state {
+            options.loss.watch(&state.device, &cc.egui_ctx);
+            // A larger window could not be drawn.
+            let most = state.device.limits().max_texture_dimension_2d as f32 / cc.egui_ctx.pixels_per_point();
+            cc.egui_ctx.send_viewport_cmd(ViewportCommand::MaxInnerSize(egui::Vec2::splat(most)));
+        }
         let device = match &cc.wgpu_render_state {
             Some(state) => Device::new(state).map_err(|e| e.to_string()),
             None => Err("The window was opened without a graphics device that can draw 3D.".to_owned()),
@@ -131,6 +149,7 @@ impl StudioApp {
         let place = options.open.map(Place::Path);
         let requests = runtime.start(&mut state, place);
         let mut inbox: Vec<Command> = requests.into_iter().map(|request| ViewCommand::Ui(request).into()).collect();
+        inbox.extend(lost::greeting().map(|said| TasksCommand::Report(said).into()));
         if options.reset {
             inbox.push(Command::Settings(SettingsCommand::ResetSettings));
         }
@@ -155,6 +174,9 @@ impl StudioApp {
             ended: false,
             shot_sender,
             shots,
+            loss: options.loss,
+            lacking,
+            lacks_letters: false,
         }
     }
 
@@ -166,6 +188,11 @@ impl StudioApp {
     /// Executes a command before the next frame. For tests and the screenshot tool.
     pub fn push(&mut self, command: impl Into<Command>) {
         self.inbox.push(command.into());
+    }
+
+    /// Whether the graphics device was lost. For tests.
+    pub fn loss(&self) -> &Loss {
+        &self.loss
     }
 
     /// Pictures sent to the graphics card so far.
@@ -413,8 +440,13 @@ impl StudioApp {
         }
     }
 
-    /// Folders and files dropped on the window, and a screenshot that arrived.
+    /// Folders and files dropped on the window, a screenshot that arrived, and letters that no font has.
     fn outside(&mut self, ctx: &egui::Context) {
+        if !self.lacks_letters && self.lacking.try_recv().is_ok() {
+            self.lacks_letters = true;
+            let why = "no font of this computer has Chinese, Japanese or Korean letters: they are shown as boxes";
+            self.inbox.push(TasksCommand::Report(TaskError::new("Letters", why).with_hint(fonts::ADVICE)).into());
+        }
         let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());
         if let Some(path) = dropped.into_iter().next() {
             self.inbox.push(Command::Library(LibraryCommand::Open(Place::Path(path))));
@@ -450,6 +482,13 @@ fn step_scale(held: egui::Modifiers) -> f64 {
 
 impl eframe::App for StudioApp {
     fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        if self.loss.why().is_some() {
+            // Nothing can be asked in a window that is not drawn.
+            self.end();
+            self.leaving = true;
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+            return;
+        }
         let doc = &self.state.document;
         let open = !doc.unsaved.is_empty() || doc.stroke.is_some();
         if open && !self.leaving && ctx.input(|i| i.viewport().close_requested()) {

@@ -156,6 +156,40 @@ mod tests {
         }
     }
 
+    /// Of an input method: the letters of a composition arrive as keys too on some desktops.
+    #[test]
+    fn letters_of_a_composition_are_the_texts_and_trigger_nothing() {
+        let (ctx, keys) = (egui::Context::default(), Bindings::default());
+        let (mut text, mut got) = (String::new(), Vec::new());
+        let mut frame = |events: Vec<egui::Event>| {
+            let raw = egui::RawInput { events, ..egui::RawInput::default() };
+            let mut output = ctx.run_ui(raw, |ui| {
+                got.extend(pressed(ui.ctx(), &keys, Place { labeling: true, ..Place::default() }, |_| true));
+                ui.text_edit_singleline(&mut text).request_focus();
+            });
+            output.textures_delta.clear();
+            text.clone()
+        };
+        let key = |key| egui::Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        let ime = |event| egui::Event::Ime(event);
+        let preedit = |text: &str| ime(egui::ImeEvent::Preedit { text: text.into(), active_range_chars: None });
+        frame(Vec::new());
+        for letters in ["n", "ni", "nih"] {
+            frame(vec![preedit(letters), key(EKey::B), key(EKey::C), key(EKey::H)]);
+        }
+        frame(vec![preedit("nihao"), key(EKey::Enter)]);
+        let typed = frame(vec![ime(egui::ImeEvent::Commit("né".into()))]);
+        assert_eq!((typed.as_str(), got), ("né", Vec::new()));
+        // Without a text these keys are actions.
+        assert!([EKey::B, EKey::C, EKey::H].iter().all(|key| !press(&keys, *key, Modifiers::NONE).is_empty()));
+    }
+
     #[test]
     fn a_key_triggers_its_action_and_no_other() {
         let mut keys = Bindings::default();
