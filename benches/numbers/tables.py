@@ -158,7 +158,9 @@ def doctor(steps):
     found = steps["doctor"]
     return (f"{found['spoilt_sets']} data sets of {found['pairs']} pairs, stored wrongly in {found['ways']} ways: "
             f"{100 * found['named_share']:.1f} % named rightly and nothing else, {100 * found['noticed_share']:.1f} % noticed. "
-            f"{found['sound_sets']} sound ones: {found['false_alarms']} false alarms.")
+            f"{found['near_sets']} slightly off in {found['near_ways']} ways: of {found['near_noticed']} something is said, of "
+            f"{found['near_sets'] - found['near_named']} something wrong. {found['sound_sets']} sound ones: {found['false_alarms']} false "
+            f"alarms. {found['worsened']} sets are worse when they are read as was said.")
 
 
 def dataset(steps):
