@@ -159,7 +159,7 @@ def verdict(bench):
 
 def doctor(bench):
     other = ("--cases", bench.places["other"]) if bench.places["other"] else ()
-    answer = bench.bench("doctor", "doctor", "--sets", "2", "--sound", "4", "--seed", "77", *other)
+    answer = bench.bench("doctor", "doctor", "--sets", "1", "--sound", "3", "--seed", "77", *other)
     keys = ("pairs", "named_share", "noticed_share", "sound_sets", "false_alarms", "worsened")
     counts = {f"{kind}_{key}": sum(row[key] for row in answer[kind]) for kind in ("spoilt", "near") for key in ("sets", "named", "noticed")}
     return {key: answer[key] for key in keys} | counts | {"ways": len(answer["spoilt"]), "near_ways": len(answer["near"])}

@@ -93,7 +93,8 @@ fn unshare(_file: &Path) -> std::io::Result<()> {
     Ok(())
 }
 
-#[cfg(all(test, unix))]
+#[cfg(unix)]
+#[cfg(test)]
 mod tests {
     use super::*;
     use crate::io::masks::{StoredMask, StoredReview};
