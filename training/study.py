@@ -2,7 +2,7 @@
 
 Trains every method on the same shards, with the same number of samples from the same seed in the same order, has the
 product score it (`touch2touch evaluate`), and adds a row to FILE. Rows that are in FILE are not made again; what lies in DIR
-is gone on from: stopped at any time, it loses two minutes at most. `./study --pages` makes tables of docs/study.json.
+is gone on from: stopped at any time, it loses two minutes at most. Tables of all rows lie beside FILE, as FILE.md.
 """
 
 import argparse
@@ -12,6 +12,7 @@ from pathlib import Path
 
 import torch
 
+from benches.numbers import study_tables
 from benches.program import commit, machine, today
 
 from .place import keep_freed_memory
@@ -98,6 +99,7 @@ def main():
                 print(f"{name}: {row} is left out: {why}", file=sys.stderr, flush=True)
                 continue
             print(f"{name}: {row} in {time.monotonic() - begun:.0f} s", flush=True)
+    Path(f"{args.json}.md").write_text(study_tables.tables(rows.read()))
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 A step whose figures are kept in docs/numbers.json is not made again unless it is named. `--real`, `--other` and `--python`
 give what does not come with the repository; the steps that need it are left out otherwise, with the figures that are kept.
-`--study` adds rows to the trials.
 """
 
 import argparse
@@ -17,7 +16,6 @@ from . import pages
 from .steps import STEPS, Bench, rounded
 
 KEPT = ROOT / "docs" / "numbers.json"
-STUDY = ROOT / "docs" / "study.json"
 
 
 def read(path):
@@ -41,7 +39,7 @@ def listed(kept):
 
 
 def measure(step, args, kept):
-    places = {name: getattr(args, name) for name in ("real", "other", "python", "study")}
+    places = {name: getattr(args, name) for name in ("real", "other", "python")}
     bench = Bench(Path(args.programs).resolve(), Path(args.out).resolve(), places)
     begun, load = time.monotonic(), machine()
     figures = rounded(step.figures(bench))
@@ -55,7 +53,6 @@ def parser():
     parser.add_argument("--real", type=Path, metavar="DIR", help="folder of real pairs")
     parser.add_argument("--other", type=Path, metavar="DIR", help="folder of cases with known truth by another simulator")
     parser.add_argument("--python", type=Path, metavar="PY", help="Python with open3d and small_gicp, the peers of the registration")
-    parser.add_argument("--study", type=Path, metavar="DIR", help="folder of `training.study`, whose methods are tried too in the trials")
     parser.add_argument("--out", default=ROOT / "target" / "study", help="folder of what is made on the way (default: target/study)")
     parser.add_argument("--programs", default=ROOT / "target" / "release", help="folder of the programs (default: target/release)")
     parser.add_argument("--list", action="store_true", help="say which steps there are, how long each took and when, and make nothing")
@@ -71,7 +68,7 @@ def main():
     if args.list:
         return listed(kept)
     if args.check:
-        said = pages.wrong(steps(), kept, read(STUDY))
+        said = pages.wrong(steps(), kept)
         print("\n".join(said) or "the pages say what was measured")
         return sys.exit(bool(said))
     unknown = set(args.steps) - {step.name for step in STEPS}
@@ -95,7 +92,7 @@ def main():
         kept = read(KEPT) | {step.name: kept[step.name]}
         keep({s.name: kept[s.name] for s in STEPS if s.name in kept})
         print(f"{step.name}: {kept[step.name]['made']['seconds']} s", flush=True)
-    pages.write(steps(), kept, read(STUDY))
+    pages.write(steps(), kept)
     sys.exit(failed)
 
 

@@ -3,8 +3,6 @@
 from dataclasses import dataclass
 from typing import Callable
 
-from training.study_runs import Training
-
 from ..program import MODELS, Program
 
 GENERATOR = ("--bundle", MODELS / "generator_ldm")
@@ -185,32 +183,18 @@ SENSORS = {"nominal": (), "drawn": ("--sensors", "77"), "other_gelslims": ("--ge
 ROOMS_M = (0.0005, 0.002, 0.005)
 
 
-def tried(method, name):
+def tried(method):
     """A row of the trials."""
     sweep = {f"{1000 * s['clearance_m']:g}": s["success"] for s in method["sweep"] if any(abs(s["clearance_m"] - r) < 1e-9 for r in ROOMS_M)}
-    return {"method": name or method["method"], "mean_deg": method["angle"]["mean_deg"], "success": method["success"], "sweep": sweep,
+    return {"method": method["method"], "mean_deg": method["angle"]["mean_deg"], "success": method["success"], "sweep": sweep,
             "with_verdict": method["with_verdict"]}
 
 
-# Methods of the study that are tried beside the shipped generator, and the samples that each was given.
-BESIDE, SAMPLES = ("latent diffusion", "VQ-VAE"), 20_000
-
-
-def beside(bench):
-    """Bundles of the study by the names of their rows; none where its folder was not named."""
-    folder = bench.places["study"]
-    bundle = lambda method: folder / "runs" / Training(method).name() / str(SAMPLES) / "bundle"
-    return {f"{method}, {SAMPLES:,} samples": bundle(method) for method in BESIDE} if folder else {}
-
-
 def trials(bench):
-    found, others = {}, beside(bench)
-    bundles = [word for bundle in others.values() for word in ("--bundle", bundle)]
-    # Rows are: measured, the shipped generator, these, the floor.
-    names = dict(enumerate(others, 2))
+    found = {}
     for sensors, words in SENSORS.items():
-        answer = bench.verb("trials", *SHIPPED, *bundles, *words)
-        found[sensors] = {tool["tool"]: [tried(method, names.get(at)) for at, method in enumerate(tool["methods"])] for tool in answer["tools"]}
+        answer = bench.verb("trials", *SHIPPED, *words)
+        found[sensors] = {tool["tool"]: [tried(method) for method in tool["methods"]] for tool in answer["tools"]}
         found["published"] = answer["published"]
     return found
 

@@ -1,4 +1,4 @@
-"""The rows of `docs/study.json` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
+"""The rows of `training.study` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
 
 from training import study_runs
 from training.study_runs import CONDITIONS, REFERENCE, SHIFTS, test_set

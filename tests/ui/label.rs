@@ -461,8 +461,10 @@ fn masks_are_exported_as_annotations_and_imported_again_by_clicks() {
 
     // What cannot be read is said in the form, with its place.
     rig.clicks(&["Open", "Import masks…"]);
-    rig.take_to(&rig.data.join("nowhere"));
-    rig.harness.get_by_label_contains("no such file or folder");
+    let empty = rig.data.join("empty");
+    std::fs::create_dir(&empty).unwrap();
+    rig.take_to(&empty);
+    rig.harness.get_by_label_contains("there are no masks here");
     rig.shoot("import-refused");
     rig.clicks(&["Close"]);
     assert!(rig.harness.state().state().export.importing.is_none());

@@ -110,6 +110,7 @@ pub struct StudioApp {
     shot_sender: Sender<(Shot, Arc<egui::ColorImage>)>,
     shots: Receiver<(Shot, Arc<egui::ColorImage>)>,
     loss: Loss,
+    _watched: Option<lost::Watched>,
     /// Letters that no font has; the first is said.
     lacking: Receiver<char>,
     lacks_letters: bool,
@@ -120,12 +121,12 @@ impl StudioApp {
     pub fn new(cc: &eframe::CreationContext<'_>, options: Options) -> Self {
         theme::install(&cc.egui_ctx);
         let lacking = letters::install(&cc.egui_ctx);
-        if let Some(state) = &cc.wgpu_render_state {
-            options.loss.watch(&state.device, &cc.egui_ctx);
+        let watched = cc.wgpu_render_state.as_ref().map(|state| {
             // A larger window could not be drawn.
             let most = state.device.limits().max_texture_dimension_2d as f32 / cc.egui_ctx.pixels_per_point();
             cc.egui_ctx.send_viewport_cmd(ViewportCommand::MaxInnerSize(egui::Vec2::splat(most)));
-        }
+            options.loss.watch(&state.device, &cc.egui_ctx)
+        });
         let device = match &cc.wgpu_render_state {
             Some(state) => Device::new(state).map_err(|e| e.to_string()),
             None => Err("The window was opened without a graphics device that can draw 3D.".to_owned()),
@@ -175,6 +176,7 @@ impl StudioApp {
             shot_sender,
             shots,
             loss: options.loss,
+            _watched: watched,
             lacking,
             lacks_letters: false,
         }

@@ -20,8 +20,8 @@ const TOO_SOON: Duration = Duration::from_secs(30);
 pub struct Loss(Arc<OnceLock<String>>);
 
 impl Loss {
-    /// Listens to a device.
-    pub(crate) fn watch(&self, device: &wgpu::Device, ctx: &Context) {
+    /// Listens to a device as long as what is returned is kept.
+    pub(crate) fn watch(&self, device: &wgpu::Device, ctx: &Context) -> Watched {
         let (loss, ctx) = (self.clone(), ctx.clone());
         device.set_device_lost_callback(move |reason, why| {
             // A window that closes destroys its device.
@@ -30,6 +30,7 @@ impl Loss {
                 ctx.request_repaint();
             }
         });
+        Watched(device.clone())
     }
 
     /// The device is lost.
@@ -42,6 +43,16 @@ impl Loss {
     /// Why the device was lost, if it was.
     pub(crate) fn why(&self) -> Option<&str> {
         self.0.get().map(String::as_str)
+    }
+}
+
+/// A device that is listened to. Its callback holds the window's context, which holds what the device made: it ends with the
+/// window, or neither would ever be freed.
+pub(crate) struct Watched(wgpu::Device);
+
+impl Drop for Watched {
+    fn drop(&mut self) {
+        self.0.set_device_lost_callback(|_, _| {});
     }
 }
 
