@@ -12,7 +12,7 @@ use crate::units::counted;
 
 /// Fewest pairs that tell the fingers apart.
 const FEWEST: usize = 3;
-/// Share of the pairs in which the sound finger is right, and in which the other one may be.
+/// Share of the pairs in which the sound finger is right and the other one contradicts the touch, and in which that may be right.
 const RIGHT: f64 = 0.5;
 const STILL_RIGHT: f64 = 0.2;
 
@@ -20,9 +20,11 @@ const STILL_RIGHT: f64 = 0.2;
 struct Alone {
     pad: PadId,
     samples: Vec<Sample>,
-    /// Pairs that can be registered by it, and those whose pose is good and near the truth.
+    /// Pairs that can be registered by it, those whose pose is good and near the truth, and those whose pose contradicts the
+    /// touch: a bare shaft leaves the place open and does neither.
     tried: usize,
     right: usize,
+    contradicting: usize,
 }
 
 impl Alone {
@@ -30,8 +32,8 @@ impl Alone {
         let samples: Vec<Sample> = felt.iter().map(|felt| alone(felt.sample, pad)).collect();
         let each = felt.iter().zip(&samples).map(|(felt, sample)| Felt { sample, ..*felt });
         let registered = Registered::of(&each.collect::<Vec<_>>(), models);
-        let (tried, right) = (registered.tried(), registered.right());
-        Self { pad, samples, tried, right }
+        let (tried, right, contradicting) = (registered.tried(), registered.right(), registered.contradicting());
+        Self { pad, samples, tried, right, contradicting }
     }
 
     /// Pairs in which it felt something.
@@ -50,7 +52,11 @@ pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, m
     let rig = &felt.first()?.sample.rig;
     let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
-    let wrong = fingers.iter().find(|finger| finger.tried >= FEWEST && !finger.is_at_least(STILL_RIGHT))?;
+    let is_wrong = |finger: &&Alone| {
+        let contradicts = finger.contradicting as f64 >= RIGHT * finger.tried as f64;
+        finger.tried >= FEWEST && contradicts && !finger.is_at_least(STILL_RIGHT)
+    };
+    let wrong = fingers.iter().find(is_wrong)?;
     let [name, other] = [wrong, sound].map(|finger| format!("{} finger", rig.pad_name(finger.pad)));
     let touched = wrong.touched();
     if (touched as f64) < STILL_RIGHT * wrong.tried as f64 {

@@ -168,6 +168,7 @@ pub(super) struct Registered<'m, 'a> {
     tried: usize,
     asked: usize,
     wrong: usize,
+    contradicting: usize,
     /// Largest error of a registered angle, radians; 0 where no truth is known.
     largest_error_rad: f64,
 }
@@ -189,11 +190,20 @@ impl<'m, 'a> Registered<'m, 'a> {
             Some(Sure { at: *at, truth: sample.grasp_from_object, found })
         });
         let errors = tried.iter().zip(&found).filter_map(|((_, sample, _), found)| {
-            let (truth, (_, found)) = sample.grasp_from_object.zip(*found)?;
-            Some(angle_error(found.theta_rad, truth.theta_rad))
+            let truth = sample.grasp_from_object?;
+            // No pose is no smaller error than any.
+            Some(found.map_or(std::f64::consts::PI, |(_, found)| angle_error(found.theta_rad, truth.theta_rad)))
         });
-        let largest_error_rad = errors.fold(0.0, f64::max);
-        Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong, largest_error_rad }
+        let largest_error_rad = errors.clone().fold(0.0, f64::max);
+        let far = errors.filter(|error| *error > FAR_RAD).count();
+        let lost = found.iter().filter(|found| found.is_none_or(|(grade, _)| grade == Grade::Wrong)).count();
+        let contradicting = far.max(lost);
+        Self { sure: sure.collect(), models, tried: tried.len(), asked, wrong, contradicting, largest_error_rad }
+    }
+
+    /// Poses that contradict the touch: none was found, the verdict calls it wrong, or the angle is far from the true one.
+    pub(super) fn contradicting(&self) -> usize {
+        self.contradicting
     }
 
     /// Figures that a cure must not worsen.

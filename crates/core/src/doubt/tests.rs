@@ -42,7 +42,8 @@ impl Set {
 fn sound_sets_of_every_condition_and_of_other_sensors_raise_no_doubt() {
     for (number, condition) in (0u64..).zip(Condition::iter()) {
         let config = if number % 2 == 0 { SimConfig::default() } else { SimConfig::randomised(number) };
-        for pairs in [1, 4] {
+        // Of bare shafts one finger alone is seldom right.
+        for pairs in [1, if condition == Condition::Ambiguous { 8 } else { 4 }] {
             assert!(set(condition, pairs, &config).judged().is_empty(), "{condition:?}, {pairs} pairs");
         }
     }
