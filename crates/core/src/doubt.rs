@@ -187,7 +187,7 @@ fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<D
     if registered.agree() || of_all.as_ref().is_some_and(explained) {
         return of_all;
     }
-    parts::of_fingers(felt, tools, &registered, &models).or(of_all).or_else(|| registered.mostly_wrong())
+    parts::of_fingers(felt, tools, &models).or(of_all).or_else(|| registered.mostly_wrong())
 }
 
 /// Doubt about the imprints of all pairs and both fingers together.

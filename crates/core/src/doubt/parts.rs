@@ -48,12 +48,7 @@ impl Alone {
 }
 
 /// Doubt about the imprints of one finger, where the other one's lie on the CAD models at the true poses.
-pub(super) fn of_fingers(
-    felt: &[Felt<'_>],
-    tools: &BTreeMap<String, TriMesh>,
-    both: &Registered<'_, '_>,
-    models: &Models<'_>,
-) -> Option<Doubt> {
+pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, models: &Models<'_>) -> Option<Doubt> {
     let rig = &felt.first()?.sample.rig;
     let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
@@ -71,10 +66,6 @@ pub(super) fn of_fingers(
             sound.touched()
         );
         return Some(Doubt::new(Cause::NothingFelt, what, "check that finger's camera and its depth without contact"));
-    }
-    // A finger that is wrong spoils the poses of both together; one that felt a bare shaft does not.
-    if (both.contradicting() as f64) < RIGHT * both.tried() as f64 {
-        return None;
     }
     let figures = format!(
         "registered by the {name} alone, {} of {} poses are good and near the truth, by the {other} alone {} of {}",
