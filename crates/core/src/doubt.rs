@@ -173,7 +173,7 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
     doubts
 }
 
-/// What registering some pairs comes to: before and after a cure it tells what the cure is worth.
+/// Figures of the registrations of some pairs: before and after a cure they tell what the cure is worth.
 pub fn worth(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
     poses::Registered::of(felt, &poses::models(felt, tools)).worth()
 }

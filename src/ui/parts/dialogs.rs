@@ -33,7 +33,7 @@ pub(crate) enum Purpose {
 }
 
 impl Purpose {
-    /// Why a path is none for it, in words.
+    /// Objection to a path, in words.
     fn objection(self, path: &Path) -> Option<String> {
         let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
         let writes_file = matches!(self, Self::Output(output) if output.file_name().is_some());
@@ -222,7 +222,7 @@ fn from_home(text: &str) -> PathBuf {
     }
 }
 
-/// What shows file dialogs on a Linux desktop: a portal, else zenity. The library that asks them says "cancelled" where neither
+/// The programs that show file dialogs on a Linux desktop: a portal, else zenity. The library that asks them says "cancelled" where neither
 /// is there, and waits half a minute for a portal that does not answer.
 #[cfg(target_os = "linux")]
 mod system {

@@ -61,7 +61,7 @@ pub struct Options {
     pub reset: bool,
     /// Folder that pictures are written to; `None` = the user's folder for pictures.
     pub screenshots: Option<PathBuf>,
-    /// Whether the graphics device was lost: whoever opened the window asks it when the window is closed.
+    /// Loss of the graphics device: whoever opened the window asks it when the window is closed.
     pub loss: Loss,
     /// True where every frame is painted whole even where a program draws (for measuring what [`crate::ui::parts::kept`] saves).
     pub whole_frames: bool,
@@ -192,7 +192,7 @@ impl StudioApp {
         self.inbox.push(command.into());
     }
 
-    /// Whether the graphics device was lost. For tests.
+    /// Loss of the graphics device. For tests.
     pub fn loss(&self) -> &Loss {
         &self.loss
     }

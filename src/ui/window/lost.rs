@@ -15,7 +15,7 @@ const STARTED_AGAIN: &str = "TOUCH2TOUCH_STARTED_AGAIN";
 /// A device that is lost again so soon will be lost for ever.
 const TOO_SOON: Duration = Duration::from_secs(30);
 
-/// Whether the window's device was lost, and why. Cheap to clone.
+/// Loss of the window's device, with the reason. Cheap to clone.
 #[derive(Clone, Debug, Default)]
 pub struct Loss(Arc<OnceLock<String>>);
 
@@ -60,13 +60,13 @@ fn now() -> u64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |since| since.as_secs())
 }
 
-/// Whether a program that was `started_again` then may be so now.
+/// True where a program that was `started_again` then may be so now.
 fn may_start(started_again: Option<&str>, now: u64) -> bool {
     let then: Option<u64> = started_again.and_then(|text| text.parse().ok());
     then.is_none_or(|then| now.saturating_sub(then) >= TOO_SOON.as_secs())
 }
 
-/// What to say in the window of a program that had to start again.
+/// Note in the window of a program that had to start again.
 pub(crate) fn greeting() -> Option<TaskError> {
     std::env::var_os(STARTED_AGAIN)?;
     let why = "the graphics device was lost, so the studio closed, with everything saved, and started again";

@@ -328,9 +328,9 @@ fn by_light(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
     })
 }
 
-/// How some images lie, read from their light.
+/// Turns in which some images lie, read from their light.
 struct Light {
-    /// Where that is sure.
+    /// Those that are sure.
     turns: Vec<(PadId, Turn)>,
     /// Mean share of the gel's slopes without curl, where there is a touch to read.
     consistency: f64,
@@ -351,7 +351,7 @@ impl Light {
     fn decoded(touches: &[(PadId, &ColorTouch)], colors: Colors) -> Self {
         Self::of(touches.iter().filter_map(|(pad, color)| {
             let ColorImages { raw, reference } = color.images.as_ref()?;
-            // What is linear commutes with the mean over pixels; a hue does not, but changes little from pixel to pixel.
+            // A linear change of colors commutes with the mean over pixels; a hue does not, but changes little from pixel to pixel.
             let [raw, reference] = [raw, reference].map(|image| area(image).map(|pixel| colors.decoded(*pixel)));
             Some((*pad, Cow::Owned(ColorTouch::from_images(raw, reference)?.difference)))
         }))

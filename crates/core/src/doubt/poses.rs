@@ -137,7 +137,7 @@ pub(super) fn models<'a>(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -
     named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect()
 }
 
-/// What registering some pairs came to, by the verdicts and the truth.
+/// Figures of the registrations of some pairs, by the verdicts and the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Worth {
     /// Pairs with a CAD model and cameras.

@@ -109,7 +109,7 @@ where
     Ok(area.present()?)
 }
 
-/// What is drawn, without the pictures and the ground.
+/// The drawing as SVG text, without the pictures and the ground.
 fn lines_and_letters<D: Drawing>(drawing: &D) -> anyhow::Result<String> {
     let mut out = String::new();
     let [width, height] = drawing.size();

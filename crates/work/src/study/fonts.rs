@@ -11,7 +11,7 @@ use crate::io::{files, folders};
 /// Roboto Regular, a TrueType file (see `assets/fonts/README.md`).
 pub static REGULAR: &[u8] = include_bytes!("../../../../assets/fonts/Roboto-Regular.ttf");
 
-/// What to do where no font of this computer has a letter.
+/// Advice where no font of this computer has a letter.
 pub const ADVICE: &str =
     "Install a font that has them (on Debian or Ubuntu: fonts-noto-cjk) and start the program again.";
 
@@ -32,11 +32,11 @@ const MOST_FILES: usize = 50_000;
 pub struct SystemFont {
     /// The name of its file.
     pub name: &'static str,
-    /// Its file, or a collection of which the first one counts.
+    /// Content of the file; of a collection the first font counts.
     pub bytes: &'static [u8],
 }
 
-/// Whether a letter is one of Chinese, Japanese or Korean, or a sign among them.
+/// True for letters of Chinese, Japanese and Korean, and signs among them.
 pub fn is_east_asian(letter: char) -> bool {
     matches!(u32::from(letter),
         0x1100..=0x11FF | 0x2E80..=0x9FFF | 0xA960..=0xA97F | 0xAC00..=0xD7FF | 0xF900..=0xFAFF | 0xFE30..=0xFE4F
@@ -106,7 +106,7 @@ fn find(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Those of the files that are known to have East Asian letters, the best first.
+/// Files that are known to have East Asian letters, the best first.
 fn ranked(files: Vec<PathBuf>) -> Vec<PathBuf> {
     let rank = |file: &PathBuf| {
         let name = file.file_stem()?.to_string_lossy().to_lowercase().replace(['-', '_', ' '], "");

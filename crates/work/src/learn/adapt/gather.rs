@@ -28,7 +28,7 @@ pub(super) struct FitTouch {
     pub(super) name: String,
     pub(super) tool: Option<String>,
     pub(super) pad: PadId,
-    /// Where the sample holds the touch, which is not its finger in picture pairs.
+    /// Pad under which the sample holds the touch, which is not its finger in picture pairs.
     pub(super) of_sample: PadId,
     pub(super) scale: Scale,
     /// Meters, at the decoder's size and in its orientation.
