@@ -1,13 +1,11 @@
 //! `touch2touch-bench`: time and error of the registration engines and of the generator, on known grasps, side by side; what
-//! masks cost a person, and what the doctor finds. None of it ships with the studio.
+//! the verdict and the doctor find. None of it ships with the studio.
 
 mod cases;
-mod dataset;
 mod doctor;
 mod figures;
 mod front;
 mod generator;
-mod labelling;
 mod peers;
 mod registration;
 mod reliability;
@@ -39,14 +37,10 @@ enum Benchmark {
     Generator(generator::GeneratorArgs),
     /// Write fresh known grasps of the built-in simulator, for `touch2touch-bench registration`.
     Cases(cases::CasesArgs),
-    /// Worth of proposed contact masks on simulated grasps, cost of a stroke, and work of a person on a mask.
-    Labelling(labelling::LabellingArgs),
     /// Number of data sets stored wrongly that the doctor names rightly, and of sound ones that it doubts.
     Doctor(doctor::DoctorArgs),
     /// Signs of a fault that need no truth (a wrong tool, swapped fingers, a turned camera), each as a detector.
     Verdict(verdict::VerdictArgs),
-    /// Seconds for a whole data set on all cores, on simulated pairs.
-    Dataset(dataset::DatasetArgs),
 }
 
 fn main() -> ExitCode {
@@ -62,9 +56,7 @@ fn run(benchmark: &Benchmark) -> VerbResult {
         Benchmark::Registration(args) => registration::run(args),
         Benchmark::Generator(args) => generator::run(args),
         Benchmark::Cases(args) => cases::run(args),
-        Benchmark::Labelling(args) => labelling::run(args),
         Benchmark::Doctor(args) => doctor::run(args),
-        Benchmark::Dataset(args) => dataset::run(args),
         Benchmark::Verdict(args) => verdict::run(args),
     }
 }

@@ -18,11 +18,11 @@ use touch2touch_work::infer::mask::MaskModel;
 use touch2touch_work::labels::ImprintSource;
 
 /// A grasp of a simulated tool.
-pub(crate) struct Case {
-    pub(crate) name: String,
-    pub(crate) sample: Sample,
-    pub(crate) tool: std::sync::Arc<ToolModel>,
-    pub(crate) truth: PlanarPose,
+pub(super) struct Case {
+    pub(super) name: String,
+    pub(super) sample: Sample,
+    pub(super) tool: std::sync::Arc<ToolModel>,
+    pub(super) truth: PlanarPose,
 }
 
 /// Score of a prediction.
@@ -39,7 +39,7 @@ pub(super) struct Score {
 ///
 /// # Errors
 /// If no tool is wanted, or a CAD model cannot be used.
-pub(crate) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
+pub(super) fn simulate(count: usize, seed: u64, wanted: impl Fn(bool) -> bool) -> anyhow::Result<Vec<Case>> {
     let specs: Vec<_> = catalog::tools().iter().filter(|tool| wanted(tool.seen)).collect();
     anyhow::ensure!(!specs.is_empty(), "there are no such tools");
     let models = specs
