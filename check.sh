@@ -57,8 +57,7 @@ step "the Python package: tests, types"
 TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
 "$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 
-step "the pages say what was measured"
-python3 -m unittest --quiet benches.numbers.test_pages
-python3 -m benches.numbers --check
+step "tables of measurements and of the study of methods"
+python3 -m unittest --quiet training.test_study_tables
 
 step "all passed"

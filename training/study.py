@@ -12,9 +12,9 @@ from pathlib import Path
 
 import torch
 
-from benches.numbers import study_tables
 from benches.program import commit, machine, today
 
+from . import study_tables
 from .place import keep_freed_memory
 from .study_rows import Rows
 from .study_runs import AUTOENCODER, SECTIONS

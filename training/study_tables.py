@@ -1,9 +1,9 @@
 """The rows of `training.study` as Markdown, in the paper's form: its tables of methods, conditions and ablations, and one of fits."""
 
-from training import study_runs
-from training.study_runs import CONDITIONS, REFERENCE, SHIFTS, test_set
+from benches.numbers import COLUMNS, GROUPS, group_of, markdown, number
 
-from .tables import COLUMNS, GROUPS, group_of, markdown, number
+from . import study_runs
+from .study_runs import CONDITIONS, REFERENCE, SHIFTS, test_set
 
 SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "fid", "angle_deg", "success_5", "success_10")]
 # Columns of the paired differences.
