@@ -11,7 +11,6 @@
 //! There is no friction between membrane and tool and no light bouncing in the gel.
 //!
 //! One pair (both fingers, both sensors) costs about 0.15 s of one core in release, most of it for the rays of the camera.
-//! `examples/contact_sheet.rs` draws the tiles of `docs/simulated_tiles.png`.
 
 mod condition;
 mod config;
