@@ -1,11 +1,15 @@
 #!/usr/bin/env bash
-# Passes the tests: everything that CI runs, fastest first, with all set-up of its own.
-# On Debian and Ubuntu it installs a software Vulkan driver and the window libraries (asks for sudo if need be);
+# Passes the tests: what CI runs, with all set-up of its own. `./check.sh --all` adds what need not be tried each time: the
+# documentation of the code, the command line without windows and model engines, the science with checked arithmetic, the
+# wheel. On Debian and Ubuntu it installs a software Vulkan driver and the window libraries (asks for sudo if need be);
 # a missing GPU, ONNX Runtime or window is then a failure, not a skip. Tests on reference data that is not part of the
 # repository run, and are demanded, where that data lies in ../shared (or TOUCH2TOUCH_SHARED); what is not tried is said.
 set -euo pipefail
 cd "$(dirname "$0")"
 step() { printf '\n== %s (%ss)\n' "$*" "$SECONDS"; }
+# One set of features and the studio's profile for all: each dependency is built once.
+whole=(--locked --release --workspace --features ui-test)
+built="${CARGO_TARGET_DIR:-target}/release"
 
 step "packages"
 . ./setup.sh
@@ -14,50 +18,65 @@ need_packages test
 step "format"
 cargo fmt --all --check
 
-step "lints: everything, then the command line without windows and model engines"
-cargo clippy --locked --workspace --features ui-test --all-targets -- -D warnings
-cargo clippy --locked --no-default-features -- -D warnings
+step "lints"
+cargo clippy "${whole[@]}" --all-targets -- -D warnings
 
-step "documentation"
-RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --document-private-items --features ui-test
+step "build: programs, tests, the Python package"
+cargo test "${whole[@]}" --no-run
+cargo build "${whole[@]}"
 
-if [ -d "${TOUCH2TOUCH_SHARED:-../shared}" ]; then
-  export REQUIRE_SHARED=1
-else
-  printf '\nNOT TRIED: tests on the reference data, which is not in %s\n' "${TOUCH2TOUCH_SHARED:-../shared}"
-fi
-
-step "tests: the science, the job without model engines, the tuning of networks"
-cargo test --locked -p touch2touch-core -p touch2touch-work -p touch2touch-tuning
+step "the Python package in an environment of its own"
+python=target/python-venv/bin/python
+[ -x "$python" ] || python3 -m venv target/python-venv
+"$python" -m pip install --quiet numpy pytest mypy pyarrow duckdb pandas polars "ray[data]"
+site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
+rm -rf "$site/touch2touch"
+cp -r python/touch2touch "$site/"
+if [ -e "$built/libtouch2touch_python.dylib" ]; then library=dylib; else library=so; fi
+cp "$built/libtouch2touch_python.$library" "$site/touch2touch/_native.abi3.so"
 
 step "the ONNX Runtime library, plain and with a provider, fetched by the product itself"
 export ORT_DYLIB_PATH="$PWD/target/onnxruntime" TOUCH2TOUCH_OPENVINO="$PWD/target/openvino"
-cargo run --locked --quiet --features ui-test -- runtime --fetch --dir "$ORT_DYLIB_PATH"
+"$built/touch2touch" runtime --fetch --dir "$ORT_DYLIB_PATH"
 if [ "$(uname -sm)" = "Linux x86_64" ]; then
-  cargo run --locked --quiet --features ui-test -- runtime --fetch --provider openvino --dir "$TOUCH2TOUCH_OPENVINO"
+  "$built/touch2touch" runtime --fetch --provider openvino --dir "$TOUCH2TOUCH_OPENVINO"
 fi
 
-step "the Python package: its wheel in a fresh environment"
-python3 -m venv --clear target/python-venv
-python=target/python-venv/bin/python
-"$python" -m pip install --quiet maturin numpy pytest mypy pyarrow duckdb pandas polars "ray[data]"
-"$python" -m maturin build --locked --profile dev --interpreter "$python" --out target/wheels
-"$python" -m pip install --quiet --no-index --find-links target/wheels touch2touch
-
-step "tests: files, models on both engines, GPU on a software driver, the studio by clicks and keys"
+step "tests"
+if [ -d "${TOUCH2TOUCH_SHARED:-../shared}" ]; then
+  export REQUIRE_SHARED=1
+else
+  printf 'NOT TRIED: tests on the reference data, which is not in %s\n' "${TOUCH2TOUCH_SHARED:-../shared}"
+fi
 export REQUIRE_GPU=1 REQUIRE_ORT=1 REQUIRE_PYTHON=1 TOUCH2TOUCH_PYTHON="$PWD/$python"
 if [ -z "${VK_DRIVER_FILES:-}" ]; then
   # One named driver for every machine: pictures and timings of the tests then mean the same everywhere.
   driver=$(find /usr/share/vulkan/icd.d -name 'lvp_icd*.json' 2>/dev/null | head -n 1)
   [ -z "$driver" ] || export VK_DRIVER_FILES="$driver"
 fi
-cargo test --locked -p touch2touch -p touch2touch-work -p touch2touch-bench --features ui-test
+# Each test's time is printed beside it: the switch for that asks for the environment variable, which only the tests get.
+cargo test "${whole[@]}" --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Z unstable-options --report-time
 
-step "the Python package: tests, types"
-TOUCH2TOUCH_PROGRAM="$PWD/target/debug/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
+step "tests of the Python package, its types"
+TOUCH2TOUCH_PROGRAM="$PWD/$built/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
 "$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 
 step "tables of measurements and of the study of methods"
 python3 -m unittest --quiet training.test_study_tables
+
+if [ "${1:-}" = --all ]; then
+  step "documentation of the code"
+  RUSTDOCFLAGS="-D warnings" cargo doc --locked --workspace --no-deps --document-private-items --features ui-test
+  step "the command line without windows and model engines"
+  cargo clippy --locked --no-default-features -- -D warnings
+  step "the science with checked arithmetic"
+  cargo test --locked -p touch2touch-core -p touch2touch-tuning
+  step "the wheel in a fresh environment"
+  "$python" -m pip install --quiet maturin
+  "$python" -m maturin build --locked --release --interpreter "$python" --out target/wheels
+  python3 -m venv --clear target/wheel-venv
+  target/wheel-venv/bin/python -m pip install --quiet --find-links target/wheels touch2touch
+  target/wheel-venv/bin/python -c 'import touch2touch; print(touch2touch.__version__)'
+fi
 
 step "all passed"
