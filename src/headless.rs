@@ -32,7 +32,6 @@ mod shards;
 mod simulate;
 mod stats;
 mod still;
-mod sweep;
 mod training_data;
 mod trials;
 mod unit;
@@ -98,8 +97,6 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a data set: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
-    /// Turn a dial (mask threshold or probability, gate, trim, shift) over all pairs, and say what it does to every pose.
-    Sweep(Box<sweep::SweepArgs>),
     /// Trials of a robot with the poses: simulated grasps of a tool, put into a hole of its own outline; cup on cup.
     Trials(Box<trials::TrialsArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
@@ -132,7 +129,7 @@ enum Verb {
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
-    /// Put the parts of a run together that `--shard I/N` made of `generate`, `pose`, `sweep` or `masks propose`: what one run prints.
+    /// Put the parts of a run together that `--shard I/N` made of `generate`, `pose` or `masks propose`: what one run prints.
     /// (`evaluate` keeps its parts beside the predictions: run it without --shard.)
     Merge(merge::MergeArgs),
     /// Predictions kept on the disk: how many, where, and a way to remove them.
@@ -283,7 +280,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
-        Some(Verb::Sweep(args)) => sweep::run(&args),
         Some(Verb::Trials(args)) => trials::run(&args),
         Some(Verb::Figure(args)) => figure::run(&args),
         Some(Verb::Still(args)) => still::run(&args),

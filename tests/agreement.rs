@@ -23,10 +23,9 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AboutCommand, AdaptCommand, Command, DialCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand,
-    Pane, PredictCommand, ViewCommand,
+    AboutCommand, AdaptCommand, Command, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
+    PredictCommand, ViewCommand,
 };
-use touch2touch::app::dial::DialPairs;
 use touch2touch::app::export::{FigureForm, FigureRows, Output};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
@@ -40,7 +39,6 @@ use touch2touch::app::{export, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
-use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
 use touch2touch_work::about::{Cure, Fact};
@@ -51,7 +49,6 @@ use touch2touch_work::io::images;
 use touch2touch_work::labels::Labels;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::subject::Subject;
-use touch2touch_work::sweep::Dial;
 
 use crate::support::run;
 
@@ -97,7 +94,6 @@ fn how(action: Action) -> How {
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
         A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),
-        A::TurnDial => Verb(&["sweep", "demo", "--dial", "threshold", "--values", "3,4,5", "--pairs", "8"]),
         // They were computed by the Python package; the studio only lists them.
         A::OpenScores => Window,
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
@@ -559,63 +555,6 @@ fn a_pair_in_files_is_the_same_in_both() {
             assert!(a.len() > 500 && a == b, "{}: {} and {} bytes", file.display(), a.len(), b.len());
         }
         assert!(said["mask"].as_str().unwrap().starts_with("hand"), "{said}");
-    }
-}
-
-#[test]
-fn a_dial_does_the_same_in_both() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = lab_folder(home.path());
-    let mut studio = Studio::open(Place::Path(folder), home.path());
-    let threshold = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
-    studio.send(prefer(move |s| s.mask = MaskSettings { choice: threshold, ..MaskSettings::default() }).into());
-    studio.send(DialCommand::Over(DialPairs::Spread(2)).into());
-    for (dial, range, count) in
-        [(Dial::Threshold, [4.0, 6.0], 3), (Dial::Gate, [0.6, 1.4], 3), (Dial::Shift, [0.0; 2], 1)]
-    {
-        if dial == Dial::Gate {
-            studio.send(prefer(|s| s.registration = Registration::DistanceField.into()).into());
-        }
-        studio.send(DialCommand::Choose(dial).into());
-        studio.send(DialCommand::Range(range, count).into());
-        let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
-        studio.send(DialCommand::Start.into());
-        let found = studio.state.dial.result.clone().expect("the dial was turned");
-        let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
-        let mut said = json(&words, home.path());
-        let mut shown: Value = serde_json::from_str(&serde_json::to_string(&*found).unwrap()).unwrap();
-        assert!(shown["seconds"].take().is_number() && said["seconds"].take().is_number());
-        assert_eq!(found.series.len(), if dial == Dial::Shift { 1 } else { 2 });
-        assert!(found.complete && found.series.iter().all(|s| s.points.len() >= 3 && s.base.cases.len() == 2));
-        assert_eq!(shown, said, "{dial:?}");
-    }
-    // The pairs of the list are named.
-    let listed = studio.state.library.open.as_ref().unwrap().source.index().pairs[1].name.clone();
-    studio.send(LibraryCommand::SetFilter(listed.clone()).into());
-    studio.send(DialCommand::Over(DialPairs::Listed).into());
-    let words = export::equivalent_words(&studio.state, Pane::Dial, 0.004).unwrap();
-    studio.send(DialCommand::Start.into());
-    let found = studio.state.dial.result.clone().expect("the dial was turned");
-    let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
-    assert!(words.windows(2).any(|two| two[0] == "--only" && two[1].contains(&listed)), "{words:?}");
-    let mut said = json(&words, home.path());
-    let mut shown: Value = serde_json::from_str(&serde_json::to_string(&*found).unwrap()).unwrap();
-    assert!(shown["seconds"].take().is_number() && said["seconds"].take().is_number());
-    assert_eq!(shown, said);
-    studio.send(LibraryCommand::SetFilter(String::new()).into());
-    // A value that is put in force is the one that the panes compute with, and that their commands say.
-    studio.send(DialCommand::Use(Dial::Gate.parse("0.6").unwrap()).into());
-    studio.send(DialCommand::Use(Dial::Threshold.parse("4").unwrap()).into());
-    studio.predict(0);
-    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
-    for said in ["--engine distance_field:gate=0.6", "--mask threshold --threshold-mm 4"] {
-        assert!(words.join(" ").contains(said), "{words:?}");
-    }
-    let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
-    let report = json(&words, home.path());
-    for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
-        let shown = results::pose(&studio.state, source).ready().unwrap();
-        assert_eq!(case["angle_deg"], number(shown.angle_rad.to_degrees()), "{source:?}");
     }
 }
 

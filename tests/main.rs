@@ -43,7 +43,6 @@ mod providers;
 #[cfg(feature = "onnx")]
 mod sensors;
 #[cfg(feature = "onnx")]
-mod sweep;
 #[cfg(all(feature = "onnx", feature = "tune"))]
 mod training;
 #[cfg(feature = "ui-test")]

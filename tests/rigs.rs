@@ -181,7 +181,6 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "masks export --out OUT",
         "masks stats",
         "label",
-        "sweep --dial gate",
         "compare --pair a",
         "ledger --pair a",
         "basin --pair a",

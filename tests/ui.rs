@@ -14,7 +14,6 @@ mod calm;
 mod chain;
 mod compare;
 mod daily;
-mod dial;
 mod export;
 mod follow;
 mod frames;

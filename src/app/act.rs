@@ -4,9 +4,9 @@ use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
 use super::command::{
-    AboutCommand, AdaptCommand, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand, FollowCommand,
-    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
-    TrainCommand, UiRequest, ViewCommand, WorkbenchCommand,
+    AboutCommand, AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
+    UiRequest, ViewCommand, WorkbenchCommand,
 };
 use super::keys::{ImprintSource, ShiftMode};
 use super::pane::Workspace;
@@ -21,7 +21,7 @@ use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool, Section};
 use super::state::{Absent, State};
-use super::{adapt, dial, export, labels, results, train};
+use super::{adapt, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 

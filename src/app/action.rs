@@ -125,8 +125,6 @@ macro_rules! actions {
             state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
             state => when(can_rank(state), EvaluateCommand::All);
-        TurnDial, Generate, "Turn the dial", "Poses many pairs with every value of the chosen dial (mask threshold, probability, gate, trim, shift)", [],
-            state => when(state.tasks.of_kind(TaskKind::Dial).is_none() && dial::setup(state).is_ok(), DialCommand::Start);
         RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
         OpenScores, Generate, "Open scores…", "Shows the rows of touches that were felt elsewhere (Parquet, from Python) as scores of the open data set, the worst first", [],
@@ -445,7 +443,6 @@ impl Action {
             Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",
             Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
-            Self::TurnDial => "sweep threshold small multiples",
             Self::EvaluateDataset => "score metrics benchmark results table",
             Self::ExportTable => "csv markdown json save results latex",
             Self::CancelJobs => "stop abort interrupt",

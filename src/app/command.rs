@@ -3,7 +3,6 @@
 pub use super::about::AboutCommand;
 pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
-pub use super::dial::DialCommand;
 pub use super::evaluate::EvaluateCommand;
 pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
@@ -43,8 +42,6 @@ macro_rules! rooms {
             Workbench(WorkbenchCommand) in workbench,
             /// To the results table.
             Evaluate(EvaluateCommand) in evaluate,
-            /// To the dial.
-            Dial(DialCommand) in dial,
             /// To figures and other things that are taken away.
             Export(ExportCommand) in export,
             /// To the panel about the open data set.

@@ -8,7 +8,6 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::adapt::AdaptState;
-use super::dial::DialState;
 use super::effect::{Access, Effect, Errand};
 use super::keys::DatasetSeq;
 use super::services::Opened;
@@ -390,7 +389,6 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.rows = None;
     state.library.brush = None;
     state.library.ticked.clear();
-    state.dial = DialState { result: None, ..state.dial.clone() };
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
     let own = opened.source.root().is_some() && opened.source.case().is_none() && !resumed;

@@ -195,10 +195,6 @@ macro_rules! panes {
                 "Fit to my pairs" as "Fit", "The generator fitted to the open pairs, and what that is worth", Form, needs [],
                 at [Adapt Top(1)]
             } }
-            dial { Dial {
-                "Dial", "What a threshold, probability, gate, trim or shift does to the poses of all pairs", Form, needs [],
-                at [Evaluate Top(1)]
-            } }
             table {
                 Table { "All metrics", "The scores of all pairs by every source", Form, needs [Scores], at [Evaluate Top(1)] }
             }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 pub mod about;
 pub mod adapt;
 pub mod cache;
-pub mod dial;
 pub mod evaluate;
 pub mod export;
 pub mod history;
@@ -25,7 +24,6 @@ use super::keys::{ImprintSource, PairKey, TouchKey};
 use super::pane::{Demand, Pane, Workspace};
 use about::AboutState;
 use adapt::AdaptState;
-use dial::DialState;
 use evaluate::TableState;
 use export::ExportState;
 use history::History;
@@ -62,8 +60,6 @@ pub struct State {
     pub table: TableState,
     /// The choices of the next figure and of what else is taken away.
     pub export: ExportState,
-    /// The dial that is turned over pairs.
-    pub dial: DialState,
     /// The panel about the open data set.
     pub about: AboutState,
     /// The fit to the open pairs.

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::shards::{Parts, Sharded};
-use super::{Common, Output, VerbResult, generate, masks, pose, sweep};
+use super::{Common, Output, VerbResult, generate, masks, pose};
 
 /// Arguments of `merge`.
 #[derive(Debug, Args)]
@@ -23,7 +23,6 @@ pub(super) fn run(args: &MergeArgs) -> VerbResult {
     match parts.verb {
         Sharded::Generate => generate::merge(&parts, output),
         Sharded::Pose => pose::merge(&parts, output),
-        Sharded::Sweep => sweep::merge(&parts, output),
         Sharded::MasksPropose => masks::merge_proposals(&parts, output),
     }
 }

@@ -104,7 +104,6 @@ fn command(words: &[String]) -> Vec<String> {
 pub(super) enum Sharded {
     Generate,
     Pose,
-    Sweep,
     MasksPropose,
 }
 

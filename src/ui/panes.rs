@@ -3,7 +3,6 @@
 pub(crate) mod adapt;
 pub(crate) mod basin;
 pub(crate) mod browser;
-pub(crate) mod dial;
 pub(crate) mod generate;
 pub(crate) mod images;
 pub(crate) mod layers;

@@ -51,8 +51,6 @@ pub(super) fn parts_of_a_run_are_merged_to_what_one_run_prints() {
     for (words, of) in [
         (vec!["pose", path, "--imprint", "both", "--engine", "all"], 2),
         (vec!["pose", "demo", "--limit", "4", "--imprint", "measured"], 5),
-        (vec!["sweep", path, "--dial", "threshold", "--values", "3,4,5"], 2),
-        (vec!["sweep", "demo", "--dial", "shift", "--limit", "4"], 5),
     ] {
         let (whole, merged) = (json(&words, home.path()), merged(&words, of, home.path()));
         let is_noted = !merged["notes"].as_array().unwrap().is_empty();

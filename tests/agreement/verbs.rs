@@ -51,10 +51,6 @@ fn held(verb: &str) -> Option<Held> {
             watched::what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes,
         ]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
-        "sweep" => By(&[
-            tables::a_random_dial_over_a_random_recipe_is_the_same_in_the_pane_and_by_the_verb,
-            super::a_dial_does_the_same_in_both,
-        ]),
         "figure" => By(&[
             files::a_random_recipe_draws_the_same_pictures_by_button_and_verb,
             super::figures_and_pictures_are_the_same_files_in_both,

@@ -3,25 +3,7 @@
 use std::path::PathBuf;
 
 use touch2touch_work::adapt::{Adapted, Scored};
-use touch2touch_work::recipe::Recipe;
-use touch2touch_work::sweep::{Dial, Sweep};
 use touch2touch_work::train::Trained;
-
-pub(super) fn swept() -> Sweep {
-    Sweep {
-        dataset: "elsewhere".into(),
-        dial: Dial::Gate,
-        unit: Dial::Gate.unit(),
-        at: None,
-        in_force: Recipe::default(),
-        series: Vec::new(),
-        left_out: Vec::new(),
-        notes: Vec::new(),
-        pairs: 0,
-        complete: false,
-        seconds: 0.0,
-    }
-}
 
 pub(super) fn adapted() -> Adapted {
     Adapted {

@@ -18,5 +18,4 @@ pub mod space;
 pub mod statistics;
 pub mod still;
 pub mod subject;
-pub mod sweep;
 pub mod trials;

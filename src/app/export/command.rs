@@ -1,13 +1,12 @@
 //! The command that does in a shell what a pane shows: [`equivalent`].
 
-use super::super::dial::DialPairs;
 use super::super::keys::{ImprintSource, ShiftMode};
 use super::super::pane::{Kind, Pane};
 use super::super::state::State;
 use super::super::state::adapt::AdaptPairs;
 use super::super::state::library::Place;
 use super::super::state::settings::ColorMap;
-use super::super::{adapt, dial, recipe, results};
+use super::super::{adapt, recipe, results};
 use super::column::in_figure;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -16,7 +15,6 @@ use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::figure::FigurePane;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
 use touch2touch_work::subject::{RecipeChange, Subject};
-use touch2touch_work::sweep::Setting;
 use touch2touch_work::train::MasksFrom;
 
 fn command(verb: &str) -> Words {
@@ -117,7 +115,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
                 .word_if(state.table.published, "--paper")
                 .then(recipe.words(Stage::Pose))
         }
-        (Pane::Dial, _) => dial_words(state, verb("sweep"))?,
         (Pane::Adapt, _) => {
             let setup = adapt::setup(state)?;
             let words = verb("adapt").option("--out", "fitted");
@@ -133,19 +130,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
         _ => return None,
     };
     Some(words.list())
-}
-
-fn dial_words(state: &State, words: Words) -> Option<Words> {
-    let dial = &state.dial;
-    let values = dial.dial.spread(dial.range[0], dial.range[1], dial.count).ok()?;
-    let values: Vec<String> = values.into_iter().map(Setting::key).collect();
-    let words = words.option("--dial", dial.dial.key()).option("--values", values.join(","));
-    let words = match dial.pairs {
-        DialPairs::All => words,
-        DialPairs::Spread(count) => words.option("--pairs", count),
-        DialPairs::Listed => words.option("--only", names(state, dial::pairs(state))?),
-    };
-    Some(words.word_if(!dial.predictions, "--measured-only").then(dial::recipe(state).words(Stage::Pose)))
 }
 
 fn train_words(state: &State, words: Words) -> Words {

@@ -70,9 +70,6 @@ kinds! {
     /// Scores of touches that were felt elsewhere are read.
     ReadScores, "Open scores", Files,
         "Stop; the scores stay as they are";
-    /// A dial is turned over many pairs.
-    Dial, "Dial", Batch,
-        "Stop, and show the pairs that were done until then";
     /// The models are tried on a sample of a data set.
     TryModels, "Try the models", Batch,
         "Stop; the models are not tried on a sample of these pairs";

@@ -1,15 +1,11 @@
-//! Figures of a whole data set: statistics of its predictions, dials, and the order of its masks.
-
-use std::collections::BTreeSet;
+//! Figures of a whole data set: statistics of its predictions and the order of its masks.
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{DialCommand, EvaluateCommand};
-use touch2touch::app::dial::DialPairs;
+use touch2touch::app::command::EvaluateCommand;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::recipe::Stage;
-use touch2touch_work::sweep::Dial;
 
 use super::*;
 
@@ -63,48 +59,6 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
     }
     compared(&counts, 14);
     compared(&shifted, 2);
-}
-
-#[test]
-pub(in crate::agreement) fn a_random_dial_over_a_random_recipe_is_the_same_in_the_pane_and_by_the_verb() {
-    let home = tempfile::tempdir().unwrap();
-    let mut draws = Draws::new(8);
-    let (mut counts, mut dials) = (Vec::new(), BTreeSet::new());
-    for mut both in Both::places(home.path()).take(2) {
-        let mut count = 0;
-        both.show(&[Pane::Dial]);
-        both.studio.send(DialCommand::Over(DialPairs::Spread(2)).into());
-        for dial in Dial::iter() {
-            put(&mut both.studio, &draws.posed());
-            both.studio.send(DialCommand::Choose(dial).into());
-            let ends = match dial {
-                Dial::Threshold => [draws.one(3.0..5.0), draws.one(5.0..8.0)],
-                Dial::Probability | Dial::Trim => [draws.one(0.1..0.3), draws.one(0.3..0.8)],
-                Dial::Gate => [draws.one(0.5..1.0), draws.one(1.0..3.0)],
-                Dial::Shift => [0.0; 2],
-            };
-            both.studio.send(DialCommand::Range(ends, 2).into());
-            both.studio.send(DialCommand::Predictions(draws.of(&[true, true, false]) || dial == Dial::Shift).into());
-            both.studio.state.dial.result = None;
-            let said = both.said(Pane::Dial);
-            both.studio.send(DialCommand::Start.into());
-            let what =
-                format!("{dial:?} {ends:?}, {:?}", recipe::in_force(&both.studio.state, ImprintSource::Predicted));
-            match (&both.studio.state.dial.result, said) {
-                (Some(shown), Ok(said)) => {
-                    let shown = without(written(&**shown), &["seconds"]);
-                    count += same(&shown, &without(said, &["seconds"]), &what);
-                    dials.insert(format!("{dial:?}"));
-                }
-                // Such as a gate of a registration that has none.
-                (None, Err(_)) => {}
-                (shown, said) => panic!("{what}: {shown:?} is shown, {said:?} is said"),
-            }
-        }
-        counts.push(count);
-    }
-    compared(&counts, 100);
-    assert!(dials.len() >= 4, "{dials:?}");
 }
 
 #[test]

@@ -12,11 +12,10 @@ use touch2touch::app::about::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
-    AboutCommand, AdaptCommand, Answer, CameraPreset, Command, DialCommand, EvaluateCommand, ExportCommand,
-    FollowCommand, Hover, InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand,
-    SettingsCommand, TasksCommand, TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
+    AboutCommand, AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
+    TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
-use touch2touch::app::dial::{DialPairs, Turn};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{ReadScores, Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
@@ -65,11 +64,10 @@ use touch2touch_work::queue::QueueBy;
 use touch2touch_work::rows::RowScores;
 use touch2touch_work::space::{Ground, ViewAngles};
 use touch2touch_work::subject::Subject;
-use touch2touch_work::sweep::{Dial, Setting};
 use touch2touch_work::tool::UnitSet;
 use touch2touch_work::train::{MasksFrom, TrainChoice};
 
-use super::super::answered::{adapted, swept, trained};
+use super::super::answered::{adapted, trained};
 use super::super::double::Double;
 
 fn position() -> impl Strategy<Value = [f32; 2]> {
@@ -274,14 +272,6 @@ fn registration() -> impl Strategy<Value = RegistrationChoice> {
         .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
 }
 
-fn setting() -> impl Strategy<Value = Setting> {
-    let settings = any_of::<Dial>().prop_map(|dial| {
-        let (first, last, count) = dial.usual();
-        dial.spread(first, last, count).unwrap()
-    });
-    (settings, any::<usize>()).prop_map(|(settings, at)| settings[at % settings.len()])
-}
-
 fn shortcut() -> impl Strategy<Value = Shortcut> {
     (any_of::<Key>(), any::<[bool; 3]>()).prop_map(|(key, [ctrl, shift, alt])| Shortcut { ctrl, shift, alt, key })
 }
@@ -391,7 +381,6 @@ fn ended() -> impl Strategy<Value = Ended> {
                 Ended::of::<ReadScores>((seq, Arc::new(rows)))
             }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
-            TaskKind::Dial => Ended::of::<Turn>(Arc::new(swept())),
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
             TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
@@ -567,14 +556,6 @@ draws! {
         1 OpenRows(Just(PathBuf::from("rows"))),
         1 Export(Just(PathBuf::from("table"))),
     }
-    dial: DialCommand {
-        1 Choose(any_of::<Dial>()),
-        1 Range([number(), number()].prop_map(|ends| ends.map(f64::from)), any::<usize>()),
-        1 Over(select(DialPairs::OFFERED.to_vec())),
-        1 Predictions(any::<bool>()),
-        2 Start,
-        2 Use(setting()),
-    }
     export: ExportCommand {
         1 Ask(any::<bool>()),
         1 SetForm(form()),
@@ -661,7 +642,6 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
         (3, inspect().boxed()),
         (4, workbench().boxed()),
         (2, evaluate().boxed()),
-        (2, dial().boxed()),
         (1, export().boxed()),
         (1, about().boxed()),
         (1, adapt().boxed()),
@@ -678,7 +658,6 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
             | Command::Inspect(_)
             | Command::Workbench(_)
             | Command::Evaluate(_)
-            | Command::Dial(_)
             | Command::Export(_)
             | Command::About(_)
             | Command::Adapt(_)

@@ -149,11 +149,6 @@ impl RegistrationChoice {
         }
     }
 
-    /// The share that is trimmed, where one is.
-    pub fn trim(self) -> Option<f64> {
-        matches!(self.rejection, Rejection::Trim(_)).then(|| self.rejection.number()).flatten()
-    }
-
     /// The registration with the settings that the product uses, apart from what is left out.
     pub fn method(self) -> Box<dyn Register> {
         let rejection = self.rejection;

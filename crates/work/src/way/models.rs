@@ -398,17 +398,6 @@ impl Models {
         self.with_mask_model(bundle, engine, |model| Ok((model.probability(imprint)?, model.least_probability())))
     }
 
-    /// From which probability on a mask model's bundle calls a pixel contact.
-    ///
-    /// # Errors
-    /// If the bundle cannot be opened, or is of another kind.
-    pub(crate) fn least_probability(&self, bundle: &BundleInfo) -> Result<f32, TaskError> {
-        let what = format!("Open {}", bundle.name);
-        let opened = bundle.open(&what)?;
-        let spec = opened.mask_unet().ok_or_else(|| TaskError::new(&what, "it is no mask model"))?;
-        Ok(spec.output.threshold as f32)
-    }
-
     fn with_mask_model<T: Send>(
         &self,
         bundle: &BundleInfo,
