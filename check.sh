@@ -28,18 +28,24 @@ cargo build "${whole[@]}"
 step "the Python package in an environment of its own"
 python=target/python-venv/bin/python
 [ -x "$python" ] || python3 -m venv target/python-venv
-"$python" -m pip install --quiet numpy pytest mypy pyarrow duckdb pandas polars "ray[data]"
+"$python" -m pip install --quiet numpy pytest mypy onnxruntime==1.31.1 pyarrow duckdb pandas polars "ray[data]"
 site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
 rm -rf "$site/touch2touch"
 cp -r python/touch2touch "$site/"
 if [ -e "$built/libtouch2touch_python.dylib" ]; then library=dylib; else library=so; fi
 cp "$built/libtouch2touch_python.$library" "$site/touch2touch/_native.abi3.so"
 
-step "the ONNX Runtime library, plain and with a provider, fetched by the product itself"
-export ORT_DYLIB_PATH="$PWD/target/onnxruntime" TOUCH2TOUCH_OPENVINO="$PWD/target/openvino"
-"$built/touch2touch" runtime --fetch --dir "$ORT_DYLIB_PATH"
+step "the ONNX Runtime library, plain and with a provider"
+# Both packages put it into the same folder, so that the one with a provider has an environment of its own.
+library() { "$1" -c 'import sysconfig; print(sysconfig.get_path("platlib") + "/onnxruntime/capi")'; }
+ORT_DYLIB_PATH=$(library "$PWD/$python")
+export ORT_DYLIB_PATH
 if [ "$(uname -sm)" = "Linux x86_64" ]; then
-  "$built/touch2touch" runtime --fetch --provider openvino --dir "$TOUCH2TOUCH_OPENVINO"
+  openvino=target/openvino-venv/bin/python
+  [ -x "$openvino" ] || python3 -m venv target/openvino-venv
+  "$openvino" -m pip install --quiet onnxruntime-openvino==1.24.1
+  TOUCH2TOUCH_OPENVINO=$(library "$PWD/$openvino")
+  export TOUCH2TOUCH_OPENVINO
 fi
 
 step "tests"

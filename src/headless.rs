@@ -134,7 +134,7 @@ enum Verb {
     Merge(merge::MergeArgs),
     /// Predictions kept on the disk: how many, where, and a way to remove them.
     Cache(cache::CacheArgs),
-    /// Say which model runtime is used and why, or fetch the faster one.
+    /// Say which model runtime is used and why, and which GPUs it can use.
     Runtime(models::RuntimeArgs),
 }
 

@@ -38,7 +38,7 @@ pub(crate) fn python() -> Option<PathBuf> {
     python.or_else(|| left_out("TOUCH2TOUCH_PYTHON names no Python with the package", "REQUIRE_PYTHON"))
 }
 
-/// The folder of an ONNX Runtime with OpenVINO, as the check script has fetched it.
+/// The folder of an ONNX Runtime with OpenVINO, as the check script has installed it.
 #[cfg(feature = "onnx")]
 pub(crate) fn openvino() -> Option<String> {
     let named = std::env::var("TOUCH2TOUCH_OPENVINO").ok().filter(|dir| Path::new(dir).is_dir());

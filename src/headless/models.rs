@@ -5,10 +5,9 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
-use super::args::keyed;
 use super::{Common, Output, VerbResult};
 use touch2touch_work::infer::bundle::Bundle;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Provider, resolve};
+use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
 use touch2touch_work::infer::{runtime, sandbox};
 
 /// Verbs of a bundle.
@@ -118,25 +117,12 @@ fn attempt(args: &TryArgs) -> VerbResult {
 /// Arguments of `runtime`.
 #[derive(Debug, Args)]
 pub(super) struct RuntimeArgs {
-    /// Fetch the ONNX Runtime library for this platform (by Python's pip) and keep it for the studio.
-    #[arg(long)]
-    fetch: bool,
-    /// The one with this execution provider, in the place of the plain one.
-    #[arg(long, requires = "fetch", value_parser = keyed::<Provider>())]
-    provider: Option<Provider>,
-    /// Folder to keep it in instead of the application's data folder.
-    #[arg(long, requires = "fetch")]
-    dir: Option<PathBuf>,
     #[command(flatten)]
     common: Common,
 }
 
 pub(super) fn runtime(args: &RuntimeArgs) -> VerbResult {
     let output = Output::new(args.common, "runtime", 1);
-    if args.fetch {
-        let library = runtime::fetch_runtime(args.dir.as_deref(), args.provider)?;
-        output.note(&format!("fetched {}", library.display()));
-    }
     let report = runtime::runtime_report();
     output.finish(&report, || report.to_string())?;
     Ok(report.engine.is_some())

@@ -96,7 +96,7 @@ fn held(verb: &str) -> Option<Held> {
         "read-as" => Not("the studio offers no such button; what it writes every reader reads"),
         "bundle check" => Not("it looks at one model's files and computes nothing of a touch"),
         "cache" => Not("it counts and removes what can be made again"),
-        "runtime" => Not("it says which engine is there, or fetches one"),
+        "runtime" => Not("it says which engine is there"),
         _ => return None,
     })
 }

@@ -20,7 +20,6 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::bundle::{BundleFile, Role};
-use super::packages::way_to;
 pub use super::provider::Provider;
 use crate::io::files;
 use touch2touch_core::diffusion::{ModelError, Tensor};
@@ -129,6 +128,9 @@ impl FromStr for EngineChoice {
     }
 }
 
+/// The way to a library of ONNX Runtime, in a sentence.
+pub(super) const INSTALL: &str = "install it with `pip install onnxruntime`, or set ORT_DYLIB_PATH to its library";
+
 /// Why there is no engine or no graph.
 #[derive(Debug, thiserror::Error)]
 pub enum EngineError {
@@ -136,9 +138,7 @@ pub enum EngineError {
     #[error("this build cannot run models; build it with the feature `onnx` (it is on by default)")]
     NotInThisBuild,
     /// ONNX Runtime was asked for and is not there.
-    #[error(
-        "ONNX Runtime was not found ({tried}); fetch it with `touch2touch runtime --fetch`, set ORT_DYLIB_PATH, or choose the built-in engine"
-    )]
+    #[error("ONNX Runtime was not found ({tried}); {}, or choose the built-in engine", INSTALL)]
     NoOnnxRuntime {
         /// The places and what was wrong with each.
         tried: String,
@@ -324,7 +324,7 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
 
 /// The library of ONNX Runtime in use, loaded on the first call, or all the places that were searched in vain.
 #[cfg(feature = "onnx")]
-pub(super) fn library() -> Result<Library, Vec<super::library::Searched>> {
+pub(super) fn library() -> Result<Library, Vec<super::runtime::Searched>> {
     ort_engine::library()
 }
 
@@ -347,7 +347,7 @@ pub(super) fn build(engine: EngineKind) -> String {
 #[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only ONNX Runtime has providers"))]
 pub(super) enum NoProvider {
     /// The library was built without it.
-    #[error("the ONNX Runtime in use has none; {}", way_to(*.0))]
+    #[error("the ONNX Runtime in use has none; {}", .0.way_to())]
     NotInTheLibrary(Provider),
     /// It is there and does not start.
     #[error("it does not start ({said}); {}", provider.needs())]
@@ -363,12 +363,6 @@ pub(super) enum NoProvider {
 #[cfg(feature = "onnx")]
 pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
     ort_engine::try_provider(provider)
-}
-
-/// Forgets that no library was found, so that a freshly fetched one is.
-pub(super) fn search_again() {
-    #[cfg(feature = "onnx")]
-    ort_engine::search_again();
 }
 
 /// A loaded library of ONNX Runtime.

@@ -3,21 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use serde::Serialize;
-
-use super::packages::{fetched_folders, runtime_dir};
-
-/// A place that was searched without success.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Searched {
-    /// Place that was searched.
-    pub place: String,
-    /// Fault that was met there.
-    pub outcome: String,
-}
-
 /// All places to look at, in order, each with the library that lies there.
-#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
 pub(super) fn candidates() -> impl Iterator<Item = (String, Option<PathBuf>)> {
     // Each place is looked at only when the ones before it had nothing: the last one starts a program.
     let named = std::iter::once_with(|| {
@@ -30,12 +16,11 @@ pub(super) fn candidates() -> impl Iterator<Item = (String, Option<PathBuf>)> {
     });
     let beside = std::iter::once_with(|| {
         let dir = std::env::current_exe().ok().and_then(|exe| exe.parent().map(Path::to_path_buf));
-        place("beside the program", dir)
+        match dir {
+            Some(dir) => (format!("beside the program ({})", dir.display()), library_in(&dir)),
+            None => ("beside the program (unknown)".into(), None),
+        }
     });
-    // The folder itself where nothing was fetched: it is where a library could be.
-    let none_yet = std::iter::once_with(runtime_dir).filter(|dir| dir.as_ref().is_none_or(|dir| !dir.is_dir()));
-    let fetched = fetched_folders().map(Some).chain(none_yet);
-    let data = fetched.map(|dir| place("the application's data folder", dir));
     let packages = std::iter::once_with(|| {
         let library = python_packages().iter().find_map(|dir| library_in(&dir.join("onnxruntime/capi")));
         ("Python's package folders".into(), library)
@@ -44,33 +29,24 @@ pub(super) fn candidates() -> impl Iterator<Item = (String, Option<PathBuf>)> {
         let library = python_onnxruntime().and_then(|dir| library_in(&dir.join("capi")));
         ("the onnxruntime package of `python3`".into(), library)
     });
-    named.chain(beside).chain(data).chain(packages).chain(python)
-}
-
-#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
-fn place(name: &str, dir: Option<PathBuf>) -> (String, Option<PathBuf>) {
-    match dir {
-        Some(dir) => (format!("{name} ({})", dir.display()), library_in(&dir)),
-        None => (format!("{name} (unknown)"), None),
-    }
+    named.chain(beside).chain(packages).chain(python)
 }
 
 /// The library in `dir`; the last by name where there are several.
-pub(super) fn library_in(dir: &Path) -> Option<PathBuf> {
+fn library_in(dir: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(dir).ok()?;
     let files = entries.filter_map(|entry| Some(entry.ok()?.path()));
     files.filter(|path| path.file_name().and_then(|n| n.to_str()).is_some_and(is_library)).max()
 }
 
 /// The library's own file, not one that it loads.
-pub(super) fn is_library(file: &str) -> bool {
+fn is_library(file: &str) -> bool {
     let plain = file.strip_prefix("lib").unwrap_or(file);
     let end = plain.strip_prefix("onnxruntime");
     end.is_some_and(|end| end.starts_with('.') && [".so", ".dylib", ".dll"].iter().any(|ext| end.contains(ext)))
 }
 
 /// Package folders of the Pythons that can be found without starting one.
-#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
 fn python_packages() -> Vec<PathBuf> {
     let mut prefixes: Vec<PathBuf> =
         ["VIRTUAL_ENV", "CONDA_PREFIX"].iter().filter_map(std::env::var_os).map(PathBuf::from).collect();
@@ -93,7 +69,6 @@ fn python_packages() -> Vec<PathBuf> {
 }
 
 /// Asks the Python on the path, without importing the package.
-#[cfg_attr(not(feature = "onnx"), allow(dead_code, reason = "only the ONNX engine looks for its library"))]
 fn python_onnxruntime() -> Option<PathBuf> {
     const QUESTION: &str = "import importlib.util as u; s = u.find_spec('onnxruntime'); \
                             print(list(s.submodule_search_locations)[0] if s else '')";

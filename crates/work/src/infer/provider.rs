@@ -106,6 +106,28 @@ impl Provider {
             Self::WebGpu => "it needs a GPU with a driver for Vulkan, Metal or Direct3D 12",
         }
     }
+
+    /// The package of Python's index whose library has it.
+    fn package(self) -> Option<&'static str> {
+        match self {
+            Self::Cuda | Self::TensorRt => Some("onnxruntime-gpu"),
+            Self::DirectMl => Some("onnxruntime-directml"),
+            Self::CoreMl => Some("onnxruntime"),
+            Self::OpenVino => Some("onnxruntime-openvino"),
+            Self::WebGpu => Some("onnxruntime-webgpu"),
+            Self::MiGraphX => None,
+        }
+    }
+
+    /// The way to a library with it, in a sentence.
+    pub(super) fn way_to(self) -> String {
+        let needs = self.needs();
+        match self.package() {
+            _ if !self.is_possible_here() => format!("there is none for this system; {needs}"),
+            Some(package) => format!("install one that has it with `pip install {package}`; {needs}"),
+            None => format!("set ORT_DYLIB_PATH to a library that has it; {needs}"),
+        }
+    }
 }
 
 #[cfg(test)]
@@ -120,6 +142,19 @@ mod tests {
             assert_eq!(provider.key().parse(), Ok(provider));
             assert!(provider.engine_name().ends_with(provider.name()));
             assert!(!provider.name().is_empty() && provider.name().len() < provider.engine_name().len());
+        }
+    }
+
+    #[test]
+    fn every_provider_has_a_way_to_it() {
+        for provider in Provider::iter() {
+            let way = provider.way_to();
+            assert!(way.contains(provider.needs()), "{way}");
+            assert_eq!(
+                way.contains("pip install onnx"),
+                provider.is_possible_here() && provider.package().is_some(),
+                "{way}"
+            );
         }
     }
 }

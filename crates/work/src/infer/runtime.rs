@@ -1,8 +1,7 @@
-//! ONNX Runtime on this machine: what was found of it, what it can run graphs on, and how it is fetched.
+//! ONNX Runtime on this machine: what was found of it, and what it can run graphs on.
 
 #[cfg(feature = "onnx")]
 mod device;
-mod fetch;
 
 use std::fmt;
 use std::path::PathBuf;
@@ -12,9 +11,6 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::engine::{self, EngineChoice, EngineKind, Provider};
-
-pub(crate) use super::library::Searched;
-pub use fetch::fetch_runtime;
 
 /// Engine that runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -33,6 +29,15 @@ pub struct RuntimeReport {
     pub threads: usize,
     /// Providers that this system can have.
     pub providers: Vec<ProviderReport>,
+}
+
+/// A place that was searched without success.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Searched {
+    /// Place that was searched.
+    pub place: String,
+    /// Fault that was met there.
+    pub outcome: String,
 }
 
 /// A provider on this machine.
@@ -94,7 +99,7 @@ pub fn runtime_report() -> RuntimeReport {
             ..report
         },
         Err(searched) => RuntimeReport {
-            reason: "no ONNX Runtime library was found, so the built-in engine is used".into(),
+            reason: format!("no ONNX Runtime library was found, so the built-in engine is used; {}", engine::INSTALL),
             searched,
             ..report
         },

@@ -9,7 +9,8 @@ use ort::session::{Session as OrtSession, SessionInputValue};
 use ort::value::TensorRef;
 
 use super::{Input, Library, NoProvider, Provider, Session, threads};
-use crate::infer::library::{Searched, candidates};
+use crate::infer::library::candidates;
+use crate::infer::runtime::Searched;
 use touch2touch_core::diffusion::Tensor;
 
 /// The library stays loaded once it is: ONNX Runtime cannot be unloaded safely.
@@ -65,13 +66,6 @@ pub(super) fn library() -> Result<Library, Vec<Searched>> {
         State::Loaded { library, .. } => Ok(library.clone()),
         State::Absent(searched) => Err(searched.clone()),
         State::NotSearched => Err(Vec::new()),
-    }
-}
-
-pub(super) fn search_again() {
-    let mut state = STATE.lock().unwrap_or_else(PoisonError::into_inner);
-    if matches!(*state, State::Absent(_)) {
-        *state = State::NotSearched;
     }
 }
 
