@@ -24,7 +24,6 @@ mod models;
 mod notes;
 mod output;
 mod pose;
-mod read_as;
 mod recipe;
 mod report;
 mod seeds;
@@ -34,7 +33,6 @@ mod stats;
 mod still;
 mod training_data;
 mod trials;
-mod unit;
 mod version;
 mod watch;
 
@@ -117,12 +115,8 @@ enum Verb {
     /// Contact masks.
     #[command(subcommand)]
     Masks(masks::MasksVerb),
-    /// Open a data set and list what is wrong with it.
+    /// Open a data set and list what is wrong with it, or say for good how it is read.
     Doctor(doctor::DoctorArgs),
-    /// Say which unit the CAD models (STL) of a data set are in, or set it for good.
-    Unit(unit::UnitArgs),
-    /// Say how a data set is read otherwise than it is stored, or set it for good: fingers swapped, pictures mirrored, ...
-    ReadAs(read_as::ReadAsArgs),
     /// A pair with everything that its results depend on, in one file.
     #[command(subcommand)]
     Case(case::CaseVerb),
@@ -290,8 +284,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
-        Some(Verb::Unit(args)) => unit::run(&args),
-        Some(Verb::ReadAs(args)) => read_as::run(&args),
         Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Merge(args)) => merge::run(&args),

@@ -31,7 +31,7 @@ pub(super) struct DatasetArgs {
     #[arg(long, value_name = "PATH", conflicts_with = "path")]
     input: Option<PathBuf>,
     /// Read the data otherwise than they are stored, for this run: what the doctor offers, such as swap-fingers, several with
-    /// commas. Without it, what read-as.txt in the data set says (verb read-as). An empty list reads them as they are stored.
+    /// commas. Without it, what read-as.txt in the data set says (`doctor --set`). An empty list reads them as they are stored.
     #[arg(long, value_name = "LIST", value_parser = parse_readings)]
     read_as: Option<Readings>,
 }

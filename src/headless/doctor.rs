@@ -1,6 +1,8 @@
 //! `touch2touch doctor PATH`: says what a data set is and what the models are worth on a sample of it, loads the pairs and
 //! lists what is wrong, and tries on a handful of pairs which other reading would explain them better.
 
+mod set;
+
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -46,6 +48,12 @@ pub(super) struct DoctorArgs {
     /// The generator's bundle (default: the shipped one).
     #[arg(long)]
     bundle: Option<PathBuf>,
+    /// Say something of the data for good, by a file beside them, and examine nothing: `read-as=LIST`, what the doctor
+    /// offers, such as swap-fingers, several with commas (read-as.txt; an empty list removes it), or `unit:TOOL=UNIT` of m,
+    /// cm, mm, um or in (unit.txt beside the tool's CAD model, for all models of that folder; where they are in several
+    /// units it says `auto`). What the file said before is replaced.
+    #[arg(long, value_name = "NAME=VALUE", num_args = 1..)]
+    set: Vec<set::Setting>,
     #[command(flatten)]
     common: Common,
 }
@@ -68,6 +76,9 @@ struct Report<'a> {
 
 /// Done means examined: problems found are the result, not a failure.
 pub(super) fn run(args: &DoctorArgs) -> VerbResult {
+    if !args.set.is_empty() {
+        return set::run(&args.dataset, &args.set, args.common);
+    }
     let output = Output::new(args.common, "examining", 0);
     let (mut about, mut worth) = (Vec::new(), None);
     // Without knowing the sensors, none of its pairs can be examined.

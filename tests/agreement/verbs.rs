@@ -91,9 +91,10 @@ fn held(verb: &str) -> Option<Held> {
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "trials" => Not("it simulates its grasps; the studio plays the trial of a pair, as `pose --trial`"),
         "training-data" => Not("only the training in Python reads it"),
-        "doctor" => By(&[super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb]),
-        "unit" => By(&[files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb]),
-        "read-as" => Not("the studio offers no such button; what it writes every reader reads"),
+        "doctor" => By(&[
+            super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb,
+            files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb,
+        ]),
         "bundle check" => Not("it looks at one model's files and computes nothing of a touch"),
         "cache" => Not("it counts and removes what can be made again"),
         "runtime" => Not("it says which engine is there"),

@@ -61,8 +61,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch masks stats", How::Run(&[], "", &[0])),
     ("touch2touch basin", How::Run(&[], "", &[0])),
     ("touch2touch cache", How::Run(&[], "", &[0])),
-    ("touch2touch read-as", How::Run(&[], "", &[0])),
-    ("touch2touch unit", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
     ("touch2touch merge", How::Run(&[], "", &[0])),

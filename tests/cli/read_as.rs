@@ -50,7 +50,10 @@ fn fingers_that_were_swapped_are_said_by_every_verb_and_read_right_for_good() {
     store(&set, ReadAs::SwapFingers(Depths::Imprints));
     let wrong = doctor(&[]);
     let said = wrong["problems"][0].to_string();
-    assert!(said.contains("fingers are swapped") && said.contains("of 4 pairs") && said.contains("read-as"), "{wrong}");
+    assert!(
+        said.contains("fingers are swapped") && said.contains("of 4 pairs") && said.contains("--set read-as="),
+        "{wrong}"
+    );
     let remedy = wrong["read_as"].as_str().unwrap().to_owned();
     assert!(remedy.ends_with("swap-fingers"), "{remedy}");
     let (off, notes) = error(&[]);
@@ -58,14 +61,15 @@ fn fingers_that_were_swapped_are_said_by_every_verb_and_read_right_for_good() {
     // For one run, then for good; then again as it is stored.
     let (once, _) = error(&["--read-as", &remedy]);
     assert!(once < 3.0, "{once}");
-    let kept = run(&["read-as", path, "--set", &remedy], dir.path());
+    let kept = run(&["doctor", path, "--set", &format!("read-as={remedy}")], dir.path());
     assert!(kept.status.success() && set.join("read-as.txt").is_file(), "{}", error_text(&kept));
     let (for_good, _) = error(&[]);
     assert_eq!(for_good.to_bits(), once.to_bits());
     let read = doctor(&[]);
     assert_eq!(read["problems"].as_array().map(Vec::len), Some(1), "that it is read so: {read}");
     assert!(read["problems"].to_string().contains("read as ") && read["read_as"].is_null(), "{read}");
-    assert!(run(&["read-as", path, "--clear"], dir.path()).status.success());
+    assert!(run(&["doctor", path, "--set", "read-as="], dir.path()).status.success());
+    assert!(!set.join("read-as.txt").exists());
     assert_eq!(error(&[]).0.to_bits(), off.to_bits());
     std::fs::write(set.join("read-as.txt"), "swap-toes").unwrap();
     let refused = run(&["pose", path], dir.path());

@@ -1,4 +1,4 @@
-//! `touch2touch unit`: a CAD model in another unit is said, and accepted for good.
+//! A CAD model in another unit is said, and accepted for good.
 
 use std::path::Path;
 
@@ -24,40 +24,40 @@ fn a_model_in_millimeters_is_said_and_accepted_for_good() {
     let folder = set.join("tools_stls");
     let [own, other] = ["pattern_36", "pattern_31_rod"];
     let said = || std::fs::read_to_string(folder.join("unit.txt")).ok();
-    let unit = |words: &[&str]| run(&[&["unit", path, "--json"], words].concat(), dir.path());
-    assert_eq!(unit(&[]).status.code(), Some(0));
+    let posed = || run(&["pose", path, "--mask", "cad", "--json"], dir.path());
+    let set_to = |unit: &str| run(&["doctor", path, "--json", "--set", &format!("unit:{own}={unit}")], dir.path());
+    assert!(posed().status.success());
     scale(&folder.join(format!("{own}.stl")), 1e3);
 
-    let found = unit(&["--tool", own]);
+    let found = posed();
     assert_eq!(found.status.code(), Some(1), "{}", error_text(&found));
-    let tool = json(&found)["tools"][0].clone();
-    assert_eq!((&tool["usable"], &tool["fits"][0]["unit"]), (&false.into(), &"mm".into()), "{tool}");
-    assert!(tool["problem"].as_str().unwrap().contains("cannot be meters"), "{tool}");
+    assert!(json(&found).to_string().contains("cannot be meters"), "{}", json(&found));
+    let doctor = json(&run(&["doctor", path, "--no-predictions", "--json"], dir.path()));
+    assert!(doctor["about"].to_string().contains(r#""unit":"mm""#), "{doctor}");
 
     // A unit in which it is no tool changes nothing; the right one is for all models of the folder.
-    let wrong = unit(&["--tool", own, "--set", "um"]);
+    let wrong = set_to("um");
     assert!(wrong.status.code() == Some(2) && said().is_none(), "{}", error_text(&wrong));
     assert!(error_text(&wrong).contains("no tool") && error_text(&wrong).contains("millimeters"));
-    let done = unit(&["--tool", own, "--set", "mm"]);
+    let done = set_to("mm");
     assert!(done.status.success(), "{}", error_text(&done));
-    assert_eq!((said().as_deref(), &json(&done)["word"]), (Some("auto\n"), &"auto".into()), "the other is in meters");
-    assert_eq!(unit(&[]).status.code(), Some(0));
+    let word = json(&done)["set"][0]["word"].clone();
+    assert_eq!((said().as_deref(), &word), (Some("auto\n"), &"auto".into()), "the other is in meters");
+    assert!(posed().status.success());
 
+    // What the file said before is replaced.
     scale(&folder.join(format!("{other}.stl")), 1e3);
     std::fs::write(folder.join("unit.txt"), "in").unwrap();
-    let refused = unit(&["--tool", own, "--set", "mm"]);
-    assert_eq!((refused.status.code(), said().as_deref()), (Some(2), Some("in")));
-    assert!(error_text(&refused).contains("says \"in\" already"), "{}", error_text(&refused));
-    let done = unit(&["--tool", own, "--set", "mm", "--replace"]);
+    assert_eq!(posed().status.code(), Some(1));
+    let done = set_to("mm");
     assert!(done.status.success(), "{}", error_text(&done));
     assert_eq!(said().as_deref(), Some("mm\n"));
-    assert_eq!(unit(&[]).status.code(), Some(0));
-    let pose = run(&["pose", path, "--mask", "cad", "--json"], dir.path());
+    let pose = posed();
     assert!(pose.status.success(), "{}", error_text(&pose));
 
     // One that is in a unit of its own: no word in one file says that.
     scale(&folder.join(format!("{own}.stl")), 1.0 / 25.4);
-    let alone = unit(&["--tool", own, "--set", "in", "--replace"]);
+    let alone = set_to("in");
     assert_eq!(alone.status.code(), Some(2), "{}", error_text(&alone));
     assert!(error_text(&alone).contains("other units"), "{}", error_text(&alone));
 }

@@ -85,7 +85,7 @@ pub(in crate::agreement) fn the_unit_of_a_cad_model_is_written_the_same_by_butto
     let (tool, unit) = ("pattern_36", "m");
     let named = LibraryCommand::ReadToolAs { tool: tool.into(), unit: unit.parse().unwrap(), replacing: None };
     both.studio.send(named.into());
-    both.run(&["unit", twin.to_str().unwrap(), "--tool", tool, "--set", unit].map(str::to_owned)).unwrap();
+    both.run(&["doctor", twin.to_str().unwrap(), "--set", &format!("unit:{tool}={unit}")].map(str::to_owned)).unwrap();
     let [shown, said] = [own, twin].map(|folder| std::fs::read_to_string(folder.join("tools_stls/unit.txt")).unwrap());
     assert_eq!((shown.trim(), &shown), (unit, &said));
 }

@@ -97,12 +97,8 @@ impl Cure {
     pub fn verb(&self) -> Option<String> {
         Some(match self {
             Self::FitRange { .. } => return None,
-            Self::ReadTool { tool, unit, replacing } => {
-                let replace = if replacing.is_some() { " --replace" } else { "" };
-                format!("touch2touch unit PATH --tool {tool} --set {}{replace}", unit.key())
-            }
-            Self::ReadAs { list } if list.is_empty() => "touch2touch read-as PATH --clear".into(),
-            Self::ReadAs { list } => format!("touch2touch read-as PATH --set {list}"),
+            Self::ReadTool { tool, unit, .. } => format!("touch2touch doctor PATH --set unit:{tool}={}", unit.key()),
+            Self::ReadAs { list } => format!("touch2touch doctor PATH --set read-as={list}"),
             Self::Fit { .. } => "touch2touch adapt PATH --out FITTED".into(),
             Self::TrainFromCad { .. } => "touch2touch masks train PATH --from cad".into(),
             Self::Examine { .. } => "touch2touch doctor PATH".into(),

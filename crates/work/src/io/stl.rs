@@ -113,7 +113,7 @@ impl MeshError {
             Self::NotStl { .. } => "export the part as STL from the CAD program",
             Self::Truncated { .. } => "copy or export the file again",
             Self::Unit { .. } => {
-                "accept the scale with --tool-scale auto on the command line, or for good with `touch2touch unit` or the \
+                "accept the scale with --tool-scale auto on the command line, or for good with `touch2touch doctor --set` or the \
                  button at the 3D view: a file unit.txt beside the model says auto, m, cm, mm, um, in or a factor"
             }
             Self::NotATool { .. } => {

@@ -99,10 +99,10 @@ pub fn problems(dataset: &Dataset, doubts: &[Doubt]) -> Vec<Problem> {
     let of = |doubt: &Doubt| {
         let hint = match doubt.read_as() {
             Some(_) if remedy.is_empty() => {
-                format!("read them as they are stored: `touch2touch read-as {} --clear`", file.display())
+                format!("read them as they are stored: `touch2touch doctor {} --set read-as=`", file.display())
             }
             Some(_) => format!(
-                "correct what writes the files, or have them read so: `touch2touch read-as {} --set {remedy}`; --read-as {remedy} \
+                "correct what writes the files, or have them read so: `touch2touch doctor {} --set read-as={remedy}`; --read-as {remedy} \
                  tries it for one run",
                 file.display(),
             ),

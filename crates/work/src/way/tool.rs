@@ -111,7 +111,7 @@ pub fn set_unit(dataset: &Dataset, tool: &str, unit: ToolUnit, replacing: Option
         Some(says) if says == word => return done(None),
         Some(says) if Some(says) != replacing => {
             return Err(fail(format!("{} says {says:?} already", file.display()))
-                .with_hint("Replace it (--replace) if that is wrong: it is for all models of that folder."));
+                .with_hint("Replace it if that is wrong: it is for all models of that folder."));
         }
         _ => {}
     }

@@ -66,7 +66,7 @@ impl Dataset {
             problem(
                 file,
                 format!("read as {}, because {}", list(&self.read_as), mistakes.join(" and ")),
-                "as was asked for; `touch2touch read-as PATH --clear` ends it",
+                "as was asked for; `touch2touch doctor PATH --set read-as=` ends it",
             )
         })
     }
