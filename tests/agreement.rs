@@ -93,7 +93,7 @@ fn how(action: Action) -> How {
         A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
-        A::RankMasks | A::NextUncertain => Verb(&["masks", "queue", "demo"]),
+        A::RankMasks => Verb(&["masks", "queue", "demo"]),
         // They were computed by the Python package; the studio only lists them.
         A::OpenScores => Window,
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),

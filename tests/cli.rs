@@ -1,6 +1,5 @@
 //! The program as a user runs it: one JSON object on standard output, exit codes that mean what they say.
 
-mod agreement;
 #[cfg(feature = "onnx")]
 mod chain;
 

@@ -18,7 +18,7 @@ use touch2touch_work::io::exchange::{Format, MANIFEST, PARTS};
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_work::io::{images, npz};
 use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::labels::{Act, DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
+use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
 use crate::support::run;
 
@@ -117,8 +117,9 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
             }
             let labels = Labels::of(&dataset);
             assert!(labels.reviews().states.is_empty(), "no pair is marked");
-            let records = labels.records(&dataset.index.pairs[0].name).unwrap();
-            assert_eq!((&*records[0].name, &*records[0].person, records[0].act), ("import of masks", "Ben", Act::Do));
+            let name = &dataset.index.pairs[0].name;
+            assert_eq!(labels.persons(name).unwrap().into_iter().collect::<Vec<_>>(), ["Ben"]);
+            assert_eq!(labels.past(name, &labels.load(name).unwrap()).done[0].name, "import of masks");
             let again = import(&dataset, &from(folder));
             assert_eq!((again.same, again.total()), (8, 0), "{format:?}: {again:?}");
         }

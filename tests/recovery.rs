@@ -57,7 +57,7 @@ fn at(labels: &PairLabels, x: usize) -> bool {
 
 fn unsaved(name: &str, labels: &PairLabels) -> Unsaved {
     let deed = Operation { person: Some("Anna".into()), ..Operation::named("brush stroke") };
-    Unsaved { name: name.into(), labels: labels.clone(), deed, repeat: None }
+    Unsaved { name: name.into(), labels: labels.clone(), deed }
 }
 
 fn set(dir: &Path) -> (PathBuf, PathBuf, Dataset) {
@@ -90,7 +90,7 @@ fn what_waits_is_taken_in_at_the_next_opening_and_merged_with_what_others_did() 
     // Undo takes it back, and the journal says whose it was.
     let told = Labels::of(&dataset).past("a", &now);
     assert_eq!((told.done.last().unwrap().name.as_ref(), told.problem), ("labels taken in", None));
-    assert_eq!(Labels::of(&dataset).records("a").unwrap().last().unwrap().person, "Anna");
+    assert_eq!(Labels::of(&dataset).persons("a").unwrap().into_iter().collect::<Vec<_>>(), ["Anna"]);
     // Nothing is taken in twice.
     assert_eq!(recover(&dataset, &fresh, &waiting).pairs, Vec::<String>::new());
 }
@@ -145,8 +145,9 @@ fn labels_saved_to_a_folder_are_ordinary_ones_and_can_be_taken_in() {
     let folder = dir.path().join("usb").join(FOLDER);
     let gone = Unsaved { name: "c".into(), ..unsaved("c", &drawn) };
     labels.keep_in(&dataset, &[unsaved("a", &drawn), gone], &folder).unwrap();
-    let there = Labels::in_folder(&dataset, &folder).load("a").unwrap();
-    assert!(at(&there, 3) && there.review == Review::InProgress);
+    let there = MaskStore::in_folder(folder.clone());
+    assert!(there.load("a", lab::RIGHT).unwrap().unwrap().mask[(3, 1)]);
+    assert_eq!(there.load_review("a").unwrap().unwrap().review, Review::InProgress.stored());
     let found = take_in(&dataset, &labels, &folder).unwrap();
     assert_eq!(found.pairs, ["a"]);
     assert!(found.failed[0].why.contains("c is no pair"), "{found:?}");

@@ -179,7 +179,6 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "adapt",
         "stats --out OUT",
         "masks export --out OUT",
-        "masks stats",
         "label",
         "compare --pair a",
         "ledger --pair a",

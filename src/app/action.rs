@@ -98,8 +98,6 @@ macro_rules! actions {
             state => listed(state, LibraryCommand::NextUnfinished);
         NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)],
             state => listed(state, LibraryCommand::NextWorst).filter(|_| state.table.by().is_some());
-        NextUncertain, Navigate, "Next uncertain", "Shows the most uncertain pair that is neither done nor skipped, then the next; ranks the pairs first where they are not", [alt(K::N)],
-            state => listed(state, LibraryCommand::NextUncertain).filter(|_| state.table.scores.queue.known() > 0 || can_rank(state));
         TickPair, Navigate, "Tick the pair", "Ticks the pair on screen for figures, or no longer; Ctrl+click in the list does the same", [ctrl(K::T)],
             state => state.selection.pair.and_then(|pair| does(LibraryCommand::Tick(pair)));
         OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)],
@@ -434,9 +432,7 @@ impl Action {
             Self::ExportMasks => "unet training labels npy coco png save",
             Self::ImportMasks => "unet labels npy coco png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",
-            Self::NextUncertain | Self::RankMasks => {
-                "queue active learning doubt disagreement unsure probability hardest"
-            }
+            Self::RankMasks => "queue active learning doubt disagreement unsure probability hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",
             Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",

@@ -96,7 +96,6 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             // An answer to anything but the last request: what was changed since is not on the disk yet.
             if state.document.asked.get(&name) == Some(&revision) {
                 labels::unsaved::saved(state, &name, effects);
-                labels::saved(state);
             }
             if let Some(merged) = merged {
                 labels::merged(state, &name, &merged, effects);

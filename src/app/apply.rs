@@ -7,6 +7,7 @@ use super::{
     about, adapt, answers, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, train,
     view, workbench,
 };
+use touch2touch_work::progress::Progress;
 
 macro_rules! dispatch {
     ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {
@@ -26,6 +27,9 @@ pub fn apply(state: &mut State, command: Command) -> Vec<Effect> {
     step(state, command, &mut effects);
     if preferred {
         view::follow_workspace(state, before, &mut effects);
+    }
+    if std::mem::take(&mut state.document.marked) {
+        state.document.progress = Progress::of(state.library.pairs(), &state.document.reviews);
     }
     effects
 }

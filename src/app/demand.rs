@@ -23,7 +23,6 @@ pub fn demands(state: &State) -> Vec<Request> {
     results::want_thumbnails(&mut wants);
     results::want_scores(&mut wants);
     results::want_table(&mut wants);
-    results::want_label_stats(&mut wants);
     results::want_about(&mut wants);
     neighbors(&mut wants);
     results::want_mask_plan(&mut wants);
@@ -40,8 +39,7 @@ fn selection(wants: &mut Demands<'_>) {
     }
     wants.ask(pair);
     let name = state.pair_name();
-    let labels = LabelsKey { pair, repeat: state.document.repeats.contains_key(name) };
-    wants.ask_unless(state.document.stored.contains_key(name), labels);
+    wants.ask_unless(state.document.stored.contains_key(name), LabelsKey(pair));
     let (measured, predicted) = (ImprintSource::Measured, ImprintSource::Predicted);
     let (scene_measured, cloud_measured) = results::shows_cloud(state, measured);
     let (scene_predicted, cloud_predicted) = results::shows_cloud(state, predicted);

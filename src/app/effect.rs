@@ -30,8 +30,6 @@ pub struct LabelsToSave {
     pub labels: PairLabels,
     /// The deed.
     pub deed: Operation,
-    /// Who draws it a second time, apart from the pair's labels; `None` for these.
-    pub repeat: Option<String>,
 }
 
 /// Labels that could not be written.

@@ -78,7 +78,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
 }
 
 /// Has the measured imprints of every pair scored.
-pub(super) fn rank(state: &mut State, effects: &mut Vec<Effect>) {
+fn rank(state: &mut State, effects: &mut Vec<Effect>) {
     let setup = results::setup_of_all(state).map(|setup| measured_only(&setup));
     start(state, setup, "Rank the masks of", effects);
 }

@@ -204,7 +204,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
         Output::Masks => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;
-            let (labels, choice) = (state.document.own_labels(), state.export.masks);
+            let (labels, choice) = (state.document.finished_labels(), state.export.masks);
             let write = Write::new(Lane::Compute, "Export masks", file, move |folder, _, cx| {
                 Ok((source.export_masks(&labels, choice, &folder, cx)?, folder))
             });

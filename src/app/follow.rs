@@ -67,6 +67,7 @@ pub(super) fn arrived(state: &mut State, followed: Followed, current: bool, effe
     }
     state.tasks.failed.clear();
     state.reorder();
+    state.document.marked = true;
     let name = state.library.entry(followed.pair).map_or_else(String::new, |entry| entry.name.clone());
     let Some(follow) = &mut state.library.follow else { return };
     follow.arrived += usize::from(!followed.completed);

@@ -21,8 +21,8 @@ pub use touch2touch_work::labels::{ImprintSource, Revision};
 pub use touch2touch_work::mask::MaskRecipe;
 
 pub use dataset::{
-    AboutKey, ImportForm, ImportPlanKey, LabelStatsKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey,
-    ToolKey, TrainPlanKey,
+    AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey, ToolKey,
+    TrainPlanKey,
 };
 pub use imprint::{AmbiguityKey, ColorKey, EnsembleKey, ImprintKey, LedgerKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};

@@ -2,7 +2,6 @@
 
 mod batch;
 pub mod ghost;
-mod repeat;
 pub(super) mod unsaved;
 
 pub(crate) use super::state::labels::{Changed, Merged};
@@ -10,7 +9,6 @@ pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Quest
 pub(crate) use batch::can_propose_all;
 pub use batch::{ImportMasks, ProposeAll};
 pub use ghost::ghost;
-pub(super) use repeat::{begin_repeat, end_repeats, next_repeat};
 pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;
@@ -588,24 +586,14 @@ fn save_pair(state: &mut State, name: &str, deed: Operation, effects: &mut Vec<E
 }
 
 fn save_again(state: &mut State, name: &str, mut deed: Operation, effects: &mut Vec<Effect>) {
-    let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
-    deed.person = repeat.clone().or_else(|| state.settings.known_labeler());
+    deed.person = state.settings.known_labeler();
     let Some(open) = &state.library.open else { return };
     let revision = state.document.next_revision();
     let Some(labels) = state.document.finished(name) else { return };
-    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels, deed, repeat };
+    let save = LabelsToSave { seq: open.seq, name: name.to_owned(), revision, labels, deed };
     effects.push(Effect::SaveLabels(open.source.clone(), Box::new(save)));
     state.document.unsaved.insert(name.to_owned());
     state.document.asked.insert(name.to_owned(), revision);
-}
-
-/// Labels are on the disk: what is counted of them may be counted again, and what came back may be over.
-pub(super) fn saved(state: &mut State) {
-    let doc = &mut state.document;
-    if doc.unsaved.is_empty() && std::mem::take(&mut doc.marked) {
-        doc.marks += 1;
-    }
-    end_repeats(state);
 }
 
 fn save_all(state: &mut State, effects: &mut Vec<Effect>) {

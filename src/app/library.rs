@@ -21,7 +21,7 @@ use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
 use super::train::TrainState;
-use super::{evaluate, inspect, labels, settings, tasks};
+use super::{inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
@@ -79,8 +79,6 @@ pub enum LibraryCommand {
     NextUnfinished,
     /// Selects the next worst pair by the chosen score; the list is then in that order.
     NextWorst,
-    /// Shows the most uncertain pair whose review is not finished, then the next; the list is then in that order.
-    NextUncertain,
     /// Marks the selected pair as done and shows the next unfinished one.
     DoneAndNext,
 }
@@ -147,20 +145,12 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::Last => select_row(state, usize::MAX, effects),
         LibraryCommand::NextUnfinished => select_next_unfinished(state, effects),
         LibraryCommand::NextWorst => select_next_worst(state, effects),
-        LibraryCommand::NextUncertain => select_next_uncertain(state, effects),
         LibraryCommand::DoneAndNext if labels::says_open_polygon(state) => {}
         LibraryCommand::DoneAndNext => {
             labels::set_review(state, Review::Done, effects);
-            state.document.since_repeat += 1;
             // Before the list is sorted anew, so that "next" is what the person sees as next.
             let next = next_unfinished(state);
-            match labels::next_repeat(state, next.is_none()) {
-                Some(pair) => {
-                    labels::begin_repeat(state, pair);
-                    select(state, pair, effects);
-                }
-                None => select_unfinished(state, next, effects),
-            }
+            select_unfinished(state, next, effects);
             state.reorder();
         }
     }
@@ -299,22 +289,6 @@ fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<
     }
 }
 
-/// Begins the ranking where nothing is ranked yet.
-fn select_next_uncertain(state: &mut State, effects: &mut Vec<Effect>) {
-    let sorted = std::mem::replace(&mut state.library.sort, Sort::Uncertain) == Sort::Uncertain;
-    state.reorder();
-    if state.table.scores.queue.known() == 0 {
-        return evaluate::rank(state, effects);
-    }
-    if sorted {
-        return select_next_unfinished(state, effects);
-    }
-    let unfinished =
-        |pair: &&PairId| state.library.entry(**pair).is_some_and(|e| !state.document.review(&e.name).is_finished());
-    let next = state.library.order.iter().find(unfinished).copied();
-    select_unfinished(state, next, effects);
-}
-
 fn select_next_worst(state: &mut State, effects: &mut Vec<Effect>) {
     if state.table.by().is_none() {
         return;
@@ -346,7 +320,6 @@ pub(super) fn select(state: &mut State, pair: PairId, effects: &mut Vec<Effect>)
     }
     say_notes(state);
     settings::follow_range(state);
-    labels::end_repeats(state);
 }
 
 /// Says the oddities of the files of the selected pair, once it is loaded; each pair once.
@@ -400,6 +373,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.document = Document {
         reviews: opened.reviews,
         notes: opened.notes,
+        marked: true,
         last_revision: state.document.last_revision,
         ..Document::default()
     };

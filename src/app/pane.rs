@@ -68,8 +68,8 @@ pub(crate) enum Dock {
     Right(u8),
 }
 
-/// A demand: what is computed while a pane is on screen. Everything but [`Demand::Thumbnails`], [`Demand::Scores`] and
-/// [`Demand::LabelStats`] is of the selected pair and begins with its tensors and labels.
+/// A demand: what is computed while a pane is on screen. Everything but [`Demand::Thumbnails`] and [`Demand::Scores`]
+/// is of the selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
     /// Nothing besides the tensors and labels.
@@ -106,8 +106,6 @@ pub enum Demand {
     Thumbnails,
     /// The scores that are kept of all pairs.
     Scores,
-    /// The progress of the labeling of the data set.
-    LabelStats,
     /// The plan of a training of the mask model: what it would learn from.
     Training,
 }
@@ -181,7 +179,7 @@ macro_rules! panes {
                 Form, needs [Poses, FingerPoses], at [Align Right(1)]
             } }
             masks {
-                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks, LabelStats], at [Label Right(1)] }
+                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
             train { Train {
                 "Train the mask model" as "Train", "The mask model trained on corrected masks, and what that is worth",
@@ -256,7 +254,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, LabelStats, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
                     Steps, Thumbnails, Training, Trial, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
@@ -306,8 +304,7 @@ impl Pane {
 
     /// True where it shows something of the selected pair.
     pub(crate) fn is_of_pair(self) -> bool {
-        let of_all =
-            |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::LabelStats | Demand::Training);
+        let of_all = |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::Training);
         self.needs().iter().any(|need| !of_all(need))
     }
 }

@@ -14,9 +14,7 @@ use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::follow::Following;
 use touch2touch_work::io::dataset::{Dataset, ToolUnit};
 use touch2touch_work::job::JobCx;
-use touch2touch_work::label_stats::LabelStats;
-use touch2touch_work::labels::{JournalHistory, Operation, PairLabels, Review, Unsaved};
-use touch2touch_work::repeats::Repeater;
+use touch2touch_work::labels::{JournalHistory, Operation, PairLabels, Unsaved};
 use touch2touch_work::tool::{UnitSet, set_unit};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
@@ -108,37 +106,6 @@ pub trait DataSource: Send + Sync {
     /// If they cannot be written there either.
     fn keep_labels(&self, _unsaved: &[Unsaved], _folder: Option<&Path>) -> Result<PathBuf, TaskError> {
         Err(TaskError::new("Keep the labels elsewhere", "this source keeps none"))
-    }
-
-    /// Reads what a person drew a second time of a pair; empty if there is nothing.
-    ///
-    /// # Errors
-    /// As [`DataSource::load_labels`].
-    fn load_repeat(&self, _person: &str, _name: &str) -> Result<PairLabels, TaskError> {
-        Ok(PairLabels::default())
-    }
-
-    /// Writes what a person draws a second time, apart from the labels of the pair.
-    ///
-    /// # Errors
-    /// As [`DataSource::save_labels`], and where there is no place for it.
-    fn save_repeat(
-        &self,
-        _person: &str,
-        _name: &str,
-        _labels: &PairLabels,
-        _deed: &Operation,
-    ) -> Result<(), TaskError> {
-        Err(TaskError::new("Save the repeat", "this source keeps none"))
-    }
-
-    /// The progress of the labeling, what it took, and what comes back to a person; see
-    /// [`touch2touch_work::label_stats::label_stats`].
-    ///
-    /// # Errors
-    /// None of the journals: what cannot be read of them is in the result.
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: Repeater<'_>) -> Result<LabelStats, TaskError> {
-        Ok(LabelStats::of_reviews(self.index(), reviews))
     }
 
     /// The plan of an export of masks. `changed` is newer than what is stored.

@@ -8,8 +8,8 @@ use strum::IntoEnumIterator as _;
 use super::{Output, VerbResult, find_pair};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::label_pair::{Begin, LabelSetup, label_pair};
-use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{Labels, Review, take_in};
+use touch2touch_work::progress::Progress;
 
 pub(super) use args::LabelArgs;
 use report::{Report, Stored};
@@ -49,7 +49,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
             }
         }
     }
-    let counts = LabelStats::of_reviews(&dataset.index, &labels.reviews().states).all;
+    let counts = Progress::of(&dataset.index.pairs, &labels.reviews().states).all;
     let report = Report { folder, pairs, counts };
     output.finish(&report, || {
         let lines: Vec<String> = report.pairs.iter().map(Stored::text).collect();

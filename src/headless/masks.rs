@@ -1,10 +1,8 @@
-//! `touch2touch masks`: contact masks as training folders, how far those of two people agree, which to look at first, and a
-//! mask model trained on them.
+//! `touch2touch masks`: contact masks as training folders, which to look at first, and a mask model trained on them.
 
 mod import;
 mod propose;
 mod queue;
-mod stats;
 mod train;
 
 pub(super) use propose::merge as merge_proposals;
@@ -20,7 +18,6 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::RegistrationChoice;
-use touch2touch_work::agreement::{Agreements, compare_labels};
 use touch2touch_work::export::{Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
 use touch2touch_work::io::exchange::{ExportReport, Format};
 use touch2touch_work::labels::{ImprintSource, Labels};
@@ -33,82 +30,13 @@ pub(super) enum MasksVerb {
     Export(ExportArgs),
     /// Take masks over that lie in one of these forms. What was painted by hand stays, and no pair is marked.
     Import(import::ImportArgs),
-    /// Compare the masks of two people, the worst first.
-    Compare(CompareMasksArgs),
     /// Propose masks for many pairs at once. What was painted by hand stays, and every pair is still to be looked at.
     Propose(Box<propose::ProposeArgs>),
-    /// Count the pairs of each tool in each review state, and what the masks took: seconds, edits, repeats.
-    Stats(stats::StatsArgs),
     /// List the pairs, the most uncertain masks first.
     Queue(Box<queue::QueueArgs>),
     /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
     /// pairs that were left out.
     Train(train::TrainArgs),
-}
-
-/// Arguments of `masks compare`.
-#[derive(Debug, Args)]
-pub(super) struct CompareMasksArgs {
-    #[command(flatten)]
-    dataset: DatasetArgs,
-    /// The other person's folder of labels (a `touch2touch_masks`), of the same data set.
-    #[arg(long)]
-    with: PathBuf,
-    #[command(flatten)]
-    common: Common,
-}
-
-/// Answer of `masks compare`.
-#[derive(Serialize)]
-struct Comparison {
-    folders: [PathBuf; 2],
-    mean_iou: Option<f64>,
-    mean_dice: Option<f64>,
-    mean_edge_mm: Option<f64>,
-    #[serde(flatten)]
-    found: Agreements,
-}
-
-fn compare(args: &CompareMasksArgs) -> VerbResult {
-    let dataset = args.dataset.open()?;
-    let output = Output::new(args.common, "comparing", 1);
-    if !args.with.is_dir() {
-        anyhow::bail!("there is no folder {}; name the other person's touch2touch_masks", args.with.display());
-    }
-    let (own, other) = (Labels::of(&dataset), Labels::in_folder(&dataset, &args.with));
-    let found = compare_labels(&dataset, &own, &other)?;
-    if found.masks.is_empty() {
-        anyhow::bail!(
-            "no mask was drawn by both: {} only here, {} only in {}",
-            found.only[0],
-            found.only[1],
-            args.with.display()
-        );
-    }
-    let [mean_iou, mean_dice, mean_edge_mm] = found.means();
-    let folders = [own.folder()?.to_owned(), args.with.clone()];
-    let report = Comparison { folders, mean_iou, mean_dice, mean_edge_mm, found };
-    output.finish(&report, || {
-        let mm = |edge: Option<f64>| edge.map_or_else(|| "-".to_owned(), |mm| format!("{mm:.2}"));
-        let mut lines = vec![format!("{:>6} {:>6} {:>8}  pair, finger", "IoU", "Dice", "edge mm")];
-        for one in &report.found.masks {
-            let a = &one.agreement;
-            let edge = mm(a.edge_mm);
-            lines.push(format!("{:6.3} {:6.3} {edge:>8}  {}, {}", a.iou, a.dice, one.pair, one.finger));
-        }
-        let mean = |value: Option<f64>| value.map_or_else(|| "-".to_owned(), |v| format!("{v:.3}"));
-        lines.push(format!(
-            "mean of {} masks: IoU {}, Dice {}, edges {} mm apart; drawn here alone {}, there alone {}",
-            report.found.masks.len(),
-            mean(mean_iou),
-            mean(mean_dice),
-            mm(mean_edge_mm),
-            report.found.only[0],
-            report.found.only[1]
-        ));
-        lines.join("\n")
-    })?;
-    Ok(true)
 }
 
 /// Arguments of `masks export`.
@@ -181,9 +109,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
         MasksVerb::Import(args) => return import::run(args),
-        MasksVerb::Compare(args) => return compare(args),
         MasksVerb::Propose(args) => return propose::run(args),
-        MasksVerb::Stats(args) => return stats::run(args),
         MasksVerb::Queue(args) => return queue::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };

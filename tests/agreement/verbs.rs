@@ -73,7 +73,6 @@ fn held(verb: &str) -> Option<Held> {
             labels::masks_proposed_by_a_random_recipe_for_all_pairs_are_those_of_the_verb,
             proposals::what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did,
         ]),
-        "masks stats" => By(&[labels::random_edits_of_masks_by_hand_are_those_of_the_verb]),
         "masks queue" => By(&[
             tables::a_random_recipe_orders_the_masks_the_same_in_the_list_and_by_the_verb,
             super::the_most_uncertain_masks_are_in_one_order_in_both,
@@ -87,7 +86,6 @@ fn held(verb: &str) -> Option<Held> {
             shards::masks_are_proposed_in_parts_as_at_once,
             shards::an_evaluation_finds_what_its_parts_have_kept,
         ]),
-        "masks compare" => Not("the studio compares one person with oneself only (masks stats)"),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "trials" => Not("it simulates its grasps; the studio plays the trial of a pair, as `pose --trial`"),
         "training-data" => Not("only the training in Python reads it"),

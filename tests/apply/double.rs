@@ -33,11 +33,9 @@ use touch2touch_work::infer::bundle::Origin;
 use touch2touch_work::infer::bundle::SensorPair;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::JobCx;
-use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{Operation, Recovered, Unsaved};
 use touch2touch_work::models::GenerateInput;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::repeats::Repeater;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];
@@ -60,10 +58,6 @@ pub(crate) struct Source {
     /// Labels kept where they wait, or in a folder that was named.
     pub(crate) waiting: Mutex<Vec<(Option<PathBuf>, Unsaved)>>,
     pub(crate) saves: AtomicU64,
-    /// Second masks as they would lie on the disk.
-    pub(crate) repeats: Mutex<BTreeMap<String, PairLabels>>,
-    /// Pairs that are to come back.
-    pub(crate) due: Mutex<Vec<String>>,
     /// What is odd about every pair loaded from now on.
     pub(crate) notes: Mutex<Vec<Problem>>,
 }
@@ -92,8 +86,6 @@ impl Source {
             lost: AtomicBool::new(false),
             waiting: Mutex::default(),
             saves: AtomicU64::new(0),
-            repeats: Mutex::default(),
-            due: Mutex::default(),
             notes: Mutex::default(),
         }
     }
@@ -194,24 +186,6 @@ impl DataSource for Source {
         let kept = unsaved.iter().map(|one| (folder.map(Path::to_owned), one.clone()));
         self.waiting.lock().unwrap().extend(kept);
         Ok(folder.map_or_else(|| "waiting".into(), Path::to_owned))
-    }
-
-    fn load_repeat(&self, _: &str, name: &str) -> Result<PairLabels, TaskError> {
-        Ok(self.repeats.lock().unwrap().get(name).cloned().unwrap_or_default())
-    }
-
-    fn save_repeat(&self, _: &str, name: &str, labels: &PairLabels, _: &Operation) -> Result<(), TaskError> {
-        if self.full_disk.load(Ordering::Relaxed) {
-            return Err(TaskError::new("Save the repeat", "no space left"));
-        }
-        self.repeats.lock().unwrap().insert(name.to_owned(), labels.clone());
-        Ok(())
-    }
-
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, _: Repeater<'_>) -> Result<LabelStats, TaskError> {
-        let mut stats = LabelStats::of_reviews(self.index(), reviews);
-        stats.repeats.due.clone_from(&self.due.lock().unwrap());
-        Ok(stats)
     }
 
     fn plan_masks(&self, _: &BTreeMap<String, PairLabels>, _: ExportChoice) -> Result<Plan, TaskError> {

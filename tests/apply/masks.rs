@@ -127,7 +127,7 @@ fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
     let stored = |bench: &Bench| bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
     assert_eq!(stored(&bench).note, "odd edge");
     assert!(stored(&bench).masks.is_empty(), "it may still be given up");
-    assert!(bench.state.document.own_labels()[&name].masks.is_empty());
+    assert!(bench.state.document.finished_labels()[&name].masks.is_empty());
     assert!(bench.state.document.stroke.is_some(), "it goes on");
     bench.send(LabelsCommand::EndStroke);
     bench.settle();
@@ -473,84 +473,4 @@ fn a_gate_keeps_tools_to_a_depth() {
     stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
     assert_eq!(mask(&bench, lab::RIGHT), gated);
     assert!(bench.state.log.entries.len() > said);
-}
-
-#[test]
-fn a_pair_that_comes_back_is_drawn_apart_from_its_first_mask() {
-    let mut bench = bench();
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.send(prefer(|s| s.person = "Anna".into()));
-    bench.settle();
-    let first = "tool_a/data_0".to_owned();
-    for _ in 0..5 {
-        stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
-        bench.settle();
-        bench.send(LibraryCommand::DoneAndNext);
-        bench.settle();
-    }
-    let stored = bench.services.source.labels.lock().unwrap()[&first].clone();
-    bench.services.source.due.lock().unwrap().push(first.clone());
-    // Another mark: what comes back is asked for anew, and then it comes.
-    bench.send(LabelsCommand::SetReview(Review::Flagged));
-    bench.settle();
-    bench.send(LibraryCommand::DoneAndNext);
-    bench.settle();
-    assert_eq!(bench.state.pair_name(), first);
-    assert_eq!(bench.state.document.review(&first), Review::Todo);
-    assert!(results::drawn_mask(&bench.state, MEASURED, lab::RIGHT).is_none(), "it looks as if nobody had drawn on it");
-    assert!(Action::Undo.command(&bench.state).is_none());
-    stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [2.0, 14.0]);
-    bench.settle();
-    let second = mask(&bench, lab::RIGHT);
-    // Left and looked at again before it is done, it is still the second one.
-    bench.send(LibraryCommand::Step(1));
-    bench.settle();
-    bench.send(LibraryCommand::Step(-1));
-    bench.settle();
-    assert_eq!(mask(&bench, lab::RIGHT), second);
-    assert_eq!(bench.services.source.labels.lock().unwrap()[&first], stored, "the first is not touched");
-    assert_eq!(*bench.services.source.repeats.lock().unwrap()[&first].measured(lab::RIGHT).unwrap().mask, second);
-    bench.send(LibraryCommand::DoneAndNext);
-    bench.settle();
-    assert!(bench.state.document.repeats.is_empty() && bench.state.pair_name() != first);
-    assert_eq!(bench.state.document.review(&first), Review::Done);
-    bench.send(LibraryCommand::First);
-    bench.settle();
-    assert_eq!(bench.state.pair_name(), first);
-    assert_eq!(
-        *results::drawn_mask(&bench.state, MEASURED, lab::RIGHT).unwrap().mask,
-        *stored.measured(lab::RIGHT).unwrap().mask
-    );
-    assert_eq!(bench.services.source.labels.lock().unwrap()[&first], stored);
-    assert_eq!(bench.errors(), 0, "{:?}", bench.log());
-}
-
-#[test]
-fn a_disk_that_refuses_keeps_the_second_mask_on_screen() {
-    let mut bench = bench();
-    bench.send(prefer(|s| s.person = "Anna".into()));
-    for _ in 0..5 {
-        bench.send(LibraryCommand::DoneAndNext);
-        bench.settle();
-    }
-    let first = "tool_a/data_0".to_owned();
-    bench.services.source.due.lock().unwrap().push(first.clone());
-    bench.send(LabelsCommand::SetReview(Review::Flagged));
-    bench.settle();
-    bench.send(LibraryCommand::DoneAndNext);
-    bench.settle();
-    assert_eq!(bench.state.pair_name(), first);
-    bench.services.source.full_disk.store(true, Ordering::Relaxed);
-    stroke(&mut bench, lab::RIGHT, [2.0, 1.0], [2.0, 14.0]);
-    bench.send(LibraryCommand::DoneAndNext);
-    bench.settle();
-    assert!(bench.state.document.repeats.contains_key(&first), "it is not over before it is written");
-    bench.services.source.full_disk.store(false, Ordering::Relaxed);
-    bench.send(LabelsCommand::Save);
-    bench.settle();
-    assert!(bench.state.document.repeats.is_empty());
-    assert!(bench.services.source.repeats.lock().unwrap().contains_key(&first));
-    // The first time nothing was drawn: what was right was accepted, and stays so.
-    let stored = bench.services.source.labels.lock().unwrap()[&first].clone();
-    assert!(stored.masks.values().all(|mask| mask.base().starts_with("Accepted by Anna")), "{stored:?}");
 }

@@ -1,4 +1,4 @@
-//! A data set of masks: notes, which to look at first, and what they took.
+//! A data set of masks: notes, and which to look at first.
 
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::MaskStore;
@@ -25,52 +25,6 @@ fn notes_are_written_listed_and_removed() {
     assert!(journal.contains(r#""note":["","shallow at the edge"]"#), "{journal}");
     assert!(note("").status.success());
     assert_eq!(store.load_review(&name).unwrap().unwrap().note, "");
-}
-
-#[test]
-fn what_masks_took_is_counted_from_their_journals() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    let path = set.to_str().unwrap();
-    let simulate = ["simulate", "--out", path, "--tools", "pattern_36,pattern_31_rod", "--grasps", "2", "--seed", "4"];
-    assert!(run(&simulate, dir.path()).status.success());
-    let names: Vec<String> = Dataset::open(&set).unwrap().index.pairs.iter().map(|pair| pair.name.clone()).collect();
-    let none = json(&run(&["masks", "stats", path, "--json"], dir.path()));
-    assert_eq!((&none["all"]["todo"], none["seconds_per_mask"].is_null()), (&names.len().into(), true));
-    let label = |words: &[&str]| {
-        let done = run(&[&["label", path, "--pair", &names[0], "--person", "Anna"], words].concat(), dir.path());
-        assert!(done.status.success(), "{}", error_text(&done));
-    };
-    label(&["--adopt", "--mask", "threshold", "--finger", "right"]);
-    label(&["--clean", "grow=1.3", "--finger", "right"]);
-    label(&["--review", "done"]);
-    let found = json(&run(&["masks", "stats", path, "--person", "Anna", "--json"], dir.path()));
-    assert_eq!((&found["all"]["done"], &found["all"]["todo"]), (&1.into(), &(names.len() - 1).into()));
-    assert_eq!(found["tools"].as_array().unwrap().len(), 2);
-    // One took two edits; the left finger's was right as it was, and done accepted it by one.
-    assert_eq!((&found["effort"]["masks"], &found["edits_per_mask"]), (&2.into(), &1.5.into()));
-    assert_eq!(found["sources"]["threshold"]["masks"], 1);
-    assert_eq!((&found["pairs"][0]["pair"], &found["pairs"][0]["person"]), (&names[0].clone().into(), &"Anna".into()));
-    assert!(found["seconds_per_mask"].as_f64().unwrap() <= 60.0);
-    // A second mask, as the studio writes it, is listed with how far it is from the first.
-    let store = MaskStore::for_dataset(&Dataset::open(&set).unwrap()).unwrap();
-    let (right, again) = (touch2touch_core::rig::lab::RIGHT, store.repeats_of("Anna"));
-    let mut mask = store.load(&names[0], right).unwrap().unwrap();
-    mask.mask = touch2touch_core::label::shrink(&mask.mask, 2.0);
-    again.save(&names[0], right, Some(&mask)).unwrap();
-    again.save_review(&names[0], &store.load_review(&names[0]).unwrap().unwrap()).unwrap();
-    let found = json(&run(&["masks", "stats", path, "--person", "Anna", "--json"], dir.path()));
-    let repeat = &found["repeats"]["masks"][0];
-    assert!(repeat["pair"] == *names[0] && repeat["dice"].as_f64().unwrap() < 1.0, "{found}");
-    let said = run(&["masks", "stats", path, "--person", "Anna"], dir.path());
-    let text = String::from_utf8_lossy(&said.stdout).into_owned();
-    assert!(text.contains("drawn twice") && text.contains("from threshold"), "{text}");
-    assert!(
-        json(&run(&["masks", "stats", path, "--person", "Ben", "--json"], dir.path()))["repeats"]["masks"]
-            .as_array()
-            .unwrap()
-            .is_empty()
-    );
 }
 
 #[cfg(feature = "onnx")]

@@ -388,7 +388,6 @@ fn nothing_is_written_where_the_data_set_is_not_any_more() {
             store.save_review(PAIR, &StoredReview::default()),
             store.append_journal(PAIR, &entry(1)),
             store.hold().map(drop),
-            store.repeats_of("Anna").save(PAIR, lab::RIGHT, Some(&mask)),
         ];
         assert!(refused.iter().all(|r| matches!(r, Err(StoreError::Lost(_)))), "{refused:?}");
         assert!(!root.exists(), "no folder is made at the old path");

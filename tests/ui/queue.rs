@@ -1,20 +1,17 @@
-//! A data set at the labeling desk: notes, the most uncertain first, and pairs that come back.
+//! A data set at the labeling desk: notes, and the most uncertain first.
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, TasksCommand};
-use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::command::{LabelsCommand, LibraryCommand};
 use touch2touch::app::labels::Review;
 use touch2touch::app::library::{Place, Sort};
-use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
-use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanKind, CleanUp};
-use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::MaskStore;
+use touch2touch_work::queue::QueueBy;
 
 use super::rig::{Rig, write_dataset};
 
@@ -76,13 +73,15 @@ fn a_note_is_typed_without_a_key_firing_and_is_found_again() {
 }
 
 #[test]
-fn the_most_uncertain_come_first_by_key_and_say_why() {
+fn the_most_uncertain_come_first_and_say_why() {
     let folder = tempfile::tempdir().unwrap();
     write_dataset(folder.path(), 3);
     let Some(mut rig) = Rig::live(SIZE, Place::Path(folder.path().to_owned())) else { return };
     desk(&mut rig);
-    // The first press ranks the pairs, the next ones go through them.
-    press(&mut rig, Modifiers::ALT, Key::N);
+    rig.send(LibraryCommand::SetUncertainBy(QueueBy::default()));
+    rig.harness.get_by_label("Rank by uncertainty").click();
+    rig.harness.step();
+    rig.settle();
     assert_eq!((state(&rig).library.sort, state(&rig).table.scores.queue.known()), (Sort::Uncertain, 6));
     assert!(state(&rig).table.result.is_none(), "a ranking is no results table");
     rig.shoot("queue-uncertain");
@@ -93,7 +92,7 @@ fn the_most_uncertain_come_first_by_key_and_say_why() {
     rig.send(LibraryCommand::Last);
     rig.send(LabelsCommand::SetReview(Review::Done));
     for expected in [0, 1, 2, 3, 4, 0] {
-        press(&mut rig, Modifiers::ALT, Key::N);
+        press(&mut rig, Modifiers::SHIFT, Key::N);
         assert_eq!(state(&rig).selection.pair, Some(order[expected]), "the last is done");
     }
     // A mask that is drawn otherwise is a disagreement, once it is ranked again.
@@ -107,72 +106,4 @@ fn the_most_uncertain_come_first_by_key_and_say_why() {
     let disagreement = queued.parts.iter().find(|part| part.text().starts_with("Hand against model"));
     assert!(disagreement.is_some_and(|part| part.value > 0.05), "{queued:?}");
     rig.shoot("queue-disagreement");
-}
-
-fn drawn(rig: &Rig) -> Option<Mask> {
-    let hand = results::drawn_mask(state(rig), ImprintSource::Measured, lab::RIGHT)?;
-    Some((*hand.mask).clone())
-}
-
-#[test]
-fn what_was_done_comes_back_without_its_mask_and_is_compared_with_it() {
-    let Some(mut rig) = Rig::new(SIZE, 7) else { return };
-    desk(&mut rig);
-    rig.send(prefer(|s| s.repeats_percent = 100.0));
-    let store = MaskStore::for_dataset(&Dataset::open(&rig.data).unwrap()).unwrap();
-    let first = state(&rig).pair_name().to_owned();
-    let mut done = 0;
-    while !state(&rig).document.repeats.contains_key(state(&rig).pair_name()) {
-        rig.send(LabelsCommand::AdoptAutomatic);
-        press(&mut rig, Modifiers::CTRL, Key::Enter);
-        done += 1;
-        assert!(done < 14, "nothing comes back");
-    }
-    assert_eq!((done, state(&rig).pair_name()), (12, &*first), "the first, ten others having been done since");
-    // It looks as if nobody had drawn on it, and nothing of before can be undone into it.
-    assert_eq!((state(&rig).document.review(&first), drawn(&rig)), (Review::Todo, None));
-    assert!(state(&rig).document.is_editable(&first));
-    assert!(state(&rig).history.done().iter().all(|gesture| gesture.pair() != first));
-    let before = std::fs::read(store.mask_file(&first, lab::RIGHT)).unwrap();
-    let review = store.load_review(&first).unwrap();
-    rig.shoot("queue-repeat");
-    rig.send(LabelsCommand::AdoptAutomatic);
-    rig.send(LabelsCommand::CleanUp(CleanUp { kind: CleanKind::Grow, size_mm: 1.0 }));
-    let second = drawn(&rig).unwrap();
-    // What is painted then lies apart, and an export takes the first.
-    let again = store.repeats_of("Anna");
-    assert_eq!(again.load(&first, lab::RIGHT).unwrap().unwrap().mask, second);
-    assert!(!state(&rig).document.own_labels().contains_key(&first));
-    press(&mut rig, Modifiers::CTRL, Key::Enter);
-    assert!(state(&rig).document.repeats.is_empty(), "it is over when it is written and left");
-    assert_eq!(std::fs::read(store.mask_file(&first, lab::RIGHT)).unwrap(), before);
-    assert_eq!(store.load_review(&first).unwrap(), review);
-    assert_eq!(state(&rig).document.review(&first), Review::Done);
-    // Shown again, it is the first one, with its past.
-    rig.send(LibraryCommand::First);
-    assert_eq!(state(&rig).pair_name(), first);
-    assert_ne!(drawn(&rig).unwrap(), second);
-    assert!(state(&rig).history.done().iter().any(|gesture| gesture.pair() == first));
-    let stats = state(&rig).document.stats.clone().unwrap();
-    assert_eq!(stats.repeats.masks.len(), 1, "{:?}", stats.repeats);
-    let compared = &stats.repeats.masks[0].compared;
-    assert!(compared.pair == first && compared.agreement.dice < 1.0 && compared.agreement.edge_mm.unwrap() > 0.1);
-    assert!(!stats.repeats.due.contains(&first), "once is enough");
-    // Of each pair one mask was taken over, and the other finger's was right and accepted.
-    assert_eq!((stats.all.of(Review::Done), stats.effort.masks), (12, 24));
-    let drawn_twice = rig.harness.get_by_label_contains("Drawn twice");
-    drawn_twice.scroll_to_me();
-    rig.settle();
-    rig.harness.get_by_label_contains("Drawn twice").click();
-    rig.harness.step();
-    rig.settle();
-    rig.harness.get_by_label_contains("All 2 tools").click();
-    rig.harness.step();
-    rig.settle();
-    rig.shoot("queue-progress");
-    // A restart in the middle of another one leaves the first mask in force.
-    rig.send(TasksCommand::LogSeen(u64::MAX));
-    rig.restart(SIZE);
-    assert!(state(&rig).document.repeats.is_empty());
-    assert_eq!(state(&rig).document.review(&first), Review::Done);
 }

@@ -11,7 +11,7 @@ use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Workspace;
 use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::FOLDER;
+use touch2touch_work::io::masks::{FOLDER, MaskStore};
 use touch2touch_work::labels::{Labels, recover};
 
 use super::rig::Rig;
@@ -100,9 +100,8 @@ fn labels_go_elsewhere_or_nowhere_and_are_kept_where_nobody_was_asked() {
     rig.harness.get_by_label("Use this path").click();
     let answers: Vec<ViewportCommand> = (0..20).flat_map(|_| rig.step_answering()).collect();
     assert!(answers.contains(&ViewportCommand::Close), "{answers:?}");
-    let dataset = Dataset::open(&rig.data).unwrap();
-    let there = Labels::in_folder(&dataset, &usb.join(FOLDER)).reviews().states;
-    assert_eq!(there.into_values().collect::<Vec<_>>(), [Review::Flagged]);
+    let (there, _) = MaskStore::in_folder(usb.join(FOLDER)).reviews();
+    assert_eq!(there.into_iter().map(|(_, stored)| stored.review).collect::<Vec<_>>(), [Review::Flagged.stored()]);
 
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     stick(&mut rig);

@@ -1,7 +1,5 @@
-//! Labels: what people said about pairs, how far they agree, and what it cost them.
+//! Labels: what people said about pairs, and how far they are.
 
-pub mod agreement;
 pub mod filter;
-pub mod label_stats;
 pub mod labels;
-pub mod repeats;
+pub mod progress;

@@ -32,7 +32,7 @@ mod way;
 
 pub use assist::{label_edit, label_pair, propose, queue};
 pub use exchange::{case, export, import, pair_files};
-pub use labeling::{agreement, filter, label_stats, labels, repeats};
+pub use labeling::{filter, labels, progress};
 pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{
     canvas, compare, depict, deviation, doubts, ensemble, evaluate, fan, figure, fonts, influence, layers, ledger,

@@ -24,10 +24,7 @@ impl Action {
                 Self::Generate | Self::GenerateNewSeed | Self::NextPair | Self::PreviousPair | Self::NextWorst
             ),
             Workspace::Align => self.group() == Group::Pose,
-            Workspace::Label => {
-                self.group() == Group::Mask
-                    || matches!(self, Self::NextUnfinished | Self::NextUncertain | Self::RankMasks)
-            }
+            Workspace::Label => self.group() == Group::Mask || matches!(self, Self::NextUnfinished | Self::RankMasks),
             Workspace::Evaluate => {
                 matches!(
                     self,

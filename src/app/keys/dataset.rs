@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::super::keys::{Bits, DatasetSeq, Key, PairKey, Revision};
+use super::super::keys::{DatasetSeq, Key, PairKey, Revision};
 use super::super::scores::ScoreTable;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
@@ -11,7 +11,6 @@ use touch2touch_work::about::Fact;
 use touch2touch_work::evaluate::Evaluation;
 use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::import::Import;
-use touch2touch_work::label_stats::LabelStats;
 use touch2touch_work::labels::{JournalHistory, PairLabels};
 use touch2touch_work::tool::NamedTool;
 use touch2touch_work::train::{TrainChoice, TrainPlan};
@@ -57,12 +56,7 @@ impl Key for ToolKey {
 
 /// The labels stored for a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LabelsKey {
-    /// The pair.
-    pub pair: PairKey,
-    /// True where the labels of a second time are meant.
-    pub repeat: bool,
-}
+pub struct LabelsKey(pub PairKey);
 
 impl Key for LabelsKey {
     type Value = Read;
@@ -74,28 +68,6 @@ pub struct Read {
     pub(crate) labels: PairLabels,
     /// The gestures of earlier runs.
     pub(crate) told: JournalHistory,
-}
-
-/// Everything that decides what is counted.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LabelStatsKey {
-    pub(crate) dataset: DatasetSeq,
-    /// Pairs that the data set has by now.
-    pub(crate) pairs: usize,
-    /// The number of times that review states were written.
-    pub(crate) marks: u64,
-    /// Whose repeats.
-    pub(crate) person: String,
-    /// The share of the pairs that come back, percent.
-    pub(crate) repeats_percent: Bits,
-}
-
-impl Key for LabelStatsKey {
-    type Value = LabelStats;
-
-    fn bytes(stats: &LabelStats) -> usize {
-        512 * stats.pairs.len() + 128 * stats.tools.len()
-    }
 }
 
 /// Everything that decides which scores are there.

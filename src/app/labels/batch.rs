@@ -82,7 +82,7 @@ fn reread(state: &mut State, names: &[String]) {
         let doc = &mut state.document;
         let drawn_on = doc.stroke.as_ref().is_some_and(|stroke| stroke.pair == *name);
         // What is on its way to the disk is merged there, and comes back merged.
-        if drawn_on || doc.unsaved.contains(name) || doc.repeats.contains_key(name) {
+        if drawn_on || doc.unsaved.contains(name) {
             continue;
         }
         doc.reread(name);

@@ -96,7 +96,7 @@ pub(in crate::app) fn failed(state: &mut State, not: NotSaved, effects: &mut Vec
     if state.library.open.as_ref().is_none_or(|open| open.seq != save.seq) {
         // Another data set is open by now: nobody would try again.
         state.log.error(&err);
-        let unsaved = Unsaved { name: save.name, labels: save.labels, deed: save.deed, repeat: save.repeat };
+        let unsaved = Unsaved { name: save.name, labels: save.labels, deed: save.deed };
         return effects.push(Effect::keep_waiting(source, vec![unsaved]));
     }
     let doc = &mut state.document;
@@ -141,10 +141,8 @@ pub(in crate::app) fn kept(
 /// The labels that are not on the disk, as they are now.
 pub fn unsaved(state: &State) -> Vec<Unsaved> {
     let one = |name: &String| {
-        let repeat = state.document.repeats.get(name).map(|repeating| repeating.person.clone());
-        let person = repeat.clone().or_else(|| state.settings.known_labeler());
-        let deed = Operation { person, ..Operation::named("saved elsewhere") };
-        Some(Unsaved { name: name.clone(), labels: state.document.finished(name)?, deed, repeat })
+        let deed = Operation { person: state.settings.known_labeler(), ..Operation::named("saved elsewhere") };
+        Some(Unsaved { name: name.clone(), labels: state.document.finished(name)?, deed })
     };
     state.document.unsaved.iter().filter_map(one).collect()
 }

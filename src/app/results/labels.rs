@@ -11,25 +11,16 @@ use super::super::state::State;
 use super::super::state::labels::Stored;
 use super::super::state::tasks::Level;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::JournalHistory;
 
 /// The name of the pair.
 fn name(state: &State, key: LabelsKey) -> Option<String> {
-    Some(state.library.entry(key.pair.pair)?.name.clone())
+    Some(state.library.entry(key.0.pair)?.name.clone())
 }
 
 impl Computes for LabelsKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Read>> {
         let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, *self)?);
-        let repeat = state.document.repeats.get(&name).map(|repeating| repeating.person.clone());
-        if repeat.is_some() != self.repeat {
-            return None;
-        }
         Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
-            if let Some(person) = repeat {
-                let labels = source.load_repeat(&person, &name)?;
-                return Ok(Read { labels, told: JournalHistory::default() });
-            }
             let labels = source.load_labels(&name)?;
             let told = source.past(&name, &labels);
             Ok(Read { labels, told })
@@ -39,10 +30,6 @@ impl Computes for LabelsKey {
     fn arrived(&self, state: &mut State, read: &Arc<Read>) {
         let Some(name) = name(state, *self) else { return };
         let doc = &mut state.document;
-        // Asked for before the pair came back, or before that was over.
-        if doc.repeats.contains_key(&name) != self.repeat {
-            return;
-        }
         if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
             // Read twice: what is here may be newer.
             return;
@@ -63,7 +50,7 @@ impl Computes for LabelsKey {
     }
 
     fn failed(&self, state: &mut State, err: &TaskError) -> bool {
-        if let Some(name) = name(state, *self).filter(|name| state.document.repeats.contains_key(name) == self.repeat) {
+        if let Some(name) = name(state, *self) {
             state.document.stored.insert(name, Stored::Blocked(err.clone()));
         }
         true

@@ -10,7 +10,7 @@ use touch2touch_work::export::Plan;
 impl Computes for MaskPlanKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
         let source = state.library.open.as_ref()?.source.clone();
-        let (changed, choice) = (state.document.own_labels(), self.choice);
+        let (changed, choice) = (state.document.finished_labels(), self.choice);
         Some(Job::new(Lane::Files, "Plan of an export", move |_| source.plan_masks(&changed, choice)))
     }
 

@@ -96,13 +96,7 @@ impl Runtime {
     fn save_labels(&self, source: Arc<dyn DataSource>, save: LabelsToSave) {
         let not = NotSaved { source: source.clone(), save: save.clone(), err: TaskError::new("", "") };
         let body: Body<Answer> = Box::new(move |_| {
-            let now = match &save.repeat {
-                None => source.save_labels(&save.name, &save.labels, &save.deed)?,
-                Some(person) => {
-                    source.save_repeat(person, &save.name, &save.labels, &save.deed)?;
-                    None
-                }
-            };
+            let now = source.save_labels(&save.name, &save.labels, &save.deed)?;
             let LabelsToSave { name, revision, labels: given, .. } = save;
             let merged = now.map(|now| Box::new(Merged { given, now }));
             Ok(Answer::LabelsSaved(name, revision, merged))

@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -12,7 +12,7 @@ use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::services::Opened;
 use super::super::source::DataSource;
-use super::super::state::labels::{PairLabels, Review};
+use super::super::state::labels::PairLabels;
 use super::super::state::library::Place;
 use super::super::state::settings::{SETTINGS_VERSION, Settings};
 use super::Services;
@@ -36,12 +36,10 @@ use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
 use touch2touch_work::io::{atomic, case_file, files, folders};
 use touch2touch_work::job::JobCx;
-use touch2touch_work::label_stats::{LabelStats, label_stats};
 use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
 use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
 use touch2touch_work::new_bundle::models_folder;
 use touch2touch_work::prediction::Prediction;
-use touch2touch_work::repeats::Repeater;
 use touch2touch_work::tool::tool_file;
 use touch2touch_work::tuning::unfinished_folder;
 
@@ -114,8 +112,8 @@ fn open_recovering(place: &Place, waiting: Option<&Path>) -> Result<LiveSource, 
     let recovered = waiting.map(|waiting| recover(&dataset, &labels, waiting)).unwrap_or_default();
     let mut reviews = labels.reviews();
     problems.append(&mut reviews.problems);
-    let (dataset, repeats, waiting) = (Arc::new(dataset), Arc::default(), waiting.map(Path::to_owned));
-    Ok(LiveSource { dataset, labels, problems, reviews, repeats, case, waiting, recovered })
+    let (dataset, waiting) = (Arc::new(dataset), waiting.map(Path::to_owned));
+    Ok(LiveSource { dataset, labels, problems, reviews, case, waiting, recovered })
 }
 
 /// An open data set with its store of labels.
@@ -125,8 +123,6 @@ pub struct LiveSource {
     labels: Labels,
     problems: Vec<Problem>,
     reviews: Reviews,
-    /// Second masks, by person.
-    repeats: Arc<Mutex<BTreeMap<String, Labels>>>,
     case: Option<(PairId, Case, Held)>,
     /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
@@ -137,16 +133,6 @@ impl LiveSource {
     /// The data set.
     pub fn dataset(&self) -> &Dataset {
         &self.dataset
-    }
-
-    /// The second drawings of each person: one value for all, so that only differences are written.
-    fn repeats_of(&self, person: &str) -> Result<Labels, TaskError> {
-        let mut known = self.repeats.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(labels) = known.get(person) {
-            return Ok(labels.clone());
-        }
-        let labels = self.labels.repeats_of(person)?;
-        Ok(known.entry(person.to_owned()).or_insert(labels).clone())
     }
 }
 
@@ -200,7 +186,6 @@ impl DataSource for LiveSource {
             labels: self.labels.continued(dataset),
             problems: dataset.problems.clone(),
             reviews: self.reviews.clone(),
-            repeats: self.repeats.clone(),
             case: None,
             waiting: self.waiting.clone(),
             recovered: Recovered::default(),
@@ -231,18 +216,6 @@ impl DataSource for LiveSource {
                 Err(TaskError::new("Keep the labels", "this system names no folder for what could not be saved"))
             }
         }
-    }
-
-    fn load_repeat(&self, person: &str, name: &str) -> Result<PairLabels, TaskError> {
-        self.repeats_of(person)?.load(name)
-    }
-
-    fn save_repeat(&self, person: &str, name: &str, labels: &PairLabels, deed: &Operation) -> Result<(), TaskError> {
-        self.repeats_of(person)?.save(name, labels, deed).map(drop)
-    }
-
-    fn label_stats(&self, reviews: &BTreeMap<String, Review>, whose: Repeater<'_>) -> Result<LabelStats, TaskError> {
-        Ok(label_stats(&self.dataset, &self.labels, reviews, whose))
     }
 
     fn plan_masks(&self, changed: &BTreeMap<String, PairLabels>, choice: ExportChoice) -> Result<Plan, TaskError> {
@@ -469,6 +442,7 @@ mod tests {
     use touch2touch_work::export::{LeftOut, Which};
     use touch2touch_work::io::masks::MaskStore;
     use touch2touch_work::labels::ImprintOf;
+    use touch2touch_work::labels::Review;
     use touch2touch_work::labels::{DrawnMask, MaskPlace, Revision};
     use touch2touch_work::subject::Subject;
 

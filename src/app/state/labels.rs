@@ -9,8 +9,8 @@ use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, VisiblePixels};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::error::TaskError;
-use touch2touch_work::label_stats::LabelStats;
 pub use touch2touch_work::labels::{DrawnMask, MaskPlace, PairLabels, Review};
+use touch2touch_work::progress::Progress;
 use touch2touch_work::propose::Proposal;
 
 /// The outcome of reading the stored labels of a pair.
@@ -33,18 +33,10 @@ pub struct Document {
     pub reviews: BTreeMap<String, Review>,
     /// Notes of all pairs: known at opening.
     pub notes: BTreeMap<String, String>,
-    /// Pairs that are drawn a second time without the first mask: what is known of them here is of that.
-    pub repeats: BTreeMap<String, Repeating>,
-    /// Pairs that came back in this run, and are over.
-    pub(in crate::app) repeated: BTreeSet<String>,
-    /// Pairs done since one came back.
-    pub(in crate::app) since_repeat: usize,
-    /// The number of times that review states were written: they are counted again then.
-    pub(in crate::app) marks: u64,
-    /// True where a review state was changed since.
+    /// The pairs by tool and review state.
+    pub progress: Progress,
+    /// True where a review state was changed since they were counted.
     pub(in crate::app) marked: bool,
-    /// The counts of last time.
-    pub stats: Option<Arc<LabelStats>>,
     /// Pairs whose last change is not on the disk yet.
     pub unsaved: BTreeSet<String>,
     /// The pairs whose last writing failed, and why.
@@ -144,22 +136,10 @@ impl Stroke {
     }
 }
 
-/// A pair that is drawn a second time, with what was said about it the first time.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Repeating {
-    /// Who draws it.
-    pub person: String,
-    /// The review state.
-    pub(in crate::app) review: Review,
-    /// The note.
-    pub(in crate::app) note: String,
-}
-
 impl Document {
-    /// Labels of the pairs looked at so far, without those that are drawn a second time.
-    pub fn own_labels(&self) -> BTreeMap<String, PairLabels> {
-        let own = self.labels.keys().filter(|name| !self.repeats.contains_key(*name));
-        own.filter_map(|name| Some((name.clone(), self.finished(name)?))).collect()
+    /// Labels of the pairs looked at so far, without strokes that are still being drawn.
+    pub fn finished_labels(&self) -> BTreeMap<String, PairLabels> {
+        self.labels.keys().filter_map(|name| Some((name.clone(), self.finished(name)?))).collect()
     }
 
     /// True where a polygon is being drawn that is not closed.
@@ -181,13 +161,6 @@ impl Document {
         self.labels.remove(name);
         self.stored.remove(name);
         self.changed = None;
-    }
-
-    /// Forgets what is known of a pair, its review state and note too.
-    pub(in crate::app) fn forget(&mut self, name: &str) {
-        self.reread(name);
-        self.reviews.remove(name);
-        self.notes.remove(name);
     }
 
     /// The labels of a pair, if there are any.

@@ -25,8 +25,6 @@ macro_rules! table {
         Labels(LabelsKey);
         /// The lines about the data set.
         About(AboutKey) in abouts, MIB;
-        /// The progress of the labeling, and what it took.
-        LabelStats(LabelStatsKey) in label_stats, 7 * MIB;
         /// The CAD model of a tool and what the registration derives from it.
         Tool(ToolKey) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.

@@ -24,7 +24,6 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::system_person;
 pub use touch2touch_work::mask::{MaskChoice, MaskSource};
 pub use touch2touch_work::propose::ProposalSource;
-use touch2touch_work::repeats;
 pub use touch2touch_work::space::SpacePane;
 use versus::Versus;
 
@@ -74,8 +73,6 @@ pub struct Settings {
     pub cache_mib: u32,
     /// Who labels; empty: whom the system says.
     pub person: String,
-    /// The share of the pairs that the person marked done that come back unannounced, percent; 0 switches that off.
-    pub repeats_percent: f32,
     /// True where the 3D views of prediction and measurement move together.
     pub cameras_linked: bool,
     /// The look of the 3D views.
@@ -148,7 +145,6 @@ impl Default for Settings {
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),
-            repeats_percent: (100.0 * repeats::SHARE) as f32,
             cameras_linked: true,
             scene: SceneLook::default(),
             sides: std::collections::BTreeMap::new(),
@@ -187,7 +183,6 @@ impl Settings {
             bundle_folders: person.bundle_folders.clone(),
             cache_mib: person.cache_mib,
             person: person.person.clone(),
-            repeats_percent: person.repeats_percent,
             hint_dismissed: person.hint_dismissed,
             about_own_data: person.about_own_data,
             keys: person.keys.clone(),
@@ -210,7 +205,6 @@ impl Settings {
         self.mask = self.mask.validated();
         self.scene = self.scene.validated();
         self.cache_mib = self.cache_mib.min(MAX_CACHE_MIB);
-        self.repeats_percent = clamp_or(self.repeats_percent, 0.0, 100.0, default.repeats_percent);
         self.person = self.person.chars().filter(|c| !c.is_control()).take(80).collect();
         self.recent.truncate(MAX_RECENT);
         self

@@ -7,8 +7,8 @@ use serde::Serialize;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::label_stats::Counts;
 use touch2touch_work::labels::{ImprintOf, PairLabels};
+use touch2touch_work::progress::Counts;
 
 /// Labels that are stored of a pair.
 #[derive(Debug, Serialize)]

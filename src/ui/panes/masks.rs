@@ -1,7 +1,7 @@
 //! The mask tools: what draws, what was done, the review state, where masks come from, clean-ups.
 
+mod progress;
 mod source;
-mod stats;
 
 use crate::app::results;
 use crate::app::settings::prefer;
@@ -59,7 +59,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
                 in_3d(cx, ui);
                 correct(cx, ui);
             });
-            stats::show(cx, ui);
+            progress::show(cx, ui);
         });
     });
 }

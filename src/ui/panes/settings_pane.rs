@@ -12,9 +12,6 @@ use crate::ui::parts::theme::{caption, section};
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::system_person;
 
-const REPEATS: &str = "Share of the pairs that you marked done that come back as todo, without their mask and unannounced. \
-                       The first mask stays; both are compared under Progress of the Mask pane. 0 switches it off. Default 5 %";
-
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
 
@@ -114,14 +111,6 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     ui.label(section("Labels", cx.p));
     person(cx, ui);
-    ui.horizontal(|ui| {
-        ui.label(RichText::new("Blind repeats").color(cx.p.weak));
-        let mut percent = cx.state.settings.repeats_percent;
-        let drag = egui::DragValue::new(&mut percent).speed(0.1).range(0.0..=100.0).fixed_decimals(1).suffix(" %");
-        if ui.add(drag).accessible_name("Blind repeats").on_hover_text(REPEATS).changed() {
-            cx.push(prefer(move |s| s.repeats_percent = percent));
-        }
-    });
     if let Ok(device) = cx.device {
         ui.label(caption(format!("Graphics: {}", device.adapter()), cx.p));
     }

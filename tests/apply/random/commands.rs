@@ -189,7 +189,7 @@ fn unsaved() -> impl Strategy<Value = UnsavedCommand> {
 
 fn not_saved(seq: DatasetSeq) -> Box<NotSaved> {
     let (name, labels, deed) = ("tool_a/data_0".to_owned(), PairLabels::default(), Operation::default());
-    let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed, repeat: None };
+    let save = LabelsToSave { seq, name, revision: Revision(1), labels, deed };
     let err = TaskError::new("Save the labels", "no space left");
     Box::new(NotSaved { source: Double::new(false, true).source, save, err })
 }
@@ -246,7 +246,6 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         1 => registration().prop_map(|v| prefer(move |s| s.registration = v)),
         1 => select(EngineChoice::all().collect::<Vec<_>>()).prop_map(|v| prefer(move |s| s.runtime = v)),
         1 => person.prop_map(|v| prefer(move |s| s.person = v.clone())),
-        1 => number().prop_map(|v| prefer(move |s| s.repeats_percent = v)),
         1 => any::<u32>().prop_map(|v| prefer(move |s| s.cache_mib = v)),
         1 => scene().prop_map(|v| prefer(move |s| s.scene = v.clone())),
         1 => any_of::<SpacePane>().prop_map(|sides| prefer(move |s| _ = s.sides.insert(s.workspace, sides))),
@@ -454,7 +453,6 @@ draws! {
         1 Last,
         1 NextUnfinished,
         1 NextWorst,
-        1 NextUncertain,
         1 SetUncertainBy(any_of::<QueueBy>()),
         1 DoneAndNext,
     }

@@ -100,7 +100,7 @@ mod tests {
         let [pa, pb] = [&a, &b].map(|s| s.grasp_from_object.unwrap().to_affine());
         let from_to = pa * pb.inverse();
         let ((from, mask), (to, truth)) = (surface(&a, 0), surface(&b, 0));
-        let iou = |mask: &Mask, truth: &Mask| agreement(mask, truth, 2.36).unwrap().iou;
+        let iou = |mask: &Mask, truth: &Mask| agreement(mask, truth).unwrap().iou;
         let moved = carry(from, mask, to, from_to, 0.0015).unwrap();
         let unmoved = iou(mask, truth);
         assert!(iou(&moved.mask, truth) > 0.8, "{} instead of {unmoved}", iou(&moved.mask, truth));

@@ -29,7 +29,7 @@ impl Doubt {
     /// Of one finger: the model's probability of contact at any size, its mask of the imprint, and the one drawn by hand
     /// where there is one (of another size there is none).
     pub fn of(probability: &Grid<f32>, model: &Mask, hand: Option<&Mask>) -> Self {
-        let disagreement = hand.and_then(|hand| agreement(hand, model, 1.0)).map(|agreement| 1.0 - agreement.dice);
+        let disagreement = hand.and_then(|hand| agreement(hand, model)).map(|agreement| 1.0 - agreement.dice);
         Self { unsure: unsure_share(probability), disagreement }
     }
 

@@ -29,7 +29,6 @@ use touch2touch_core::rig::{PadId, Rig};
 
 /// Name of the folder beside a data set.
 pub const FOLDER: &str = "touch2touch_masks";
-const REPEATS: &str = "repeats";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
@@ -288,14 +287,6 @@ impl MaskStore {
     #[must_use]
     pub(crate) fn of_rig(self, rig: Arc<Rig>) -> Self {
         Self { rig, ..self }
-    }
-
-    /// The store of what a person drew a second time, in a folder inside this one.
-    #[must_use]
-    pub fn repeats_of(&self, person: &str) -> Self {
-        let within = |folder: &PathBuf| folder.join(REPEATS).join(names::label(person));
-        let also_read = self.also_read.as_ref().map(within);
-        Self { folder: within(&self.folder), also_read, ..self.clone() }
     }
 
     /// Folder that files are written to.

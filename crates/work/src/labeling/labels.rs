@@ -3,16 +3,11 @@
 
 mod accepted;
 mod journal;
-mod record;
 mod recovery;
 mod stored;
 
 pub(crate) use accepted::{by_imprint, of_imprints};
 pub use journal::{Act, Change, JournalHistory, Operation, Past};
-#[cfg(test)]
-pub(crate) use record::MaskRecord;
-pub use record::Record;
-pub(crate) use record::working_seconds;
 pub use recovery::{Recovered, Unsaved, recover, take_in};
 pub use stored::Labels;
 
@@ -245,11 +240,6 @@ impl DrawnMask {
     /// Source of the mask before the first correction, in words; empty where there was none.
     pub fn base(&self) -> String {
         self.marks.base().text()
-    }
-
-    /// True where a person said of an automatic mask that it is right, and drew nothing.
-    pub(crate) fn is_merely_accepted(&self) -> bool {
-        !self.marks.has_hand_work() && matches!(self.marks.base(), Provenance::Accepted { .. })
     }
 
     /// The pixels of which it says nothing: those that are ignored, and with `manual_checked` all that no person painted.

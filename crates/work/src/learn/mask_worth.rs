@@ -88,7 +88,7 @@ pub fn mask_worth(
         let felt = Felt::new(&recipe).reach_asking(touch, Stage::Pose, Ask::default(), models, &cx.quiet())?;
         for (pad, proposal) in cad {
             let (Ok(proposal), Some(found)) = (proposal, felt.contact().masks[pad].as_ref()) else { continue };
-            overlaps.extend(agreement(&found.mask, &proposal.mask, 1.0).map(|agreed| agreed.iou));
+            overlaps.extend(agreement(&found.mask, &proposal.mask).map(|agreed| agreed.iou));
         }
         errors.push(felt.pose().ok().and_then(|pose| pose.error_rad).unwrap_or(f64::NAN));
     }

@@ -229,6 +229,12 @@ impl Line {
     }
 }
 
+/// Number of a journal's lines, and of those that cannot be understood.
+pub(super) fn count(bytes: &[u8]) -> [usize; 2] {
+    let lines = || bytes.split(|&b| b == b'\n').filter(|line| !line.trim_ascii().is_empty());
+    [lines().count(), lines().filter(|line| serde_json::from_slice::<Line>(line).is_err()).count()]
+}
+
 /// Acts that can be taken back and acts that can be done again, the oldest first, of the lines of a journal.
 ///
 /// Only as far as it leads to the labels as they are: where another program changed them, what came before is history,

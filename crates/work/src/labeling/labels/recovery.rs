@@ -28,8 +28,6 @@ pub struct Unsaved {
     pub labels: PairLabels,
     /// Act that was last.
     pub deed: Operation,
-    /// Who drew it a second time, where these are those labels.
-    pub repeat: Option<String>,
 }
 
 /// Outcome of taking in labels from a folder.
@@ -66,8 +64,6 @@ struct Manifest {
 #[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 struct Pair {
     name: String,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    repeat: Option<String>,
 }
 
 impl Manifest {
@@ -130,19 +126,15 @@ impl Labels {
         let all = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
         let _held = all.hold().map_err(fail)?;
         let mut manifest = Manifest::read(folder).unwrap_or_else(|| Manifest::of(dataset));
-        for Unsaved { name, labels, deed, repeat } in unsaved {
-            let (store, before) = match repeat {
-                Some(person) => (all.repeats_of(person), PairLabels::default()),
-                None => (all.clone(), self.known(name)),
-            };
+        for Unsaved { name, labels, deed } in unsaved {
             let by = Signed::now(deed);
             for (place, hand) in &labels.masks {
-                by.write_mask(&store, name, place, Some(hand)).map_err(fail)?;
+                by.write_mask(&all, name, place, Some(hand)).map_err(fail)?;
             }
-            store.save_review(name, &stored_review(labels)).map_err(fail)?;
-            let line = Line::new(deed, &Change::between(&before, labels), &dataset.rig, by.person, by.unix_s);
-            store.append_journal(name, &line).map_err(fail)?;
-            manifest.pairs.push(Pair { name: name.clone(), repeat: repeat.clone() });
+            all.save_review(name, &stored_review(labels)).map_err(fail)?;
+            let line = Line::new(deed, &Change::between(&self.known(name), labels), &dataset.rig, by.person, by.unix_s);
+            all.append_journal(name, &line).map_err(fail)?;
+            manifest.pairs.push(Pair { name: name.clone() });
         }
         manifest.pairs.sort();
         manifest.pairs.dedup();
@@ -192,15 +184,12 @@ pub fn take_in(dataset: &Dataset, labels: &Labels, folder: &Path) -> Result<Reco
     })?;
     let all = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
     let mut found = Recovered::default();
-    for Pair { name, repeat } in &manifest.pairs {
+    for Pair { name } in &manifest.pairs {
         let one = || {
             if !dataset.index.pairs.iter().any(|entry| entry.name == *name) {
                 return Err(TaskError::new(&what, format!("{name} is no pair of this data set")));
             }
-            match repeat {
-                Some(person) => take_in_pair(&labels.repeats_of(person)?, &all.repeats_of(person), name),
-                None => take_in_pair(labels, &all, name),
-            }
+            take_in_pair(labels, &all, name)
         };
         match one() {
             Ok(()) => found.pairs.push(name.clone()),

@@ -6,8 +6,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::accepted::{by_imprint, of_imprints};
 use super::{
-    Change, DrawnMask, ImprintOf, JournalHistory, MaskPlace, Operation, PairLabels, Record, Review, Reviews, Revision,
-    journal, note, record,
+    Change, DrawnMask, ImprintOf, JournalHistory, MaskPlace, Operation, PairLabels, Review, Reviews, Revision, journal,
+    note,
 };
 use crate::error::{TaskError, TaskErrorKind};
 use crate::io::dataset::Dataset;
@@ -45,25 +45,10 @@ impl Labels {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: Arc::default() }
     }
 
-    /// Labels in a folder that another program or person wrote, of the same sensors.
-    pub fn in_folder(dataset: &Dataset, folder: &Path) -> Self {
-        let store = MaskStore::in_folder(folder.to_owned()).of_rig(dataset.rig.clone());
-        Self { store: Arc::new(Ok(store)), saved: Arc::default() }
-    }
-
     /// Labels of a data set that grew: what was written since the opening stays known.
     #[must_use]
     pub fn continued(&self, dataset: &Dataset) -> Self {
         Self { store: Arc::new(MaskStore::for_dataset(dataset)), saved: self.saved.clone() }
-    }
-
-    /// Labels that a person gave a second time without seeing the first; in a folder of their own.
-    ///
-    /// # Errors
-    /// If there is no place for labels.
-    pub fn repeats_of(&self, person: &str) -> Result<Self, TaskError> {
-        let store = self.store("Repeats")?.repeats_of(person);
-        Ok(Self { store: Arc::new(Ok(store)), saved: Arc::default() })
     }
 
     /// The folder they lie in.
@@ -174,16 +159,6 @@ impl Labels {
         JournalHistory { problem: self.journal_problem(name), ..past }
     }
 
-    /// Records of the journal of a pair, the oldest first; none where there is no journal.
-    ///
-    /// # Errors
-    /// If the journal cannot be read.
-    pub fn records(&self, name: &str) -> Result<Vec<Record>, TaskError> {
-        let what = format!("Journal of {name}");
-        let store = self.store(&what)?;
-        Ok(record::parse(&store.journal(name).map_err(|err| store_error(&what, &err))?))
-    }
-
     /// Fault of a pair's journal: it cannot be read, or lines of it cannot. Masks do not depend on it.
     pub fn journal_problem(&self, name: &str) -> Option<TaskError> {
         let Ok(store) = &*self.store else { return None };
@@ -191,7 +166,7 @@ impl Labels {
         match store.journal(name) {
             Err(err) => Some(store_error(&what, &err)),
             Ok(bytes) => {
-                let record::Lines { all: lines, unread } = record::count(&bytes);
+                let [lines, unread] = journal::count(&bytes);
                 let file = store.journal_file(name);
                 let why = format!("{unread} of {} cannot be understood ({})", counted(lines, "line"), file.display());
                 let hint = "They were cut short, or are of something else: what they say was done cannot be taken back. \

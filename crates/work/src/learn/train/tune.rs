@@ -218,7 +218,7 @@ impl Judge<'_> {
                     (*found, *truth) = (*found && *counted, *truth && *counted);
                 }
             }
-            let agreed = agreement(&found, &truth, 1.0)
+            let agreed = agreement(&found, &truth)
                 .ok_or_else(|| TaskError::new(WHAT, "the mask has another size than its imprint"))?;
             Ok(MaskScore { iou: agreed.iou, dice: agreed.dice })
         };
