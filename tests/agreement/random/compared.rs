@@ -47,7 +47,7 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
     for mut both in Both::places(home.path()) {
         let mut count = 0;
         both.show(&[Pane::Compare, Pane::Predicted, Pane::Scene]);
-        for at in 0..3 {
+        for at in 0..2 {
             let recipe = draws.posed();
             let versus = Versus { a: draws.one(subject()), b: draws.one(subject()), mode: VersusMode::Difference };
             let shown = versus.clone();

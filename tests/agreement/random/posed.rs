@@ -42,7 +42,7 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
     for mut both in with_poses(home.path()) {
         let mut count = 0;
         both.show(&[Pane::TimeMachine, Pane::Predicted]);
-        for at in 0..3 {
+        for at in 0..2 {
             let recipe = draws.posed();
             both.predict(&recipe, 17 * at);
             for source in ImprintSource::iter() {
