@@ -94,8 +94,6 @@ fn how(action: Action) -> How {
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
         A::RankMasks => Verb(&["masks", "queue", "demo"]),
-        // They were computed by the Python package; the studio only lists them.
-        A::OpenScores => Window,
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),

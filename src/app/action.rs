@@ -125,8 +125,6 @@ macro_rules! actions {
             state => when(can_rank(state), EvaluateCommand::All);
         RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
-        OpenScores, Generate, "Open scores…", "Shows the rows of touches that were felt elsewhere (Parquet, from Python) as scores of the open data set, the worst first", [],
-            state => opened(state, ViewCommand::Ui(UiRequest::PickScores));
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
         CancelJobs, Generate, "Cancel", "Closes a form, gives up a stroke, rejects a proposal; then stops what is running", [plain(K::Escape)],

@@ -8,8 +8,6 @@ use std::sync::Arc;
 
 use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
-use super::keys::DatasetSeq;
-use super::library::Sort;
 use super::source::DataSource;
 use super::state::State;
 use super::state::tasks::{Level, TaskKind};
@@ -18,7 +16,6 @@ use touch2touch_work::error::TaskError;
 use touch2touch_work::evaluate::{self, Evaluation, Setup};
 use touch2touch_work::job::{JobCx, Progress};
 use touch2touch_work::queue::measured_only;
-use touch2touch_work::rows::{self, RowScores};
 
 /// The grasps after which the scores so far are looked up while all pairs are scored.
 const LOOKS: u64 = 24;
@@ -38,8 +35,6 @@ pub enum EvaluateCommand {
     All,
     /// Scores the measured imprints of every pair, so that the most uncertain masks are known; runs no generator.
     Rank,
-    /// Shows the rows in a folder or file as scores of the open data set, the worst first.
-    OpenRows(PathBuf),
     /// Writes the table into a folder.
     Export(PathBuf),
 }
@@ -58,11 +53,6 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Evaluate", effects),
         EvaluateCommand::All => start(state, results::setup_of_all(state), "Predict all of", effects),
         EvaluateCommand::Rank => rank(state, effects),
-        EvaluateCommand::OpenRows(path) => {
-            let Some(open) = &state.library.open else { return };
-            let (source, seq) = (open.source.clone(), open.seq);
-            tasks::start(state, TaskKind::ReadScores.name(), ReadScores { source, seq, path }, effects);
-        }
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
             let published = state.table.published;
@@ -131,36 +121,5 @@ impl Errand for Score {
             state.table.result = Some(evaluation.clone());
         }
         state.table.round += 1;
-    }
-}
-
-/// Reads the scores of touches that were felt elsewhere.
-pub struct ReadScores {
-    source: Arc<dyn DataSource>,
-    seq: DatasetSeq,
-    path: PathBuf,
-}
-
-impl Errand for ReadScores {
-    type End = (DatasetSeq, Arc<RowScores>);
-    const KIND: TaskKind = TaskKind::ReadScores;
-
-    fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
-        let dataset = self.source.on_disk(Self::KIND.name())?;
-        Ok((self.seq, Arc::new(rows::scores(dataset, &self.path)?)))
-    }
-
-    fn ended((seq, found): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        // They are of the data set that was open when they were asked for.
-        if state.library.open.as_ref().is_none_or(|open| open.seq != *seq) {
-            return;
-        }
-        state.log.info(format!("Opened {}", found.text()));
-        state.table.rows = Some(found.clone());
-        state.table.round += 1;
-        let source = found.scores.first().map(|scores| scores.method.as_str().into());
-        state.table.chosen = ScoreChoice { source, ..ScoreChoice::default() };
-        state.library.sort = Sort::Score;
-        state.reorder();
     }
 }

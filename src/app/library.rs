@@ -359,7 +359,6 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.result = None;
     state.table.looked_up = None;
     state.table.scores = Arc::default();
-    state.table.rows = None;
     state.library.brush = None;
     state.library.ticked.clear();
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };

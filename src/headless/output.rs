@@ -2,10 +2,11 @@
 //!
 //! A reader that has seen enough (`| head`) ends the program quietly; a disk that is full is an error. Neither is a panic.
 
-use std::io::{self, Write as _};
-use std::sync::Arc;
+use std::io::{self, IsTerminal as _, Write as _};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 
 use super::Common;
@@ -15,51 +16,93 @@ use touch2touch_work::job::{Cancel, JobCx, Progress};
 /// Reporter of a verb.
 pub struct Output {
     json: bool,
-    bar: ProgressBar,
+    bar: Arc<Mutex<Bar>>,
+}
+
+/// A line on a terminal that says how far a verb is.
+struct Bar {
+    what: &'static str,
+    begun: Instant,
+    /// When it was drawn last.
+    drawn: Option<Instant>,
+    done: u64,
+    total: u64,
+    text: String,
+}
+
+impl Bar {
+    fn draw(&mut self) {
+        const PAUSE: Duration = Duration::from_millis(100);
+        /// Characters of the line.
+        const WIDTH: usize = 79;
+        if !io::stderr().is_terminal() || self.drawn.is_some_and(|at| at.elapsed() < PAUSE) {
+            return;
+        }
+        self.drawn = Some(Instant::now());
+        let took = self.begun.elapsed().as_secs_f64();
+        let left = match self.done {
+            0 => String::new(),
+            done => format!(" + {:.0}", took * self.total.saturating_sub(done) as f64 / done as f64),
+        };
+        let line = format!("{} {}/{}  {took:.0}{left} s  {}", self.what, self.done, self.total, printable(&self.text));
+        let line: String = line.chars().take(WIDTH).collect();
+        clear();
+        DRAWN.store(true, Ordering::Relaxed);
+        write!(io::stderr(), "{line}").ok();
+    }
+}
+
+/// True where such a line stands on standard error.
+static DRAWN: AtomicBool = AtomicBool::new(false);
+
+/// Takes that line away; what is printed next stands in its place.
+fn clear() {
+    if DRAWN.swap(false, Ordering::Relaxed) {
+        write!(io::stderr(), "\r\x1b[2K").ok();
+    }
+}
+
+fn update(bar: &Mutex<Bar>, change: impl FnOnce(&mut Bar)) {
+    let mut bar = bar.lock().unwrap_or_else(PoisonError::into_inner);
+    change(&mut bar);
+    bar.draw();
 }
 
 impl Output {
-    /// A reporter with a bar of `total` steps on standard error; the bar hides itself where that is no terminal.
+    /// A reporter with a bar of `total` steps on standard error, where that is a terminal.
     pub fn new(common: Common, what: &'static str, total: usize) -> Self {
-        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
-        if let Ok(style) = ProgressStyle::with_template("{prefix} [{wide_bar}] {pos}/{len}  {elapsed} + {eta}  {msg}") {
-            bar.set_style(style);
-        }
-        bar.set_prefix(what);
-        Self { json: common.json, bar }
+        let bar = Bar { what, begun: Instant::now(), drawn: None, done: 0, total: total as u64, text: String::new() };
+        Self { json: common.json, bar: Arc::new(Mutex::new(bar)) }
     }
 
     /// One step is done; `item` says on what.
     pub fn step(&self, item: &str) {
-        self.message(item);
-        self.bar.inc(1);
+        update(&self.bar, |bar| {
+            bar.done += 1;
+            item.clone_into(&mut bar.text);
+        });
     }
 
     /// Moves the bar to `done` of `total`.
     pub fn set(&self, done: usize, total: usize) {
-        self.bar.set_length(total as u64);
-        self.bar.set_position(done as u64);
+        update(&self.bar, |bar| (bar.done, bar.total) = (done as u64, total as u64));
     }
 
     /// Says what is being done now.
     pub fn message(&self, text: &str) {
-        self.bar.set_message(printable(text).into_owned());
+        update(&self.bar, |bar| text.clone_into(&mut bar.text));
     }
 
     /// A job whose progress moves the bar.
     pub fn job(&self) -> JobCx {
         let bar = self.bar.clone();
-        let show = move |p: Progress| {
-            bar.set_length(p.total);
-            bar.set_position(p.done);
-            bar.set_message(printable(&p.text).into_owned());
-        };
+        let show = move |p: Progress| update(&bar, |bar| (bar.done, bar.total, bar.text) = (p.done, p.total, p.text));
         JobCx::new(Cancel::default(), Arc::new(show))
     }
 
-    /// A line on standard error, above the bar.
+    /// A line on standard error.
     pub fn note(&self, text: &str) {
-        self.bar.suspend(|| note(text));
+        note(text);
     }
 
     /// True where standard output is for programs.
@@ -75,7 +118,6 @@ impl Output {
 
     /// Ends the bar and prints the result: the JSON object, or the lines for people.
     pub fn finish(self, value: &impl Serialize, human: impl FnOnce() -> String) -> anyhow::Result<()> {
-        self.bar.finish_and_clear();
         let text = if self.json { serde_json::to_string(value)? } else { human() };
         Ok(print(text.trim_end())?)
     }
@@ -94,6 +136,7 @@ pub(super) enum PrintError {
 
 /// A text and a line break on standard output, now. Names from files are shown, never obeyed by the terminal.
 pub(super) fn print(text: &str) -> Result<(), PrintError> {
+    clear();
     let mut out = io::stdout().lock();
     writeln!(out, "{}", printable(text)).and_then(|()| out.flush()).map_err(|err| match err.kind() {
         io::ErrorKind::BrokenPipe => PrintError::Closed,
@@ -103,6 +146,7 @@ pub(super) fn print(text: &str) -> Result<(), PrintError> {
 
 /// A line on standard error, as [`print()`] has it; there is nowhere to say that it took none.
 pub(super) fn note(text: &str) {
+    clear();
     writeln!(io::stderr().lock(), "{}", printable(text)).ok();
 }
 

@@ -29,4 +29,3 @@ pub mod simulated;
 pub(crate) mod staging;
 pub mod statistics;
 pub mod stl;
-pub mod touch_rows;

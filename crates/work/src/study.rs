@@ -13,7 +13,6 @@ pub mod fonts;
 pub mod influence;
 pub mod layers;
 pub mod ledger;
-pub mod rows;
 pub mod space;
 pub mod statistics;
 pub mod still;

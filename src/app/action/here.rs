@@ -26,10 +26,7 @@ impl Action {
             Workspace::Align => self.group() == Group::Pose,
             Workspace::Label => self.group() == Group::Mask || matches!(self, Self::NextUnfinished | Self::RankMasks),
             Workspace::Evaluate => {
-                matches!(
-                    self,
-                    Self::EvaluateDataset | Self::PredictAll | Self::OpenScores | Self::ExportTable | Self::NextWorst
-                )
+                matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }
             Workspace::Adapt => {
                 matches!(self, Self::FitPairs | Self::UseFit | Self::TrainMasks | Self::StartTraining)

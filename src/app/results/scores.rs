@@ -16,12 +16,11 @@ use touch2touch_work::recipe::Recipe;
 
 impl Computes for ScoresKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ScoreTable>> {
-        let (services, setup, rows) = (services.clone(), setup_of_all(state)?, state.table.rows.clone());
+        let (services, setup) = (services.clone(), setup_of_all(state)?);
         let source = state.library.open.as_ref()?.source.clone();
         Some(Job::new(Lane::Compute, "Look for scores", move |_| {
             let dataset = source.on_disk("Look for scores")?;
-            let mut scores = evaluate::known(dataset, &setup, services.models())?;
-            scores.extend(rows.iter().flat_map(|rows| rows.scores.iter().cloned()));
+            let scores = evaluate::known(dataset, &setup, services.models())?;
             Ok(ScoreTable::new(source.index(), scores))
         }))
     }

@@ -9,7 +9,6 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Condition, Metric, Row, paper_rows};
 use touch2touch_work::evaluate::Evaluation;
 use touch2touch_work::queue::QueueBy;
-use touch2touch_work::rows::RowScores;
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
@@ -29,8 +28,6 @@ pub struct TableState {
     pub(in crate::app) looked_up: Option<TableKey>,
     /// The scores that are kept of the open data set.
     pub scores: Arc<ScoreTable>,
-    /// Scores that were felt elsewhere and opened, of the open data set.
-    pub rows: Option<Arc<RowScores>>,
     /// The number of times that scores were computed: those kept are looked up again then.
     pub(in crate::app) round: u64,
     /// Grasps of the evaluation under way at which that is done next.

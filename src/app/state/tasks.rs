@@ -67,9 +67,6 @@ kinds! {
     /// A data set is scored.
     Evaluate, "Evaluate", Batch,
         "Stop, and show what was scored until then";
-    /// Scores of touches that were felt elsewhere are read.
-    ReadScores, "Open scores", Files,
-        "Stop; the scores stay as they are";
     /// The models are tried on a sample of a data set.
     TryModels, "Try the models", Batch,
         "Stop; the models are not tried on a sample of these pairs";

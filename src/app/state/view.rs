@@ -76,8 +76,6 @@ pub enum UiRequest {
     PickFile,
     /// Ask for the folder to write the results table to; answer with `EvaluateCommand::Export`.
     PickTableFolder,
-    /// Ask for a folder of rows that are opened as scores; answer with `EvaluateCommand::OpenRows`.
-    PickScores,
     /// Ask where something is to be written; answer with `ExportCommand::Write`.
     PickOutput(Output),
     /// Ask for the folder of masks that are imported; answer with `ExportCommand::AskImport`.

@@ -22,8 +22,6 @@ pub(crate) enum Purpose {
     File,
     /// The folder that the results table is written to.
     Table,
-    /// The folder of rows that are shown as scores.
-    Scores,
     /// The folder of masks that are imported.
     Masks,
     /// The folder that labels are written to which could not be saved.
@@ -40,9 +38,7 @@ impl Purpose {
         let (named, shown) = (path.to_str().and_then(BuiltIn::named), path.display());
         match self {
             Self::Folder | Self::File if named.is_some() => None,
-            Self::Folder | Self::File | Self::Masks | Self::Scores => {
-                (!path.exists()).then(|| format!("There is nothing at {shown}"))
-            }
+            Self::Folder | Self::File | Self::Masks => (!path.exists()).then(|| format!("There is nothing at {shown}")),
             _ if writes_file && path.is_dir() => Some(format!("{shown} is a folder: name a file in it")),
             _ if writes_file => parent
                 .filter(|parent| !parent.is_dir())
@@ -58,7 +54,6 @@ impl Purpose {
             Self::Output(output) => output.title(),
             Self::Labels => "Save the labels to a folder",
             Self::Masks => "Import masks from a folder",
-            Self::Scores => "Open the scores in a folder",
             Self::Table => "Write the results table to a folder",
         }
     }
@@ -113,9 +108,7 @@ impl Dialogs {
             let dialog = rfd::FileDialog::new().set_title(purpose.title());
             let path = match purpose {
                 _ if !possible => None,
-                Purpose::Folder | Purpose::Table | Purpose::Scores | Purpose::Masks | Purpose::Labels => {
-                    dialog.pick_folder()
-                }
+                Purpose::Folder | Purpose::Table | Purpose::Masks | Purpose::Labels => dialog.pick_folder(),
                 Purpose::File => dialog.pick_file(),
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => dialog.set_file_name(name).save_file(),
@@ -186,7 +179,6 @@ impl Dialogs {
                 Purpose::Masks => {
                     "The folder of an export, one of its parts, or one .png, .npy or .json of masks.".to_owned()
                 }
-                Purpose::Scores => "A folder of .parquet files that touch2touch.ray wrote, or one of them.".to_owned(),
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));

@@ -343,7 +343,6 @@ impl StudioApp {
             UiRequest::PickFolder => self.shared.dialogs.open(Purpose::Folder, ctx),
             UiRequest::PickFile => self.shared.dialogs.open(Purpose::File, ctx),
             UiRequest::PickTableFolder => self.shared.dialogs.open(Purpose::Table, ctx),
-            UiRequest::PickScores => self.shared.dialogs.open(Purpose::Scores, ctx),
             UiRequest::PickOutput(output) => self.shared.dialogs.open(Purpose::Output(output), ctx),
             UiRequest::PickMasks => self.shared.dialogs.open(Purpose::Masks, ctx),
             UiRequest::PickLabelsFolder => self.shared.dialogs.open(Purpose::Labels, ctx),
@@ -592,7 +591,6 @@ impl eframe::App for StudioApp {
                     Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
                     Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),
                     Purpose::Table => Command::Evaluate(EvaluateCommand::Export(path)),
-                    Purpose::Scores => Command::Evaluate(EvaluateCommand::OpenRows(path)),
                 });
             }
         }

@@ -17,7 +17,7 @@ use touch2touch::app::command::{
     TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
-use touch2touch::app::evaluate::{ReadScores, Score, ScoreChoice};
+use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
 use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
@@ -61,7 +61,6 @@ use touch2touch_work::job::{PreviewPicture, Progress};
 use touch2touch_work::labels::Operation;
 use touch2touch_work::propose::Batch;
 use touch2touch_work::queue::QueueBy;
-use touch2touch_work::rows::RowScores;
 use touch2touch_work::space::{Ground, ViewAngles};
 use touch2touch_work::subject::Subject;
 use touch2touch_work::tool::UnitSet;
@@ -375,10 +374,6 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Propose => {
                 Ended::of::<ProposeAll>(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
             }
-            TaskKind::ReadScores => {
-                let rows = RowScores { scores: Vec::new(), pairs: 0, elsewhere: 1 };
-                Ended::of::<ReadScores>((seq, Arc::new(rows)))
-            }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
@@ -551,7 +546,6 @@ draws! {
         1 Start,
         1 All,
         1 Rank,
-        1 OpenRows(Just(PathBuf::from("rows"))),
         1 Export(Just(PathBuf::from("table"))),
     }
     export: ExportCommand {
