@@ -32,7 +32,6 @@ mod simulate;
 mod stats;
 mod still;
 mod training_data;
-mod trials;
 mod version;
 mod watch;
 
@@ -95,8 +94,6 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a data set: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
-    /// Trials of a robot with the poses: simulated grasps of a tool, put into a hole of its own outline; cup on cup.
-    Trials(Box<trials::TrialsArgs>),
     /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
     Figure(Box<figure::FigureArgs>),
     /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
@@ -274,7 +271,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
-        Some(Verb::Trials(args)) => trials::run(&args),
         Some(Verb::Figure(args)) => figure::run(&args),
         Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),

@@ -105,7 +105,6 @@ fn workbench(wants: &mut Demands<'_>, source: ImprintSource) {
     }
     results::want_layers(wants, source);
     results::want_deviation(wants, source);
-    results::want_trial(wants, source);
     results::want_influence(wants, source);
 }
 

@@ -29,7 +29,7 @@ pub use inspection::{Inspection, InspectionKey};
 pub use mask::{AutomaticMask, MaskKey, MaskVersion};
 pub use pose::{
     BasinKey, CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey,
-    RunKey, TrialKey,
+    RunKey,
 };
 pub(crate) use prediction::Keyed;
 pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, SeedKey, StoredKey};

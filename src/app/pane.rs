@@ -96,8 +96,6 @@ pub enum Demand {
     FingerPoses,
     /// The layers of the registration that the workbench is about.
     Layers,
-    /// The trial of a robot with the pose that the workbench is about.
-    Trial,
     /// The recorded registration that is looked at.
     Steps,
     /// The map of its starts.
@@ -161,10 +159,6 @@ macro_rules! panes {
             timemachine { TimeMachine {
                 "Time machine", "The steps of a registration, forwards and backwards",
                 Steps, needs [Steps], at [Align Bottom(1)]
-            } }
-            trial { Trial {
-                "Robot trial" as "Trial", "What a robot would do with the pose: the tool let down into a hole of its own outline, a cup onto a cup",
-                Form, needs [Trial], at [Align Bottom(1)]
             } }
             basin { BasinMap {
                 "Basin map", "Where starts lead; a click on one loads its run into the time machine",
@@ -255,7 +249,7 @@ macro_rules! define {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
                     Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
-                    Steps, Thumbnails, Training, Trial, Versus,
+                    Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
             }

@@ -47,7 +47,6 @@ mod table;
 pub(crate) mod thumbnail;
 pub(crate) mod tool;
 pub(crate) mod train_plan;
-pub(crate) mod trial;
 pub(crate) mod versus;
 
 pub(crate) use about::{about_key, want_about};
@@ -85,7 +84,7 @@ pub(crate) use mask_plan::want_mask_plan;
 pub use on_screen::proposes;
 pub(crate) use on_screen::{
     fingers_to_generate, seeds_asked, seeds_of, shows_cloud, shows_deviation, shows_influence, shows_layers,
-    shows_steps, shows_trial,
+    shows_steps,
 };
 pub use outdated::{Outdated, Why, outdated};
 pub(crate) use pose::{Registered, registered, want_pose, want_pose_table};
@@ -110,8 +109,6 @@ pub(crate) use thumbnail::want_thumbnails;
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
 pub(crate) use train_plan::{train_plan_key, want_train_plan};
-pub use trial::trial;
-pub(crate) use trial::want_trial;
 pub use versus::{subject, subject_key, subject_pose, subjects_apart, subjects_compared};
 pub(crate) use versus::{subject_points, want_versus};
 

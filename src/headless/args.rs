@@ -15,7 +15,6 @@ use super::Common;
 use touch2touch_core::pose::{Registration, RegistrationChoice};
 use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_core::sim::Sensors;
 use touch2touch_work::io::atomic;
 use touch2touch_work::io::dataset::{Dataset, OpenError, ToolScale};
 use touch2touch_work::pairs;
@@ -34,25 +33,6 @@ pub(super) struct DatasetArgs {
     /// commas. Without it, what read-as.txt in the data set says (`doctor --set`). An empty list reads them as they are stored.
     #[arg(long, value_name = "LIST", value_parser = parse_readings)]
     read_as: Option<Readings>,
-}
-
-/// The sensors that a verb simulates.
-#[derive(Debug, Clone, Copy, Args)]
-pub(super) struct SensorsArgs {
-    /// Simulate with another pair of sensors, drawn by this seed as training draws them (default: the nominal pair).
-    #[arg(long, value_name = "SEED", conflicts_with = "gelslims")]
-    sensors: Option<u64>,
-    /// Simulate with GelSlims in other colors and with other dots, drawn by this seed beyond what training draws.
-    #[arg(long, value_name = "SEED")]
-    gelslims: Option<u64>,
-}
-
-impl SensorsArgs {
-    /// The sensors that were named.
-    pub(super) fn sensors(self) -> Sensors {
-        // The parser has refused both.
-        Sensors::named(self.sensors, self.gelslims).unwrap_or_default()
-    }
 }
 
 /// Ways to read data otherwise than they are stored.

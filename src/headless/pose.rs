@@ -30,7 +30,6 @@ use touch2touch_work::models::Models;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::{Recipe, Stage};
 use touch2touch_work::tool::load_tool;
-use touch2touch_work::trials::of_pair;
 
 use args::{Imprints, registration};
 pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
@@ -220,8 +219,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             .zip(touch.tool.ok())
             .map(|((stem, found), tool)| influence::write(stem, &felt, touch, tool, by, found));
         let influence = influence.transpose()?;
-        let asked = answer.zip(truth).zip(touch.tool.ok()).filter(|_| args.trial);
-        let trial = asked.map(|((found, truth), tool)| of_pair(tool, truth, found.grasp_from_object)).transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),
             registration: by.to_string(),
@@ -245,7 +242,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             ambiguity: left_open.clone(),
             no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(ToString::to_string)),
             influence: influence.and_then(Result::ok),
-            trial,
             fan,
         })
     };

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::json;
 use strum::IntoEnumIterator;
 
-use super::args::{SensorsArgs, at_least_one};
+use super::args::at_least_one;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::sim::{self, Condition, Fault, Sensors};
@@ -21,7 +21,7 @@ pub(super) struct SimulateArgs {
     /// The folder to write; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// `all`, `seen`, `unseen`, or tool names separated by commas; by name also `pencil`, and `cup` (held by its handle).
+    /// `all`, `seen`, `unseen`, or or tool names separated by commas.
     #[arg(long, default_value = "all")]
     tools: String,
     /// Grasps per tool.
@@ -38,8 +38,12 @@ pub(super) struct SimulateArgs {
     /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
-    #[command(flatten)]
-    sensors: SensorsArgs,
+    /// Simulate with another pair of sensors, drawn by this seed as training draws them (default: the nominal pair).
+    #[arg(long, value_name = "SEED", conflicts_with = "gelslims")]
+    sensors: Option<u64>,
+    /// Simulate with GelSlims in other colors and with other dots, drawn by this seed beyond what training draws.
+    #[arg(long, value_name = "SEED")]
+    gelslims: Option<u64>,
     /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
     /// millimeters) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed", "sensors", "gelslims"])]
@@ -95,7 +99,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     let grasps = if args.test_set { sim::TEST_GRASPS } else { args.grasps.into() };
     let output = Output::new(args.common, "simulating", chosen.len() * grasps as usize);
     let layout = args.part.layout();
-    let sensors = args.sensors.sensors();
+    let sensors = Sensors::named(args.sensors, args.gelslims).map_err(anyhow::Error::msg)?;
     let config = sensors.config();
     // A condition gives at most two forms of a tool, one to even pairs and one to odd ones.
     let models: BTreeMap<String, ToolSpec> = chosen
@@ -121,7 +125,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
             let touched = args.condition.tool(tool, g);
             let (grasp, seed) = if args.test_set {
                 // By the place in the whole list, so that a choice of tools does not change their grasps.
-                sim::test_grasp(catalog::all_tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
+                sim::test_grasp(catalog::tools().iter().position(|t| t.name == tool.name).unwrap_or(t), g)
             } else {
                 // One seed per pair, so that a pair does not depend on how many others were asked for.
                 let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ g;
@@ -186,9 +190,8 @@ fn chosen_tools(list: &str) -> anyhow::Result<Vec<&'static ToolSpec>> {
         names => names
             .split(',')
             .map(|name| {
-                let every = catalog::all_tools();
-                every.iter().find(|t| t.name == name.trim()).ok_or_else(|| {
-                    let known: Vec<&str> = every.iter().map(|t| t.name.as_str()).collect();
+                all.iter().find(|t| t.name == name.trim()).ok_or_else(|| {
+                    let known: Vec<&str> = all.iter().map(|t| t.name.as_str()).collect();
                     anyhow::anyhow!("no tool is named {name:?}; there are: {}", known.join(", "))
                 })
             })

@@ -19,5 +19,4 @@ pub(crate) mod settings_pane;
 pub(crate) mod table;
 pub(crate) mod timemachine;
 pub(crate) mod train;
-pub(crate) mod trial;
 pub(crate) mod versus;

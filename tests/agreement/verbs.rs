@@ -87,7 +87,6 @@ fn held(verb: &str) -> Option<Held> {
             shards::an_evaluation_finds_what_its_parts_have_kept,
         ]),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
-        "trials" => Not("it simulates its grasps; the studio plays the trial of a pair, as `pose --trial`"),
         "training-data" => Not("only the training in Python reads it"),
         "doctor" => By(&[
             super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb,

@@ -222,15 +222,10 @@ impl Rig {
     ///
     /// `None` where there is no graphics adapter; a failure where the check script demands one.
     pub(super) fn new(size: [f32; 2], grasps: u64) -> Option<Self> {
-        Self::of_tools(size, &catalog::tools()[..2], grasps)
-    }
-
-    /// As [`Rig::new`] on grasps of these tools.
-    pub(super) fn of_tools(size: [f32; 2], tools: &[ToolSpec], grasps: u64) -> Option<Self> {
         crate::support::gpu()?;
         let folder = tempfile::tempdir().unwrap();
         let (data, config) = (folder.path().join("data"), folder.path().join("config"));
-        write_tools_touched(&data, tools, grasps);
+        write_tools_touched(&data, &catalog::tools()[..2], grasps);
         let mut rig = Self { harness: Self::start(size, &data, &config), data, config, _folder: folder };
         rig.settle();
         Some(rig)

@@ -11,7 +11,6 @@ use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::workbench::{Layer, ManualTry, PoseOf, SceneTool, WorkbenchCommand};
 use touch2touch_core::align::reason::Reason;
-use touch2touch_core::catalog;
 use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
 use touch2touch_work::io::dataset::Dataset;
@@ -104,41 +103,6 @@ impl Rig {
         let delays = self.harness.output().viewport_output.values().map(|v| v.repaint_delay);
         delays.into_iter().any(|d| d < std::time::Duration::from_secs(3600))
     }
-}
-
-#[test]
-fn a_robot_tries_the_pose_and_the_picture_rests_when_it_is_over() {
-    let Some(mut rig) = Rig::aligned() else { return };
-    rig.front("Trial");
-    rig.until("the trial", |state| results::trial(state, MEASURED).ready().is_some());
-    rig.settle();
-    rig.harness.get_by_label_contains("By the measured pose: through");
-    rig.harness.get_by_label("3D view, trial");
-    assert!(!rig.asks_to_repaint(), "nothing plays");
-    rig.harness.get_by_label("Play the trial").click();
-    rig.harness.step();
-    rig.harness.step();
-    assert!(rig.asks_to_repaint(), "it plays");
-    let over = (0..2000).any(|_| {
-        rig.harness.step();
-        !rig.asks_to_repaint()
-    });
-    assert!(over, "it ends");
-    rig.shoot("trial");
-}
-
-#[test]
-fn a_cup_by_its_handle_is_set_on_another_cup() {
-    let Some(rig) = Rig::of_tools(SIZE, &[catalog::cup_handle()], 1) else { return };
-    let mut rig = rig.in_align();
-    rig.front("Trial");
-    rig.until("the trial", |state| results::trial(state, MEASURED).ready().is_some());
-    rig.settle();
-    rig.harness.get_by_label_contains("By the measured pose: stands");
-    rig.harness.get_by_label_contains("a margin of 10");
-    let canvas = rig.harness.get_by_label("3D view, trial").rect();
-    assert!(canvas.height() > 100.0, "{canvas:?}");
-    rig.shoot("trial_cup");
 }
 
 #[test]

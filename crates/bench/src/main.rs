@@ -10,6 +10,7 @@ mod peers;
 mod registration;
 mod reliability;
 mod rows;
+mod trials;
 mod verdict;
 
 use std::process::ExitCode;
@@ -41,6 +42,8 @@ enum Benchmark {
     Doctor(doctor::DoctorArgs),
     /// Signs of a fault that need no truth (a wrong tool, swapped fingers, a turned camera), each as a detector.
     Verdict(verdict::VerdictArgs),
+    /// Would a robot that goes by the poses put tools into holes, and a cup on a cup? On simulated grasps.
+    Trials(trials::TrialsArgs),
 }
 
 fn main() -> ExitCode {
@@ -57,6 +60,7 @@ fn run(benchmark: &Benchmark) -> VerbResult {
         Benchmark::Generator(args) => generator::run(args),
         Benchmark::Cases(args) => cases::run(args),
         Benchmark::Doctor(args) => doctor::run(args),
+        Benchmark::Trials(args) => trials::run(args),
         Benchmark::Verdict(args) => verdict::run(args),
     }
 }

@@ -73,7 +73,8 @@ fn the_other_benchmarks_run() {
     let doctor =
         ["doctor", "--sets", "1", "--sound", "1", "--pairs", "1", "--only", "theta", "--no-generator", "--json"];
     let verdict = ["verdict", "--count", "2", "--json"];
-    for arguments in [&generator[..], &doctor, &verdict] {
+    let trials = ["trials", "--count", "1", "--runtime", "rten", "--steps", "1", "--bundle", bundle, "--json"];
+    for arguments in [&generator[..], &doctor, &verdict, &trials] {
         let done = run(arguments);
         assert!(done.status.success(), "{arguments:?}: {}", error_text(&done));
         assert!(json(&done).is_object(), "{arguments:?}");

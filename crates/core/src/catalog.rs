@@ -1,7 +1,6 @@
 //! The catalog of tools: the lab's twelve, and tools drawn at random.
 
 mod bend;
-mod household;
 mod mesh;
 mod shape;
 
@@ -11,7 +10,6 @@ use glam::DVec2;
 
 use super::noise::{Noise, Stream};
 
-pub use household::{CUP_AXIS_M, CUP_BASE_M, cup_handle, is_cup_handle, pencil};
 pub use shape::{Bar, Section, Solid, ToolSpec};
 
 /// Length of shaft between the grasp and an ambiguous pair's pattern, meters: out of the GelSlim's 18 mm, within the
@@ -34,13 +32,6 @@ const LAB_ROUNDING_M: f64 = 0.005;
 /// The lab's twelve tools (names from its data loader, shapes after the published images), seen ones first.
 pub fn tools() -> &'static [ToolSpec] {
     static TOOLS: LazyLock<Vec<ToolSpec>> = LazyLock::new(lab_tools);
-    &TOOLS
-}
-
-/// The lab's tools, and after them what only a robot is tried with: a pencil, and a cup by its handle.
-pub fn all_tools() -> &'static [ToolSpec] {
-    static TOOLS: LazyLock<Vec<ToolSpec>> =
-        LazyLock::new(|| tools().iter().cloned().chain([pencil(), cup_handle()]).collect());
     &TOOLS
 }
 

@@ -44,7 +44,6 @@ pub mod sim;
 mod tent;
 pub mod text;
 pub mod tool;
-pub mod trials;
 pub mod turn;
 pub mod units;
 pub mod upright;

@@ -36,6 +36,6 @@ pub use labeling::{filter, labels, progress};
 pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{
     canvas, compare, depict, deviation, doubts, ensemble, evaluate, fan, figure, fonts, influence, layers, ledger,
-    space, statistics, still, subject, trials,
+    space, statistics, still, subject,
 };
 pub use way::{bundles, cloud, feel, imprint, mask, models, on_pad, pose, predict, prediction, recipe, tool};

@@ -17,4 +17,3 @@ pub mod space;
 pub mod statistics;
 pub mod still;
 pub mod subject;
-pub mod trials;

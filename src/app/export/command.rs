@@ -78,7 +78,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
         }
         (Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
-        (Pane::Trial, _) => posed(of_pair("pose")?, state.workbench.side).word("--trial").word("--json"),
         (Pane::BasinMap, _) => {
             let plane: &'static str = state.inspect.plane.into();
             posed(of_pair("basin")?, side).option("--plane", plane)

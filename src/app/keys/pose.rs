@@ -13,7 +13,6 @@ use touch2touch_work::influence::Influence;
 use touch2touch_work::layers::LayerResult;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::Recipe;
-use touch2touch_work::trials::PairTrial;
 
 /// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -128,18 +127,6 @@ impl Key for LayersKey {
 
     fn bytes(found: &LayerResult) -> usize {
         found.bytes()
-    }
-}
-
-/// The trial of a robot with a registered pose.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TrialKey(pub PoseKey);
-
-impl Key for TrialKey {
-    type Value = PairTrial;
-
-    fn bytes(found: &PairTrial) -> usize {
-        found.attempt.path.len() * 64 + 4096
     }
 }
 

@@ -14,15 +14,10 @@ pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) 
     let other = source.other();
     let layers = state.needs(Demand::Layers) && state.workbench.side == source;
     let both = state.workbench.both_clouds && state.shows_scene(other);
-    let scene = layers || shows_trial(state, source) || both || state.shows_scene(source) || state.needs(Demand::Poses);
+    let scene = layers || both || state.shows_scene(source) || state.needs(Demand::Poses);
     let inspected = state.inspect.source == source && (state.needs(Demand::Steps) || state.needs(Demand::Basin));
     let scene = scene || proposes_at_pose(state, source) || shows_influence(state, source);
     (scene, scene || inspected)
-}
-
-/// True where the trial of a robot with the pose of an imprint is looked at.
-pub(crate) fn shows_trial(state: &State, source: ImprintSource) -> bool {
-    state.needs(Demand::Trial) && state.workbench.side == source
 }
 
 /// True where a proposal is shown over the masks.

@@ -77,8 +77,6 @@ macro_rules! table {
         Layers(LayersKey) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
         Deviation(DeviationKey) in deviations, 63 * MIB;
-        /// The trial of a robot with a registered pose.
-        Trial(TrialKey) in trials, MIB;
         /// All tools of the data set, ranked for the touch of a pose.
         Ranking(RankingKey) in rankings, MIB;
         /// The influence of each pixel on a registered angle.

@@ -62,10 +62,6 @@ pub(in crate::headless) struct PoseArgs {
     /// residual, weight and fate.
     #[arg(long)]
     pub(super) trace: bool,
-    /// Add a robot's trial with each pose: the tool is let down into a hole of its own outline, with 1 mm of room to each
-    /// side, the simulator's cup onto another (as `trials` does with simulated grasps). Where the truth is known.
-    #[arg(long)]
-    pub(super) trial: bool,
     /// Write into this folder which pixels each angle hangs on: by how many degrees to the square millimeter it changes
     /// without them, or with those up to 4 mm beside the mask. The report names the ten places that matter most. For the
     /// registrations `distance_field` and `certified`.

@@ -13,10 +13,9 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
-use touch2touch_core::units::{angle_error, text_mm};
+use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_work::trials::PairTrial;
 
 #[derive(Debug, Clone, Serialize)]
 pub(super) struct PoseRow {
@@ -55,9 +54,6 @@ pub(super) struct PoseRow {
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<PerPad<Ambiguity>>,
-    /// With `--trial`, where the truth is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) trial: Option<PairTrial>,
     /// With `--influence`, where there is one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) influence: Option<Influences>,
@@ -230,13 +226,6 @@ pub(super) fn text(report: &Report) -> String {
             c.mask,
             c.stop
         );
-        if let Some(trial) = &c.trial {
-            let needs = trial.room.map_or(String::new(), |room| {
-                let needs = room.needs_m.map_or("more than 5 mm".to_owned(), text_mm);
-                format!("; needs {needs} of room to each side")
-            });
-            text += &format!("    a robot: {}{needs}\n", trial.attempt.end);
-        }
         for ranked in c.tools.iter().flatten().take(3) {
             text += &format!("    {:>3.0} % {}\n", 100.0 * ranked.chance, ranked.tool);
         }

@@ -59,23 +59,6 @@ impl Intervals {
     pub(super) fn shifts_of(&self, [low, high]: [f64; 2]) -> Self {
         Self::union(self.0.iter().map(|[from, to]| [from - low, to - high]).collect())
     }
-
-    /// The number in it that is nearest to zero.
-    pub(super) fn nearest_to_zero(&self) -> Option<f64> {
-        let nearest = self.0.iter().map(|[low, high]| 0.0_f64.clamp(*low, *high));
-        nearest.min_by(|a, b| a.abs().total_cmp(&b.abs()))
-    }
-
-    /// Where and how far the interval from `low` to `high` leaves these: its end that is farther beyond the nearest of
-    /// them, and by how much; `None` where it does not.
-    pub(super) fn leaves(&self, [low, high]: [f64; 2]) -> Option<(f64, f64)> {
-        let beyond = |[from, to]: &[f64; 2]| {
-            let (left, right) = (from - low, high - to);
-            if left >= right { (low, left) } else { (high, right) }
-        };
-        let least = self.0.iter().map(beyond).min_by(|a, b| a.1.total_cmp(&b.1))?;
-        (least.1 > 0.0).then_some(least)
-    }
 }
 
 #[cfg(test)]
@@ -93,9 +76,5 @@ mod tests {
         assert!(set.both(&Intervals::one(2.1, 2.9)).is_empty());
         // An interval of 1.5 fits the first only, from -5 to -4.5 shifted.
         assert_eq!(set.shifts_of([5.0, 6.5]).parts(), [[-5.0, -4.5]]);
-        assert_eq!(set.shifts_of([5.0, 6.5]).nearest_to_zero(), Some(-4.5));
-        assert_eq!(set.leaves([0.5, 1.5]), None);
-        assert_eq!(set.leaves([1.0, 2.5]), Some((2.5, 0.5)));
-        assert_eq!(Intervals::default().leaves([0.0, 1.0]), None);
     }
 }

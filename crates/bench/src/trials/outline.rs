@@ -3,9 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use glam::DVec2;
-
-use super::TrialError;
-use crate::mesh::TriMesh;
+use touch2touch_core::mesh::TriMesh;
 
 /// Corners closer than this are one, meters.
 const SAME_M: f64 = 1e-9;
@@ -17,7 +15,7 @@ const STRAIGHT_M: f64 = 1e-7;
 /// The segments hold the whole boundary of the silhouette, in no order; a fold inside it may be among them, which changes
 /// nothing of what the silhouette covers.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Outline {
+pub(super) struct Outline {
     /// Ends of each segment as (y, z), meters, object frame.
     segments: Vec<[DVec2; 2]>,
 }
@@ -37,10 +35,10 @@ impl Outline {
     /// The outline of a mesh (meters, object frame) along x: the edges where its surface turns away.
     ///
     /// # Errors
-    /// [`TrialError::Outline`] of a mesh that is empty, flat along x, or not finite.
-    pub fn of_mesh(mesh: &TriMesh) -> Result<Self, TrialError> {
+    /// If it is a mesh that is empty, flat along x, or not finite.
+    pub(super) fn of_mesh(mesh: &TriMesh) -> anyhow::Result<Self> {
         if mesh.vertices.iter().any(|v| !v.is_finite()) {
-            return Err(TrialError::Outline { why: "its mesh is not finite" });
+            anyhow::bail!("the tool has no outline: its mesh is not finite");
         }
         // For each edge the sides that its triangles face: along x, against it, or neither.
         let mut faces: BTreeMap<(u32, u32), Vec<i8>> = BTreeMap::new();
@@ -64,19 +62,20 @@ impl Outline {
     /// The outline of a polygon given by its corners as (y, z), meters.
     ///
     /// # Errors
-    /// [`TrialError::Outline`] for fewer than three corners, or corners that are not finite or on one line.
-    pub fn polygon(corners: &[DVec2]) -> Result<Self, TrialError> {
+    /// For fewer than three corners, or corners that are not finite or on one line.
+    #[cfg(test)]
+    pub(super) fn polygon(corners: &[DVec2]) -> anyhow::Result<Self> {
         if corners.iter().any(|p| !p.is_finite()) {
-            return Err(TrialError::Outline { why: "a corner is not finite" });
+            anyhow::bail!("the tool has no outline: a corner is not finite");
         }
         let area: f64 = (0..corners.len()).map(|i| corners[i].perp_dot(corners[(i + 1) % corners.len()])).sum();
         if corners.len() < 3 || area.abs() < 1e-12 {
-            return Err(TrialError::Outline { why: "its corners span no area" });
+            anyhow::bail!("the tool has no outline: its corners span no area");
         }
         Self::of_edges((0..corners.len()).map(|i| [key(corners[i]), key(corners[(i + 1) % corners.len()])]))
     }
 
-    fn of_edges(edges: impl Iterator<Item = [Key; 2]>) -> Result<Self, TrialError> {
+    fn of_edges(edges: impl Iterator<Item = [Key; 2]>) -> anyhow::Result<Self> {
         let mut beside: BTreeMap<Key, BTreeSet<Key>> = BTreeMap::new();
         for [a, b] in edges.filter(|[a, b]| a != b) {
             beside.entry(a).or_default().insert(b);
@@ -86,18 +85,18 @@ impl Outline {
         let pairs = beside.iter().flat_map(|(a, to)| to.iter().filter(move |b| a < *b).map(|b| [point(*a), point(*b)]));
         let segments: Vec<_> = pairs.collect();
         if segments.len() < 3 {
-            return Err(TrialError::Outline { why: "it has no extent across the closing axis" });
+            anyhow::bail!("the tool has no outline: it has no extent across the closing axis");
         }
         Ok(Self { segments })
     }
 
     /// The segments, ends as (y, z), meters, object frame.
-    pub fn segments(&self) -> &[[DVec2; 2]] {
+    pub(super) fn segments(&self) -> &[[DVec2; 2]] {
         &self.segments
     }
 
     /// Smallest and largest (y, z), meters.
-    pub fn bounds(&self) -> [DVec2; 2] {
+    pub(super) fn bounds(&self) -> [DVec2; 2] {
         let first = self.segments[0][0];
         let points = self.segments.iter().flatten();
         points.fold([first, first], |[lo, hi], p| [lo.min(*p), hi.max(*p)])
@@ -129,8 +128,9 @@ fn straighten(beside: &mut BTreeMap<Key, BTreeSet<Key>>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::catalog::{cup_handle, pencil, tools};
+    use crate::trials::tools::{cup_handle, pencil};
     use glam::DVec3;
+    use touch2touch_core::catalog::tools;
 
     #[test]
     fn every_corner_of_a_tools_outline_lies_on_its_outline() {
