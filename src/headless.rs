@@ -5,7 +5,6 @@
 
 mod adapt;
 mod args;
-mod basin;
 mod cache;
 mod case;
 mod compare;
@@ -105,8 +104,6 @@ enum Verb {
     /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
     /// `python -m training.train` reads.
     TrainingData(Box<training_data::TrainingDataArgs>),
-    /// Poses that many starts of the registration lead to, for one pair: the numbers behind the basin map.
-    Basin(Box<basin::BasinArgs>),
     /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
     Label(Box<label::LabelArgs>),
     /// Contact masks.
@@ -276,7 +273,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
         Some(Verb::TrainingData(args)) => training_data::run(&args),
-        Some(Verb::Basin(args)) => basin::run(&args),
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),

@@ -122,14 +122,14 @@ fn how(action: Action) -> How {
         A::RunPose => Verb(&["pose", "demo"]),
         A::TryTools => Verb(&["pose", "demo", "--tool", "any"]),
         A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
-        A::OwnStarts => Verb(&["basin", "demo", "--pair", "a"]),
+        A::OwnStarts => Verb(&["pose", "demo", "--pair", "a"]),
         A::NextPoseEngine => Options(&["pose", "demo", "--engine", "gicp"]),
         A::DepthChain => Verb(&["ledger", "demo", "--pair", "a"]),
         // Steps, residuals and reasons are in the report of the registration.
         A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
             Options(&["pose", "demo", "--trace", "--json"])
         }
-        A::Distances | A::NextLayer | A::AnimateWeakest => Options(&["pose", "demo", "--trace", "--json"]),
+        A::Distances | A::NextLayer => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
         A::TickPair => Options(&["figure", "demo", "--pairs", "a,b", "--out", "a.png"]),

@@ -271,31 +271,6 @@ fn the_five_faults_are_written_and_told_apart() {
     assert_eq!(error("stl_in_millimetres"), None);
 }
 
-#[test]
-fn the_basin_map_of_a_pair_is_written() {
-    let dir = tempfile::tempdir().unwrap();
-    let (data, out) = (dir.path().join("data"), dir.path().join("map.json"));
-    let unclear = run(&["basin", "demo", "--pair", "data_1"], &data);
-    assert!(!unclear.status.success() && error_text(&unclear).contains("say more"), "{}", error_text(&unclear));
-    let missing = run(&["basin", "demo", "--pair", "nowhere"], &data);
-    assert!(error_text(&missing).contains("no pair is called"));
-    let name = Dataset::demo().index.pairs[3].name.clone();
-    let made = run(
-        &["basin", "demo", "--pair", &name, "--mask", "truth", "--plane", "angle-z", "--json", out.to_str().unwrap()],
-        &data,
-    );
-    assert!(made.status.success(), "{}", error_text(&made));
-    assert!(String::from_utf8_lossy(&made.stdout).contains("31 x 21 starts"));
-    let map: Value = serde_json::from_slice(&std::fs::read(&out).unwrap()).unwrap();
-    assert_eq!((map["pair"].as_str(), map["cells"].as_array().map(Vec::len)), (Some(name.as_str()), Some(651)));
-    assert_eq!(map["config"]["plane"], "angle-z");
-    let angle = |pose: &Value| pose["theta_rad"].as_f64().unwrap();
-    let off = (angle(&map["basins"][0]["end"]) - angle(&map["truth"])).abs();
-    assert!(off < 5f64.to_radians(), "the cheapest end is the truth: {off}");
-    assert!(map["cells"][0]["requested"]["z_m"].as_f64().unwrap() < -0.009);
-    assert!(!map["own_starts"].as_array().unwrap().is_empty());
-}
-
 /// With the tiny bundles: the form of the table, not its figures.
 #[cfg(feature = "onnx")]
 #[test]

@@ -356,7 +356,6 @@ fn e07_what_is_not_observable_is_flagged_and_stays_where_it_was() {
         let report = report.unwrap();
         let o = report.observability.unwrap();
         assert!(o.degenerate && o.weakest[0].abs() > 0.95, "a disc turns freely: {o:?}");
-        assert_eq!(o.weakest_text(), "turns about its center");
         assert!(report.grasp_from_object.is_finite());
     }
 }

@@ -15,7 +15,6 @@ use super::state::export::Output;
 use super::state::inspect::Inspected;
 use super::state::labels::Review;
 use super::state::library::Place;
-use super::state::results::Request;
 use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
@@ -168,8 +167,6 @@ fn cancel(state: &State) -> Option<Command> {
         does(command)
     } else if state.about.shown {
         does(AboutCommand::Show(false))
-    } else if state.tasks.demanded.iter().any(|r| matches!(r, Request::Basin(_))) {
-        does(InspectCommand::StopBasin)
     } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
         does(LibraryCommand::Brush(None))
     } else if state.tasks.seeds_to_come() > 0 {

@@ -310,8 +310,6 @@ macro_rules! actions {
             state => next_sides(state);
         NextGel, View, "Other GelSlim image", "Goes through the difference, the image during the touch and the one without contact", [],
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
-        AnimateWeakest, View, "Animate weak direction", "Moves the tool to and fro by at most 2 mm and 2° in the direction that the contact determines least", [],
-            state => does(WorkbenchCommand::SetAnimateWeakest(!state.workbench.animate_weakest));
         BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
         CompareMode, View, "Next comparison", "Goes through side by side, wipe, difference and 3D in the Compare pane", [shift(K::F)],

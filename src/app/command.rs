@@ -36,7 +36,7 @@ macro_rules! rooms {
             Seeds(SeedsCommand) in seeds,
             /// To masks, review states and accepted poses.
             Labels(LabelsCommand) in labels,
-            /// To the time machine and the basin map.
+            /// To the time machine.
             Inspect(InspectCommand) in inspect,
             /// To layers, poses by hand and measurements.
             Workbench(WorkbenchCommand) in workbench,

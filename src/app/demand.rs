@@ -80,10 +80,8 @@ fn selection(wants: &mut Demands<'_>) {
                 workbench(wants, source);
             }
         }
-        // The recorded run, and the map of starts last: it takes the longest.
         if results::tool(state).ready().is_some() && results::cloud(state, state.inspect.source).ready().is_some() {
             results::want_inspection(wants);
-            results::want_basin(wants);
         }
     }
     results::want_proposal(wants);
@@ -96,9 +94,6 @@ fn workbench(wants: &mut Demands<'_>, source: ImprintSource) {
     let state = wants.state;
     if results::tool(state).ready().is_none() || results::cloud(state, source).ready().is_none() {
         return;
-    }
-    if state.needs(Demand::FingerPoses) {
-        results::want_pose_table(wants, source);
     }
     if let Some(run) = state.workbench.hand(source).and_then(|hand| hand.icp.clone()) {
         wants.ask(run);

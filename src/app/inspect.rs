@@ -1,18 +1,15 @@
-//! The room of the time machine and the basin map: moving about in what was recorded.
+//! The room of the time machine: moving about in what was recorded.
 
 pub(crate) use super::state::inspect::Inspected;
-pub use super::state::inspect::{BasinColor, Inspect, Pin};
+pub use super::state::inspect::{Inspect, Pin};
 
 use super::effect::Effect;
 use super::keys::ImprintSource;
 use super::results;
 use super::state::State;
-use super::state::results::Request;
-use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_work::error::TaskError;
 
-/// A command to the time machine and the basin map.
+/// A command to the time machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum InspectCommand {
     /// Looks at the other imprint.
@@ -42,12 +39,6 @@ pub enum InspectCommand {
     Unpin(usize),
     /// True where correspondences are drawn.
     Lines(bool),
-    /// The plane of the basin map.
-    Plane(Plane),
-    /// The coloring of the basin map.
-    Color(BasinColor),
-    /// Gives up the basin map that is being computed.
-    StopBasin,
 }
 
 pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effect>) {
@@ -108,16 +99,6 @@ pub(super) fn step(state: &mut State, command: InspectCommand, _: &mut Vec<Effec
             }
         }
         InspectCommand::Lines(lines) => state.inspect.lines = lines,
-        InspectCommand::Plane(plane) => state.inspect.plane = plane,
-        InspectCommand::Color(color) => state.inspect.color = color,
-        InspectCommand::StopBasin => {
-            // What failed is not wanted any more, until somebody asks for it again; the runtime stops it.
-            if let Ok(Some(key)) = results::basin_key(state)
-                && !state.results.basins.contains(&key)
-            {
-                state.tasks.failed.insert(Request::Basin(key), TaskError::cancelled("Basin map"));
-            }
-        }
     }
 }
 

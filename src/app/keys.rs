@@ -28,8 +28,7 @@ pub use imprint::{AmbiguityKey, ColorKey, EnsembleKey, ImprintKey, LedgerKey, Me
 pub use inspection::{Inspection, InspectionKey};
 pub use mask::{AutomaticMask, MaskKey, MaskVersion};
 pub use pose::{
-    BasinKey, CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey,
-    RunKey,
+    CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey,
 };
 pub(crate) use prediction::Keyed;
 pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, SeedKey, StoredKey};

@@ -51,8 +51,6 @@ pub enum Kind {
     Scene,
     /// Steps that can be played.
     Steps,
-    /// A map that is clicked.
-    Map,
 }
 
 /// The dock where a pane lies in a workspace at first. Panes of one dock are its tabs, the one of the earlier row in front.
@@ -92,14 +90,8 @@ pub enum Demand {
     Scene,
     /// The poses of both sides.
     Poses,
-    /// The poses from each finger alone.
-    FingerPoses,
-    /// The layers of the registration that the workbench is about.
-    Layers,
     /// The recorded registration that is looked at.
     Steps,
-    /// The map of its starts.
-    Basin,
     /// Small pictures of the pairs in the list.
     Thumbnails,
     /// The scores that are kept of all pairs.
@@ -159,18 +151,6 @@ macro_rules! panes {
             timemachine { TimeMachine {
                 "Time machine", "The steps of a registration, forwards and backwards",
                 Steps, needs [Steps], at [Align Bottom(1)]
-            } }
-            basin { BasinMap {
-                "Basin map", "Where starts lead; a click on one loads its run into the time machine",
-                Map, needs [Basin], at [Align Right(1)]
-            } }
-            layers { Layers {
-                "Layers", "Residuals, drop reasons, distances both ways and the weak direction of a registration",
-                Form, needs [Layers], at [Align Right(1)]
-            } }
-            poses { Poses {
-                "Poses", "Truth, measurement and prediction against each other, per finger and joint",
-                Form, needs [Poses, FingerPoses], at [Align Right(1)]
             } }
             masks {
                 Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
@@ -240,7 +220,7 @@ macro_rules! define {
             /// The kind of what it shows.
             pub fn kind(self) -> Kind {
                 use ImprintSource::{Measured, Predicted};
-                use Kind::{Color, Form, Imprint, Map, Scene, Steps, Versus};
+                use Kind::{Color, Form, Imprint, Scene, Steps, Versus};
                 match self { $($( Self::$pane => $kind, )*)* }
             }
 
@@ -248,7 +228,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Basin, Comparison, FingerPoses, Imprint, Layers, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Ambiguity, Comparison, Imprint, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
                     Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }

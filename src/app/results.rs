@@ -14,7 +14,6 @@ use touch2touch_work::error::TaskError;
 
 pub(crate) mod about;
 pub(crate) mod ambiguity;
-pub(crate) mod basin;
 pub(crate) mod cloud;
 pub(crate) mod comparison;
 pub(crate) mod deviation;
@@ -52,8 +51,6 @@ pub(crate) mod versus;
 pub(crate) use about::{about_key, want_about};
 pub use ambiguity::ambiguity;
 pub(crate) use ambiguity::want_ambiguity;
-pub use basin::basin;
-pub(crate) use basin::{basin_key, want_basin};
 pub use cloud::cloud;
 pub(crate) use cloud::{automatic_cloud, cloud_key, latest, want_cloud};
 pub use comparison::comparison;
@@ -87,8 +84,8 @@ pub(crate) use on_screen::{
     shows_steps,
 };
 pub use outdated::{Outdated, Why, outdated};
-pub(crate) use pose::{Registered, registered, want_pose, want_pose_table};
-pub use pose::{pose, pose_key, pose_of, provisional_pose};
+pub(crate) use pose::{Registered, registered, want_pose};
+pub use pose::{pose, pose_key, provisional_pose};
 pub(crate) use prediction::{hold, keep_prediction, want_other_finger, want_stored};
 pub(crate) use prefetch::{prefetch, want_predictions_ahead};
 pub use preview::{Onlooker, PreviewRequest, preview, preview_request};

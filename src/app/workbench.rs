@@ -1,7 +1,7 @@
 //! The room of the workbench: layers, poses by hand, measuring.
 
 pub(crate) use super::state::workbench::SECTION_REACH_M;
-pub use super::state::workbench::{Layer, ManualTry, Picked, PoseOf, SceneTool, Section, SectionAxis, Workbench};
+pub use super::state::workbench::{Layer, ManualTry, Picked, SceneTool, Section, SectionAxis, Workbench};
 
 use glam::DVec3;
 
@@ -22,8 +22,6 @@ const KERNEL_M: f64 = 1e-3;
 pub enum WorkbenchCommand {
     /// The coloring of the contact points.
     SetLayer(Layer),
-    /// True where the tool is moved along its weakest direction.
-    SetAnimateWeakest(bool),
     /// True where all tools are tried on the selected pair.
     TryTools(bool),
     /// True where each 3D pane shows the clouds of both imprints.
@@ -59,7 +57,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
     let bench = &mut state.workbench;
     match command {
         WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
-        WorkbenchCommand::SetAnimateWeakest(on) => bench.animate_weakest = on,
         WorkbenchCommand::TryTools(on) => bench.tools_tried = pair.filter(|_| on),
         WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
         WorkbenchCommand::SetSection(section) => {

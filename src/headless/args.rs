@@ -227,8 +227,8 @@ mod tests {
     fn a_json_file_may_follow_a_space_and_a_path_is_no_json_file() {
         let with =
             |words: &str| JsonArgs::with_equals(words.split(' ').map(OsString::from).collect()).join(" ".as_ref());
-        assert_eq!(with("t basin --json a/b.json demo"), "t basin --json=a/b.json demo");
-        assert_eq!(with("t basin --json demo --pair x.json"), "t basin --json demo --pair x.json");
+        assert_eq!(with("t pose --json a/b.json demo"), "t pose --json=a/b.json demo");
+        assert_eq!(with("t pose --json demo --pair x.json"), "t pose --json demo --pair x.json");
         assert_eq!(with("t bench generator --json out --grasps 3"), "t bench generator --json=out --grasps 3");
         assert_eq!(with("t bench generator --json --grasps 3"), "t bench generator --json --grasps 3");
         assert_eq!(with("t pose demo --json"), "t pose demo --json");

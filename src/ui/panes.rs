@@ -1,16 +1,13 @@
 //! The panes, a file for each kind of them, as the table in `app/pane.rs` lists them.
 
 pub(crate) mod adapt;
-pub(crate) mod basin;
 pub(crate) mod browser;
 pub(crate) mod generate;
 pub(crate) mod images;
-pub(crate) mod layers;
 pub(crate) mod ledger;
 pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod metrics;
-pub(crate) mod poses;
 pub(crate) mod results;
 pub(crate) mod scatter;
 pub(crate) mod scene;

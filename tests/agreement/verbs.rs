@@ -61,7 +61,6 @@ fn held(verb: &str) -> Option<Held> {
             super::a_pair_in_files_is_the_same_in_both,
         ]),
         "adapt" => By(&[learned::TESTS[0]]),
-        "basin" => By(&[posed::a_basin_map_is_the_same_in_the_pane_and_by_the_verb]),
         "label" => By(&[
             labels::random_edits_of_masks_by_hand_are_those_of_the_verb,
             super::edits::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,

@@ -1,16 +1,13 @@
-//! The time machine and the basin map: computed only while looked at, found again under their recipe.
+//! The time machine: computed only while looked at, found again under their recipe.
 
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, TasksCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane};
 use touch2touch::app::inspect::InspectCommand;
-use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, Registration};
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
-use touch2touch::app::state::results::Request;
 use touch2touch::app::{demand, results};
-use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 
@@ -38,31 +35,19 @@ fn nothing_is_recorded_unless_it_is_looked_at() {
     let mut bench = bench(&[Pane::Scene, Pane::Metrics]);
     let pose = results::pose(&bench.state, MEASURED).ready().unwrap().clone();
     assert!(pose.report.trace.is_empty() && pose.report.fits.is_empty());
-    assert!(bench.state.results.inspections.is_empty() && bench.state.results.basins.is_empty());
+    assert!(bench.state.results.inspections.is_empty());
     assert!(Action::StepBack.command(&bench.state).is_none(), "there is nothing to step through");
-    // The time machine alone records; it needs no pose beside, and no map.
+    // The time machine alone records; it needs no pose beside.
     bench.state.results.poses.clear();
     bench.send(panes(&[Pane::TimeMachine]));
     bench.settle();
     assert_eq!(bench.state.results.inspections.len(), 1);
-    assert!(bench.state.results.poses.is_empty() && bench.state.results.basins.is_empty());
+    assert!(bench.state.results.poses.is_empty());
     let inspection = results::inspection(&bench.state).ready().unwrap().clone();
     assert_eq!(inspection.report().grasp_from_object, pose.grasp_from_object, "looking changes nothing");
-    // The map alone records nothing else.
-    bench.state.results.inspections.clear();
-    bench.send(panes(&[Pane::BasinMap]));
-    bench.settle();
-    assert_eq!((bench.state.results.inspections.len(), bench.state.results.basins.len()), (0, 1));
-    let map = results::basin(&bench.state).ready().unwrap();
-    assert_eq!(map.cells.len(), 31 * 21);
     // A closed pane asks for nothing.
     bench.send(panes(&[Pane::Log]));
-    send(&mut bench, InspectCommand::Plane(Plane::YZ));
     assert!(demand::demands(&bench.state).is_empty());
-    // Back at a plane that was there, nothing is computed again.
-    send(&mut bench, InspectCommand::Plane(Plane::AngleY));
-    bench.send(panes(&[Pane::BasinMap]));
-    assert!(results::basin(&bench.state).ready().is_some() && bench.state.tasks.is_idle());
 }
 
 #[test]
@@ -179,24 +164,4 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     assert_eq!(bench.state.inspect.pins_of(bench.state.pair_key()), [None, None], "they belong to their pair");
     bench.send(LibraryCommand::Select(SIMULATED));
     assert!(bench.state.inspect.pins_of(bench.state.pair_key())[1].is_some());
-}
-
-#[test]
-fn a_map_that_is_given_up_is_not_computed_until_asked_for() {
-    let mut bench = bench(&[Pane::Scene]);
-    bench.send(panes(&[Pane::BasinMap]));
-    let wants_map = |bench: &Bench| demand::demands(&bench.state).iter().any(|r| matches!(r, Request::Basin(_)));
-    assert!(wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 1);
-    let stop = Action::CancelJobs.command(&bench.state).unwrap();
-    bench.send(stop);
-    assert!(!wants_map(&bench) && bench.runtime.waiting(Lane::Compute) == 0);
-    assert!(matches!(results::basin(&bench.state), Lookup::Failed(err) if err.is_cancelled()));
-    bench.settle();
-    assert!(bench.state.results.basins.is_empty() && bench.errors() == 0);
-    bench.send(TasksCommand::Retry);
-    bench.settle();
-    let map = results::basin(&bench.state).ready().unwrap();
-    let truth = results::truth(&bench.state).unwrap();
-    let best = map.basins[0].end;
-    assert!((best.theta_rad - truth.theta_rad).abs() < 5f64.to_radians(), "{best:?} {truth:?}");
 }

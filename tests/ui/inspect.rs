@@ -1,14 +1,12 @@
-//! The time machine and the basin map, by keys and clicks.
+//! The time machine, by keys and clicks.
 
 use eframe::egui::{Key, Modifiers, vec2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, Pane};
-use touch2touch::app::inspect::InspectCommand;
+use touch2touch::app::command::Pane;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
-use touch2touch_core::align::basin::is_same_place;
 
 use super::rig::Rig;
 
@@ -54,7 +52,7 @@ impl Rig {
 fn scrub_by_keys_pin_two_and_compare() {
     let Some(mut rig) = Rig::align() else { return };
     let state = rig.harness.state().state();
-    assert!(state.selection.panes.contains(&Pane::TimeMachine) && state.selection.panes.contains(&Pane::BasinMap));
+    assert!(state.selection.panes.contains(&Pane::TimeMachine));
     let shown = results::inspected(state).expect("the winner's last step");
     let (run, last) = (shown.run, shown.at);
     assert!(shown.is_last() && last > 3);
@@ -131,36 +129,4 @@ fn space_plays_where_the_pointer_is_over_the_steps() {
     rig.harness.step();
     let delays: Vec<_> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
     assert!(delays.iter().all(|d| *d > std::time::Duration::from_secs(3600)), "{delays:?}");
-}
-
-#[test]
-fn a_click_on_the_map_loads_that_run() {
-    let Some(mut rig) = Rig::align() else { return };
-    let own = results::inspection(rig.harness.state().state()).ready().unwrap().num_runs();
-    rig.click_in("Map of starts", [0.9, 0.2]);
-    rig.shoot("test-basin-clicked");
-    let state = rig.harness.state().state();
-    let start = state.inspect.start.expect("a start was chosen").get();
-    let basin = results::basin(state).ready().unwrap();
-    let cell = basin.cells.iter().find(|c| c.requested == start).expect("it is a start of the grid");
-    // Right of the middle the angle grows; above it y does.
-    assert!(start.inverse().theta_rad > 0.4 && start.y_m > 0.004, "{start:?}");
-    let inspection = results::inspection(state).ready().expect("the run is there").clone();
-    assert_eq!((inspection.num_runs(), inspection.requested(0)), (1, Some(start)));
-    let arrival = cell.arrival.expect("the start leads somewhere");
-    let applied = inspection.applied(0).unwrap();
-    assert!(is_same_place(applied, arrival.applied), "the map and the time machine agree: {applied:?} {arrival:?}");
-    assert!((applied.theta_rad - start.theta_rad).abs() < 1e-9, "step 0 is the start");
-    assert_eq!(rig.at()[1], 0, "it is shown from where it began");
-    rig.harness.get_by_label("All own starts").click();
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(results::inspection(rig.harness.state().state()).ready().unwrap().num_runs(), own);
-    // Out of sight the map is not computed, even when what it is made from changes.
-    rig.fill("Time machine");
-    let maps = rig.harness.state().state().results.basins.len();
-    rig.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
-    rig.send(Command::Inspect(InspectCommand::Color(touch2touch::app::inspect::BasinColor::Winner)));
-    assert_eq!(rig.harness.state().state().results.basins.len(), maps);
-    assert_eq!(rig.harness.state().state().results.inspections.len(), 3, "the time machine is still on screen");
 }

@@ -4,7 +4,7 @@ use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
-use touch2touch::app::inspect::{BasinColor, InspectCommand};
+use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::prefer;
@@ -65,7 +65,6 @@ fn pictures_for_the_docs() {
         rig.send(Command::Inspect(InspectCommand::Pin));
         rig.send(Command::Inspect(InspectCommand::By(4)));
         rig.shoot(&format!("{name}-demo-align"));
-        rig.send(Command::Inspect(InspectCommand::Color(BasinColor::Winner)));
         rig.send(Command::Inspect(InspectCommand::Start(Some(STRAY))));
         rig.shoot(&format!("{name}-demo-align-start"));
         rig.send(Command::Inspect(InspectCommand::Start(None)));

@@ -233,7 +233,7 @@ fn methods(args: &ModelArgs) -> anyhow::Result<Vec<Method>> {
     let mask_model = args.mask_model(mask.source, &rig)?;
     let of = |imprint| -> anyhow::Result<Recipe> {
         let recipe = args.recipe(imprint, &rig)?;
-        Ok(Recipe { mask: mask.clone(), mask_model: mask_model.clone(), hand: false, ..recipe })
+        Ok(Recipe { mask, mask_model: mask_model.clone(), hand: false, ..recipe })
     };
     let predicted = of(ImprintSource::Predicted)?;
     let generator = predicted.generator.as_ref().map_or_else(String::new, |(bundle, _)| bundle.name.clone());

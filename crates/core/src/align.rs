@@ -12,12 +12,10 @@
 //!
 //! Source of the method: Fitzgibbon, Robust registration of 2D and 3D point sets, 2003.
 
-pub mod basin;
 mod batch;
 mod certify;
 pub mod closed_form;
 pub mod correspond;
-mod directions;
 pub mod icp;
 mod influence;
 mod joint;
@@ -41,7 +39,6 @@ use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
-pub use directions::{Directions, Distances};
 pub(crate) use icp::IcpConfig;
 pub use influence::influence;
 pub use joint::{Basis, Elsewhere, Evidence, Hold, JointConfig, JointFit, MaskWeight, MembraneEvidence};
@@ -403,8 +400,6 @@ pub struct AlignReport {
     /// Evidence for and against the answer, where it was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub evidence: Option<Evidence>,
-    /// Distances both ways at the answer; only if recorded.
-    pub directions: Option<Directions>,
     /// Per-iteration states of all runs; empty unless recorded.
     pub trace: Vec<TraceStep>,
     /// Fate of every offered point, in order; empty unless recorded.

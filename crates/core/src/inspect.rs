@@ -1,41 +1,16 @@
-//! Looking into a registration: the map of where starts lead, and what a step compares.
-//!
-//! The studio's time machine and basin map and the command line's `basin` call these.
+//! Looking into a registration: what a step of the time machine compares.
 
 use glam::{DVec2, DVec3};
 
-use super::align::basin::{Basin, BasinConfig, basin};
+use super::align::TraceStep;
 use super::align::correspond::{Matches, ModelPoints, Surface, correspondences};
-use super::align::{Contacts, TraceStep};
-use super::mesh::sampling::spread;
-use super::pose::{Registration, RegistrationChoice, ToolModel, register, register_from};
+use super::frames::PlanarPose;
+use super::pose::{Registration, ToolModel};
+use super::units::angle_error;
 
-/// Contact points per run of a basin map with the distance field: more move its ends by less than a line is wide.
-const MAP_POINTS: usize = 512;
-/// Contact points per run with registrations that ask a tree for every point and iteration: 651 runs must take about a
-/// second.
-const MAP_POINTS_COSTLY: usize = 96;
-
-/// Basin map: where every start of a grid leads; `None` if `cancelled` said so meanwhile.
-///
-/// The map is of the cost that decided the pose: where membranes say too little and the mask alone answers, of the mask
-/// alone. Costly registrations get fewer points, evenly thinned; [`Basin::points`] and [`Basin::offered`] say so.
-pub fn basin_map<'a>(
-    contacts: impl Into<Contacts<'a>>,
-    tool: &ToolModel,
-    engine: impl Into<RegistrationChoice>,
-    config: &BasinConfig,
-    cancelled: impl Fn() -> bool + Sync,
-) -> Option<Basin> {
-    let (engine, Contacts { points, images }) = (engine.into(), contacts.into());
-    let finite: Vec<DVec3> = points.iter().copied().filter(|p| p.is_finite()).collect();
-    let most = if engine.by.uses_field() { MAP_POINTS } else { MAP_POINTS_COSTLY };
-    let thinned: Vec<DVec3> = spread(finite.len(), most).into_iter().map(|i| finite[i]).collect();
-    let whole = Contacts { points: &thinned, images };
-    let by_membrane = || register(whole, tool, engine, false).ok()?.joint.map(|fit| fit.basis.has_membrane());
-    let images = if images.is_empty() || by_membrane() == Some(true) { images } else { &[] };
-    let contacts = Contacts { points: &thinned, images };
-    basin(config, points.len(), |start| register_from(contacts, tool, engine, start, false), cancelled)
+/// True where two poses are the same place: within a degree and a millimeter.
+pub fn is_same_place(a: PlanarPose, b: PlanarPose) -> bool {
+    angle_error(a.theta_rad, b.theta_rad) <= 1f64.to_radians() && (a.y_m - b.y_m).hypot(a.z_m - b.z_m) <= 1e-3
 }
 
 /// Model that contact points are compared with at any step of a run, prepared once per tool.
@@ -73,9 +48,9 @@ fn in_plane(points: &[DVec3]) -> Vec<DVec2> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::align::basin::{Plane, is_same_place};
+    use crate::align::Ask;
     use crate::align::testing::{cross, cross_contacts};
-    use crate::frames::PlanarPose;
+    use crate::pose::{RegistrationChoice, register, register_with};
     use strum::IntoEnumIterator as _;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 };
@@ -95,7 +70,13 @@ mod tests {
             let plain = register(&points, &tool, engine, false).unwrap();
             assert_eq!(own.grasp_from_object, plain.grasp_from_object, "{engine}: looking changes nothing");
             assert!(!own.trace.is_empty() && plain.trace.is_empty(), "{engine}");
-            let told = register_from(&points, &tool, engine, start, true).unwrap();
+            let told = register_with(
+                &*RegistrationChoice::from(engine).method(),
+                &points,
+                &tool,
+                Ask { starts: Some(&[start]), record: true, ..Ask::default() },
+            )
+            .unwrap();
             let first = told.trace[0].grasp_from_object;
             assert_eq!(told.runs.len(), 1, "{engine}");
             assert!(is_same_place(first, start) && told.trace[0].iteration == 0, "{engine}: {first:?}");
@@ -106,22 +87,5 @@ mod tests {
             let [median, _] = matches.median_and_max_m().unwrap();
             assert!(median < 2e-3, "{engine}: {median}");
         }
-    }
-
-    #[test]
-    fn a_map_says_how_many_points_it_used() {
-        let tool = ToolModel::new(cross()).unwrap();
-        let mut points = contacts(900);
-        points.push(DVec3::NAN);
-        for engine in Registration::iter() {
-            let config = BasinConfig { size: [5, 3], ..BasinConfig::new(Plane::AngleY) };
-            let map = basin_map(&points, &tool, engine, &config, || false).unwrap();
-            let most = if engine.uses_field() { MAP_POINTS } else { MAP_POINTS_COSTLY };
-            assert_eq!((map.points, map.offered, map.cells.len()), (most, 901, 15), "{engine}");
-            assert!(basin_map(&points, &tool, engine, &config, || true).is_none());
-        }
-        let none =
-            basin_map(&[] as &[DVec3], &tool, Registration::default(), &BasinConfig::new(Plane::YZ), || false).unwrap();
-        assert!(none.cells.iter().all(|c| c.failure.is_some()) && none.basins.is_empty());
     }
 }

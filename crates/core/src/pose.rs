@@ -2,8 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::align::{AlignError, AlignReport, Ask, Contacts, Directions, Evidence, Register, Scene, icp};
-use super::frames::PlanarPose;
+use super::align::{AlignError, AlignReport, Ask, Contacts, Evidence, Register, Scene};
 
 mod choice;
 
@@ -134,20 +133,6 @@ pub fn register<'a>(
     register_with(&*engine.into().method(), contacts, tool, Ask { record, ..Ask::default() })
 }
 
-/// Registers from one start, `grasp_from_object`, instead of the engine's own.
-///
-/// # Errors
-/// As [`register`], and for a start that is not finite.
-pub(crate) fn register_from<'a>(
-    contacts: impl Into<Contacts<'a>>,
-    tool: &ToolModel,
-    engine: impl Into<RegistrationChoice>,
-    start: PlanarPose,
-    record: bool,
-) -> Result<AlignReport, AlignError> {
-    register_with(&*engine.into().method(), contacts, tool, Ask { starts: Some(&[start]), record, ..Ask::default() })
-}
-
 /// Registers with a registration of any settings.
 ///
 /// # Errors
@@ -162,9 +147,6 @@ pub fn register_with<'a>(
     let mut report = registration.run(&scene, tool, ask)?;
     if ask.evidence {
         report.evidence = Some(Evidence::about(&scene, tool, &report));
-    }
-    if ask.record {
-        report.directions = Directions::at(scene.yz(), &icp::silhouette(tool), report.grasp_from_object);
     }
     Ok(report)
 }

@@ -55,7 +55,6 @@ impl Action {
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene => picture || self.is_of_scene(),
             Kind::Steps => self.is_of_steps(),
-            Kind::Map => matches!(self, A::CancelJobs | A::OwnStarts),
         }
     }
 
@@ -65,7 +64,7 @@ impl Action {
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
             || matches!(self, A::CameraBottom | A::CameraOblique | A::Section | A::Distances | A::NextSides)
             || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
-            || matches!(self, A::LinkCameras | A::NextLayer | A::AnimateWeakest | A::BothClouds);
+            || matches!(self, A::LinkCameras | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
             || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)

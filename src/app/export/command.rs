@@ -77,12 +77,7 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             let start = state.inspect.start.map(|start| start_text(start.get()));
             posed(of_pair("pose")?, side).option_if("--start", start).word("--trace").word("--json")
         }
-        (Pane::Layers, _) => posed(of_pair("pose")?, side).word("--trace").word("--json"),
-        (Pane::BasinMap, _) => {
-            let plane: &'static str = state.inspect.plane.into();
-            posed(of_pair("basin")?, side).option("--plane", plane)
-        }
-        (Pane::Metrics | Pane::Poses, _) => {
+        (Pane::Metrics, _) => {
             let recipe = recipe_shown(state, ImprintSource::Predicted);
             of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))
         }

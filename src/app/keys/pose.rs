@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, RegistrationChoice};
-use touch2touch_core::align::basin::{Basin, Plane};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::which_tool::Candidate;
@@ -163,22 +162,5 @@ impl Key for RankingKey {
 
     fn bytes(found: &Vec<Candidate>) -> usize {
         found.len() * size_of::<Candidate>()
-    }
-}
-
-/// A basin map.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct BasinKey {
-    /// The pose that the registration makes.
-    pub pose: PoseKey,
-    /// The plane of the starts that are tried.
-    pub plane: Plane,
-}
-
-impl Key for BasinKey {
-    type Value = Basin;
-
-    fn bytes(found: &Basin) -> usize {
-        found.bytes()
     }
 }

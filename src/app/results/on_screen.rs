@@ -12,10 +12,9 @@ use touch2touch_work::propose::{CadAt, Takes};
 /// whether it is needed at all.
 pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) {
     let other = source.other();
-    let layers = state.needs(Demand::Layers) && state.workbench.side == source;
     let both = state.workbench.both_clouds && state.shows_scene(other);
-    let scene = layers || both || state.shows_scene(source) || state.needs(Demand::Poses);
-    let inspected = state.inspect.source == source && (state.needs(Demand::Steps) || state.needs(Demand::Basin));
+    let scene = both || state.shows_scene(source) || state.needs(Demand::Poses);
+    let inspected = state.inspect.source == source && state.needs(Demand::Steps);
     let scene = scene || proposes_at_pose(state, source) || shows_influence(state, source);
     (scene, scene || inspected)
 }
@@ -67,13 +66,12 @@ pub(crate) fn shows_steps(state: &State, source: ImprintSource) -> bool {
     state.inspect.source == source && (lines || state.needs(Demand::Steps))
 }
 
-/// True where something on screen shows the layers of an imprint.
+/// True where a 3D view shows the layers of an imprint.
 pub(crate) fn shows_layers(state: &State, source: ImprintSource) -> bool {
     let bench = &state.workbench;
-    let in_scene = state.shows_scene(source)
+    state.shows_scene(source)
         && (matches!(bench.layer, Layer::Residuals | Layer::Reasons)
-            || bench.picked.is_some_and(|picked| picked.source == source));
-    in_scene || (state.needs(Demand::Layers) && bench.side == source)
+            || bench.picked.is_some_and(|picked| picked.source == source))
 }
 
 /// True where a 3D view shows the distances between an imprint and the model.

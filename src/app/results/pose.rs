@@ -1,4 +1,4 @@
-//! Poses of clouds: of both fingers, and of each alone.
+//! Poses of clouds.
 
 use std::sync::Arc;
 
@@ -7,11 +7,9 @@ use super::super::keys::{ImprintSource, PoseKey, ProvisionalPoseKey, ToolKey};
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::results::Computed;
-use super::super::state::workbench::PoseOf;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use super::imprint::{Imprint, imprint_input};
-use touch2touch_core::align::basin::{Basin, Plane};
 use touch2touch_core::align::{AlignReport, Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
@@ -21,7 +19,6 @@ use touch2touch_core::which_tool::{Candidate, which_tool};
 use touch2touch_work::cloud::{Clouds, images};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::influence::{Influence, influence};
-use touch2touch_work::job::JobCx;
 use touch2touch_work::pose::{self, PoseResult};
 use touch2touch_work::tool::NamedTool;
 
@@ -50,14 +47,6 @@ impl Registered {
     pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: RegistrationChoice) -> Vec<Candidate> {
         let tools = tools.iter().map(|tool| (tool.name.as_str(), &tool.model));
         self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
-    }
-
-    /// Basin map: the poses that many starts lead to.
-    ///
-    /// # Errors
-    /// As [`pose::basin`].
-    pub(crate) fn basin(&self, registration: RegistrationChoice, plane: Plane, cx: &JobCx) -> Result<Basin, TaskError> {
-        self.with_contacts(|contacts| pose::basin(contacts, &self.tool.model, registration, plane, cx))
     }
 
     /// The influence of each pixel on the angle of a report of these contacts.
@@ -135,22 +124,9 @@ impl Computes for ProvisionalPoseKey {
 /// # Errors
 /// Why there can be none.
 pub fn pose_key(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
-    match unmasked(state, source) {
-        Some(_) => Err(Absent::NoContact),
-        None => pose_key_of_the_rest(state, source),
+    if unmasked(state, source).is_some() {
+        return Err(Absent::NoContact);
     }
-}
-
-/// Why a finger of an imprint has no mask, where none can be made: a pose of the others alone is not that of all.
-fn unmasked(state: &State, source: ImprintSource) -> Option<&TaskError> {
-    state.rig().pads().find_map(|finger| match results::mask_in_force(state, source, finger) {
-        Err(Lookup::Failed(err)) => Some(err),
-        _ => None,
-    })
-}
-
-/// [`pose_key`] of the fingers that have masks.
-fn pose_key_of_the_rest(state: &State, source: ImprintSource) -> Result<Option<PoseKey>, Absent> {
     let tool = results::tool_name(state);
     let Some(cloud) = results::cloud_key(state, source)? else {
         return Ok(None);
@@ -159,6 +135,14 @@ fn pose_key_of_the_rest(state: &State, source: ImprintSource) -> Result<Option<P
         return Err(state.rig().pads().find_map(|f| results::mask_recipe(state, f).err()).unwrap_or(Absent::NoContact));
     }
     Ok(Some(PoseKey::of(cloud, tool?.into(), &recipe::in_force(state, source))))
+}
+
+/// Why a finger of an imprint has no mask, where none can be made: a pose of the others alone is not that of all.
+fn unmasked(state: &State, source: ImprintSource) -> Option<&TaskError> {
+    state.rig().pads().find_map(|finger| match results::mask_in_force(state, source, finger) {
+        Err(Lookup::Failed(err)) => Some(err),
+        _ => None,
+    })
 }
 
 /// The pose of an imprint.
@@ -185,29 +169,6 @@ pub fn provisional_pose(state: &State, source: ImprintSource) -> Option<&Arc<Pos
     state.results.provisional_poses.get(&ProvisionalPoseKey(key))
 }
 
-/// The recipe of the pose from one finger or both; `Ok(None)` while something is not there yet.
-///
-/// # Errors
-/// Why there can be none.
-pub(crate) fn pose_key_of(state: &State, source: ImprintSource, of: PoseOf) -> Result<Option<PoseKey>, Absent> {
-    let PoseOf::Finger(finger) = of else { return pose_key(state, source) };
-    let Some(mut key) = pose_key_of_the_rest(state, source)? else { return Ok(None) };
-    let part = key.cloud.parts[finger].take();
-    if part.as_ref().is_none_or(|(_, mask)| mask.is_none()) {
-        return Err(Absent::NoFinger);
-    }
-    key.cloud.parts = PerPad::default();
-    key.cloud.parts[finger] = part;
-    Ok(Some(key))
-}
-
-/// The pose from one finger or both.
-pub fn pose_of(state: &State, source: ImprintSource, of: PoseOf) -> Lookup<'_, PoseResult> {
-    let key = pose_key_of(state, source, of);
-    let cloud = key.clone().ok().flatten().and_then(|key| state.failure(key.cloud));
-    state.look_or(key, || None).or_failed(cloud).value()
-}
-
 /// The pose; where it may take a proof, one without first.
 pub(crate) fn want_pose(wants: &mut Demands<'_>, source: ImprintSource) {
     let Ok(Some(key)) = pose_key(wants.state, source) else { return };
@@ -218,17 +179,5 @@ pub(crate) fn want_pose(wants: &mut Demands<'_>, source: ImprintSource) {
         wants.ask(provisional);
     } else {
         wants.ask(key);
-    }
-}
-
-/// The poses of single fingers in the table, and the clouds that they are made of: the joint one is asked for anyway.
-pub(crate) fn want_pose_table(wants: &mut Demands<'_>, source: ImprintSource) {
-    let state = wants.state;
-    for finger in state.rig().pads() {
-        match pose_key_of(state, source, PoseOf::Finger(finger)) {
-            Ok(Some(key)) if state.results.clouds.contains(&key.cloud) => wants.ask(key),
-            Ok(Some(key)) => wants.ask(key.cloud),
-            _ => {}
-        }
     }
 }

@@ -1,10 +1,9 @@
-//! The time machine and the basin map: what of a registration is looked at, and how views find it.
+//! The time machine: what of a registration is looked at, and how views find it.
 
 use std::sync::Arc;
 
 use super::super::keys::{ImprintSource, Inspection, PairKey, PoseBits, RegistrationChoice};
 use touch2touch_core::align::TraceStep;
-use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 
 /// The part of a registration that is looked at. Not kept between runs of the program.
@@ -24,10 +23,6 @@ pub struct Inspect {
     pub pins: [Option<Pin>; 2],
     /// True where correspondences are drawn in the 3D view.
     pub lines: bool,
-    /// The plane of the basin map.
-    pub plane: Plane,
-    /// The coloring of the basin map.
-    pub color: BasinColor,
 }
 
 impl Default for Inspect {
@@ -40,31 +35,6 @@ impl Default for Inspect {
             playing: false,
             pins: [None, None],
             lines: true,
-            plane: Plane::default(),
-            color: BasinColor::default(),
-        }
-    }
-}
-
-/// The coloring of a basin map.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, strum::EnumIter)]
-pub enum BasinColor {
-    /// Square root of the cost at the end.
-    #[default]
-    Cost,
-    /// Angle between end and truth.
-    Error,
-    /// The place that the run ended at.
-    Winner,
-}
-
-impl BasinColor {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Cost => "Cost",
-            Self::Error => "Angle error",
-            Self::Winner => "End",
         }
     }
 }

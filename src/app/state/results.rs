@@ -7,8 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{
-    BasinKey, CloudKey, ImprintSource, InfluenceKey, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview,
-    TouchKey,
+    CloudKey, ImprintSource, InfluenceKey, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview, TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
@@ -83,8 +82,6 @@ macro_rules! table {
         Influence(InfluenceKey) in influences, 16 * MIB;
         /// The steps of a recorded registration, made ready to be looked through.
         Inspection(InspectionKey) in inspections, 64 * MIB;
-        /// The ends that starts lead to.
-        Basin(BasinKey) in basins, 32 * MIB;
         /// The scores that are kept of all pairs.
         Scores(ScoresKey) in scores, 64 * MIB;
         /// The results table of the scores that are kept.
@@ -112,8 +109,6 @@ pub struct Latest {
     pub pose: Option<PoseKey>,
     /// The recorded registration.
     pub inspection: Option<InspectionKey>,
-    /// The basin map.
-    pub basin: Option<BasinKey>,
     /// The influence on its angle.
     pub influence: Option<InfluenceKey>,
 }

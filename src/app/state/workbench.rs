@@ -7,7 +7,7 @@ use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
 use touch2touch_core::manual::{ManualCost, ManualPose};
-use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_core::rig::PadId;
 
 /// The coloring of the contact points in 3D.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
@@ -161,8 +161,6 @@ pub struct ManualTry {
 pub struct Workbench {
     /// The coloring of the contact points.
     pub layer: Layer,
-    /// True where the tool is moved along its weakest direction.
-    pub animate_weakest: bool,
     /// Pair for which all tools are tried.
     pub tools_tried: Option<PairKey>,
     /// True where each 3D pane shows the clouds of both imprints.
@@ -187,7 +185,6 @@ impl Default for Workbench {
     fn default() -> Self {
         Self {
             layer: Layer::None,
-            animate_weakest: false,
             tools_tried: None,
             both_clouds: false,
             section: None,
@@ -212,29 +209,5 @@ impl Workbench {
     /// The pose being set for one imprint.
     pub fn hand(&self, source: ImprintSource) -> Option<&ManualTry> {
         self.hand.as_ref().filter(|hand| hand.source == source)
-    }
-}
-
-/// A finger's row, or the joint one, of the table of poses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PoseOf {
-    /// From one finger alone.
-    Finger(PadId),
-    /// From all together.
-    Joint,
-}
-
-impl PoseOf {
-    /// The name on screen.
-    pub fn name(self, rig: &Rig) -> String {
-        match self {
-            Self::Finger(finger) => format!("{} finger", rig.pad_name(finger)),
-            Self::Joint => "Joint".into(),
-        }
-    }
-
-    /// All rows of a rig's table.
-    pub fn all(rig: &Rig) -> Vec<Self> {
-        rig.pads().map(Self::Finger).chain([Self::Joint]).collect()
     }
 }

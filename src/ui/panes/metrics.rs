@@ -3,20 +3,22 @@
 use crate::app::results;
 use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Sense, Ui};
 
-use super::{images, poses, scene};
+use super::{images, scene};
 use crate::app::action::Action;
-use crate::app::command::Pane;
+use crate::app::command::{LabelsCommand, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::state::{Absent, Lookup};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, grade_color, section, value};
 use crate::ui::parts::widget::line::Line;
 use strum::IntoEnumIterator as _;
+use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
 use touch2touch_work::compare::Comparison;
+use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::pose::PoseResult;
 
 /// Nothing is kept between frames.
@@ -138,12 +140,10 @@ fn verdict(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
 }
 
 /// The place of the tool; how it was found behind it.
-fn place(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
+fn place(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
     let p = pose.grasp_from_object;
     let mut text = format!("y {:.2} mm   z {:.2} mm", units::mm(p.y_m), units::mm(p.z_m));
-    if let Some(hand) = results::by_hand(cx.state, source) {
-        ui.label(RichText::new(poses::by_hand_text(cx, hand)).size(SMALL).color(cx.p.good));
-    } else if results::accepted(cx.state, source) == Some(p.into()) {
+    if results::accepted(cx.state, source) == Some(p.into()) {
         text += "   accepted";
     }
     let label = ui.label(value(text, cx.p).size(SMALL));
@@ -152,6 +152,23 @@ fn place(cx: &Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult) {
         scene::pose_details(pose),
         scene::pose_time(pose)
     ));
+    let elsewhere = results::accepted_elsewhere(cx.state);
+    if source == ImprintSource::Predicted && !elsewhere.is_empty() {
+        let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
+        ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
+    }
+    let Some(hand) = results::by_hand(cx.state, source) else { return };
+    let angle = units::text_deg(hand.planar.inverse().theta_rad);
+    let error = results::truth(cx.state).map(|truth| PoseDifference::between(hand.planar, truth).angle_rad);
+    let error = error.map_or(String::new(), |error| format!(" (error {})", units::text_deg(error)));
+    ui.horizontal(|ui| {
+        ui.label(RichText::new(format!("Accepted by hand: {angle}{error}")).size(SMALL).color(cx.p.good));
+        let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
+        let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
+        if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
+            cx.push(LabelsCommand::AcceptPose(source, false));
+        }
+    });
 }
 
 fn absent_short(absent: Absent) -> &'static str {

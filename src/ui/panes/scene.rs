@@ -276,14 +276,7 @@ fn one_side(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
             cx.push(Command::Workbench(WorkbenchCommand::SetSide(source)));
         }
     }
-    let seconds = ui.input(|i| i.time);
-    if state.workbench.animate_weakest
-        && results::pose(state, source).shown().is_some_and(|p| p.report.observability.is_some())
-    {
-        // The only thing that moves by itself, and only while a person asked for it.
-        ui.ctx().request_repaint_after(std::time::Duration::from_millis(33));
-    }
-    let mut scene = build::scene_of(cx, memory, source, seconds);
+    let mut scene = build::scene_of(cx, memory, source);
     place_camera(cx, ui, memory, source, &output, &scene);
     let camera = memory.views[source as usize].camera;
     cx.shared.angles[source as usize] =

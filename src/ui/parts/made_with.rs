@@ -24,7 +24,7 @@ const BUTTON: f32 = 64.0;
 pub(crate) fn is_predicted(cx: &Cx<'_>, pane: Pane) -> bool {
     match pane.kind() {
         Kind::Imprint(source) => source == ImprintSource::Predicted,
-        Kind::Steps | Kind::Map => cx.state.inspect.source == ImprintSource::Predicted,
+        Kind::Steps => cx.state.inspect.source == ImprintSource::Predicted,
         Kind::Versus => cx.state.settings.compared().is_error(),
         Kind::Form => pane == Pane::Ledger,
         Kind::Color | Kind::Scene => false,

@@ -92,7 +92,6 @@ fn controls(cx: &Cx<'_>, pane: Pane) -> &'static [(&'static str, &'static str)] 
         Kind::Versus => help::VERSUS,
         Kind::Scene => help::SCENE,
         Kind::Steps => help::STEPS,
-        Kind::Map => help::BASIN,
     }
 }
 

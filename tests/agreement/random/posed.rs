@@ -1,10 +1,9 @@
-//! Registrations: their steps, the map of their starts, and what the angle hangs on.
+//! Registrations: their steps, and what the angle hangs on.
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::state::Lookup;
 use touch2touch::app::{recipe, results};
-use touch2touch_core::align::basin::Plane;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Rejection;
 use touch2touch_work::influence::Influence;
@@ -66,39 +65,6 @@ pub(in crate::agreement) fn every_step_of_a_registration_is_the_same_in_the_time
         counts.push(count);
     }
     compared(&counts, 1000);
-}
-
-#[test]
-pub(in crate::agreement) fn a_basin_map_is_the_same_in_the_pane_and_by_the_verb() {
-    let home = tempfile::tempdir().unwrap();
-    let mut draws = Draws::new(5);
-    let mut counts = Vec::new();
-    for mut both in with_poses(home.path()) {
-        let mut count = 0;
-        both.show(&[Pane::BasinMap, Pane::Predicted]);
-        for (at, source) in ImprintSource::iter().enumerate() {
-            // Each map is of 651 registrations.
-            let by = draws.of(&[Registration::DistanceField, Registration::PlanarPointToPoint]);
-            let recipe = Recipe { registration: by.into(), ..draws.posed() };
-            both.predict(&recipe, 23 * at as u32);
-            both.studio.send(InspectCommand::Source(source).into());
-            let plane = draws.of(&Plane::iter().collect::<Vec<_>>());
-            both.studio.send(InspectCommand::Plane(plane).into());
-            let what = format!("{} {source:?} {plane:?}, {recipe:?}", both.studio.state.pair_name());
-            let said = both.said(Pane::BasinMap);
-            let shown = results::basin(&both.studio.state);
-            let Lookup::Ready(found) = shown else {
-                same_reason(shown, said, &what);
-                continue;
-            };
-            let said = said.unwrap_or_else(|err| panic!("{what}: {err}"));
-            for (part, shown) in written(found).as_object().unwrap() {
-                count += same(shown, &said[part], &format!("{what}: {part}"));
-            }
-        }
-        counts.push(count);
-    }
-    compared(&counts, 5000);
 }
 
 /// Holds what is drawn over the imprints against the file and the places of the verb. How many pixels were compared.

@@ -19,7 +19,6 @@ use touch2touch::app::command::{
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
-use touch2touch::app::inspect::BasinColor;
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Revision, ShiftMode, TouchKey,
@@ -37,7 +36,6 @@ use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::train::{Train, TrainForm};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
-use touch2touch_core::align::basin::Plane;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Metric;
@@ -516,13 +514,9 @@ draws! {
         1 Pin,
         1 Unpin(0usize..4),
         1 Lines(any::<bool>()),
-        1 Plane(any_of::<Plane>()),
-        1 Color(any_of::<BasinColor>()),
-        1 StopBasin,
     }
     workbench: WorkbenchCommand {
         1 SetLayer(any_of::<Layer>()),
-        1 SetAnimateWeakest(any::<bool>()),
         1 TryTools(any::<bool>()),
         1 SetBothClouds(any::<bool>()),
         1 SetSection(proptest::option::of(section())),

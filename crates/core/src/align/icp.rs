@@ -241,7 +241,6 @@ impl Register for IcpConfig {
             observability: Some(observability(&chosen_yz, &tool.field, pose)),
             joint: None,
             evidence: None,
-            directions: None,
             fits: if ask.record { self.fits(tool, &clean, best.state) } else { Vec::new() },
             trace: trace.steps,
         })

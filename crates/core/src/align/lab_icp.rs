@@ -209,7 +209,6 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
         observability: None,
         joint: None,
         evidence: None,
-        directions: None,
         trace: paper.trace,
         fits,
     })

@@ -409,7 +409,6 @@ impl<'a> Problem<'a> {
             observability: Some(answer.seen),
             joint: None,
             evidence: None,
-            directions: None,
             trace: answer.trace,
             fits: if config.record { fits(points_yz, self.field, pose, config.final_kernel_m()) } else { Vec::new() },
         }

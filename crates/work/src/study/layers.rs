@@ -3,8 +3,8 @@
 use crate::cloud::{Clouds, FingerCloud};
 use crate::error::TaskError;
 use crate::pose::PoseResult;
+use touch2touch_core::align::PointFit;
 use touch2touch_core::align::reason::{self, Reason, ReasonCounts, reasons};
-use touch2touch_core::align::{Directions, PointFit};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::rig::{PadId, PerPad};
@@ -20,16 +20,10 @@ pub struct LayerResult {
     pub fits: PerPad<Vec<PointFit>>,
     /// Pixels per reason.
     pub counts: PerPad<ReasonCounts>,
-    /// Residuals of the contact points of both fingers by size: shares of [`LayerResult::range_m`].
-    pub histogram: Vec<u32>,
-    /// Contact points with a larger residual than the range.
-    pub above: u32,
-    /// Largest residual of the histogram and of the heat map, meters.
+    /// Largest residual of the heat map, meters.
     pub range_m: f64,
     /// Width of the narrowest kernel, meters; `None` for an engine without one.
     pub kernel_m: Option<f64>,
-    /// Distances in both directions; `None` without points on one side.
-    pub directions: Option<Directions>,
 }
 
 impl LayerResult {
@@ -51,11 +45,9 @@ impl LayerResult {
     }
 }
 
-/// Bars of the histogram of residuals.
-pub const BARS: usize = 40;
-/// Range of the histogram and of the heat map in widths of the kernel: where the gate is, and a little beyond.
+/// Range of the heat map in widths of the kernel: where the gate is, and a little beyond.
 const RANGE_KERNELS: f64 = 4.0;
-/// Range of the histogram and of the heat map for an engine without a kernel, meters.
+/// Range of the heat map for an engine without a kernel, meters.
 const RANGE_M: f64 = 4e-3;
 
 /// Layers of a recorded registration of `clouds` with the masks they were made with.
@@ -82,29 +74,12 @@ pub fn layers(clouds: &Clouds, masks: &PerPad<&Mask>, run: &PoseResult) -> Resul
     }
     let kernel_m = run.report.trace.iter().map(|step| step.kernel_m).filter(|k| k.is_finite()).reduce(f64::min);
     let range_m = kernel_m.map_or(RANGE_M, |k| k * RANGE_KERNELS);
-    let (histogram, above) = histogram(fits.iter().flatten().flatten(), range_m);
     Ok(LayerResult {
         grasp_from_object: run.grasp_from_object,
         counts: grids.as_ref().map(|grid| grid.map(|grid| reason::counts([grid]))),
         reasons: grids,
         fits,
-        histogram,
-        above,
         range_m,
         kernel_m,
-        directions: run.report.directions,
     })
-}
-
-/// Residuals by size in [`BARS`] equal steps up to `range_m`, and how many are larger. What is not finite is left out.
-fn histogram<'a>(fits: impl Iterator<Item = &'a PointFit>, range_m: f64) -> (Vec<u32>, u32) {
-    let mut bars = vec![0; BARS];
-    let mut above = 0;
-    for residual in fits.map(|fit| f64::from(fit.residual_m)).filter(|r| r.is_finite()) {
-        match bars.get_mut((residual / range_m * BARS as f64) as usize) {
-            Some(bar) => *bar += 1,
-            None => above += 1,
-        }
-    }
-    (bars, above)
 }

@@ -5,12 +5,9 @@ use std::time::Instant;
 use glam::{DAffine3, DVec3};
 
 use crate::error::TaskError;
-use crate::job::JobCx;
-use touch2touch_core::align::basin::{Basin, BasinConfig, Plane};
 use touch2touch_core::align::{AlignReport, Ask, Contacts, Evidence, PointFit, Register, Scene, TraceStep};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::inspect::basin_map;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel, register_with};
+use touch2touch_core::pose::{ToolModel, register_with};
 use touch2touch_core::units;
 use touch2touch_core::verdict::Verdict;
 
@@ -113,25 +110,4 @@ pub fn pose<'a>(
         verdict: Verdict::of(&report),
         report,
     })
-}
-
-/// Basin map: the poses that many starts lead to.
-///
-/// # Errors
-/// If the job was told to stop, or no start led anywhere.
-pub fn basin<'a>(
-    contacts: impl Into<Contacts<'a>>,
-    tool: &ToolModel,
-    registration: RegistrationChoice,
-    plane: Plane,
-    cx: &JobCx,
-) -> Result<Basin, TaskError> {
-    const WHAT: &str = "Basin map";
-    let config = BasinConfig::new(plane);
-    let map = basin_map(contacts, tool, registration, &config, || cx.cancel.is_cancelled())
-        .ok_or_else(|| TaskError::cancelled(WHAT))?;
-    match map.cells.iter().find_map(|cell| cell.failure.as_deref()) {
-        Some(why) if map.basins.is_empty() => Err(TaskError::new(WHAT, why)),
-        _ => Ok(map),
-    }
 }

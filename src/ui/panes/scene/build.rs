@@ -152,8 +152,8 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
     }
 }
 
-/// Everything one side shows at time `seconds`.
-pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64) -> SceneData {
+/// Everything one side shows.
+pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> SceneData {
     let look = &cx.state.settings.scene;
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
     scene.cut = cut(cx, memory, source);
@@ -162,7 +162,7 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seco
     surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
-    meshes(cx, memory, source, seconds, &mut scene);
+    meshes(cx, memory, source, &mut scene);
     scene.lines.extend(layers::uncertainty(cx, source));
     steps::add(cx, memory, source, &mut scene);
     if look.layer(SceneLayer::Guides).shown {
@@ -315,7 +315,7 @@ fn pointed(cx: &Cx<'_>, source: ImprintSource, scene: &mut SceneData) {
 
 /// The models that a side can show now, each with its pose: the shaded one is [`SceneLayer::Cad`], the others are
 /// outlines to compare it with.
-pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(SceneLayer, DAffine3)> {
+pub(super) fn models(cx: &Cx<'_>, source: ImprintSource) -> Vec<(SceneLayer, DAffine3)> {
     let state = cx.state;
     let mut models = Vec::new();
     // The step that is looked at, else what was registered.
@@ -327,7 +327,7 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
             models.extend(registered.map(|pose| (SceneLayer::Registered, pose.to_affine())));
         }
         (None, Some(pose)) => {
-            models.push((SceneLayer::Cad, layers::swayed(cx, source, pose, seconds).to_affine()));
+            models.push((SceneLayer::Cad, pose.to_affine()));
         }
         (None, None) => {}
     }
@@ -342,12 +342,12 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource, seconds: f64) -> Vec<(S
 }
 
 /// The model, shaded where the tool is and as outlines where else it could be.
-fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, seconds: f64, scene: &mut SceneData) {
+fn meshes(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
     let state = cx.state;
     let tool_now = results::tool(state).ready().map(|t| t.name.as_str());
     let Some(mesh) = memory.mesh.as_ref().filter(|m| Some(m.key.1.as_str()) == tool_now) else { return };
     let settings = &state.settings.scene;
-    for (layer, world_from_mesh) in models(cx, source, seconds) {
+    for (layer, world_from_mesh) in models(cx, source) {
         let look = settings.layer(layer);
         if !look.shown {
             continue;

@@ -1,4 +1,4 @@
-//! Layers in a 3D view: what colors the contact points, the uncertainty of the pose, and the tool swaying along its weakest motion.
+//! Layers in a 3D view: what colors the contact points, and the uncertainty of the pose.
 
 use std::sync::Arc;
 
@@ -6,7 +6,6 @@ use eframe::egui::Color32;
 use glam::{DAffine3, DVec2, DVec3};
 
 use super::{Memory, rgb};
-use crate::app::command::Pane;
 use crate::app::keys::{ImprintSource, PoseKey};
 use crate::app::results;
 use crate::app::settings::LayerLook;
@@ -15,12 +14,9 @@ use crate::gpu::lines::{LinesItem, LinesStyle, Segment};
 use crate::gpu::mesh::{MeshItem, MeshStyle};
 use crate::gpu::points::{CloudItem, PointColors};
 use crate::spatial::items;
-use crate::ui::panes::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::parts::cx::Cx;
-use touch2touch_core::align::Observability;
 use touch2touch_core::align::reason::Reason;
-use touch2touch_core::colormap::Range;
-use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::verdict::Grade;
@@ -29,8 +25,21 @@ use touch2touch_work::deviation::DISTANCE_MAP;
 /// Bars of a histogram of distances.
 const BARS: usize = 37;
 
-/// Time of one sway to and fro, seconds.
-const SWAY_S: f64 = 2.0;
+/// The colors of residuals: perceptually uniform, and told apart by color-blind eyes.
+pub(super) const RESIDUAL_MAP: ColorMap = ColorMap::Viridis;
+
+/// The color of a reason: the palette of Okabe and Ito, made to be told apart by color-blind eyes.
+pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
+    match reason {
+        Reason::Inlier => [0x00, 0x9e, 0x73],
+        Reason::Inside => [0xf0, 0xe4, 0x42],
+        Reason::BeyondGate => [0xd5, 0x5e, 0x00],
+        Reason::Trimmed => [0xcc, 0x79, 0xa7],
+        Reason::OutOfFrame => [0x00, 0x72, 0xb2],
+        Reason::InvalidDepth => [0xe8, 0xe8, 0xe8],
+        Reason::OutsideMask => [0x70, 0x70, 0x70],
+    }
+}
 
 /// Colors of the contact points of one registration, made once.
 pub(super) struct LayerColors {
@@ -150,37 +159,21 @@ pub(super) fn dashed(world_from_mesh: DAffine3, color: Color32, look: LayerLook)
     items::truth(world_from_mesh, rgb(color), look.opacity, look.size.value())
 }
 
-/// Observability of the registered pose of a side.
-fn observability<'a>(cx: &'a Cx<'_>, source: ImprintSource) -> Option<&'a Observability> {
-    results::pose(cx.state, source).shown()?.report.observability.as_ref()
-}
-
-/// The registered pose moved along its weakest direction at time `seconds`, while that is shown.
-pub(super) fn swayed(cx: &Cx<'_>, source: ImprintSource, pose: PlanarPose, seconds: f64) -> PlanarPose {
-    match observability(cx, source) {
-        Some(o) if cx.state.workbench.animate_weakest => {
-            o.moved_along_weakest(pose, (seconds * std::f64::consts::TAU / SWAY_S).sin())
-        }
-        _ => pose,
-    }
-}
-
 /// The uncertainty of the pose as it is: the ellipse of two deviations of the place where the tool is held, and the fan of
-/// two deviations of the angle about it. Where the pose is doubted, and where one looks into a registration.
+/// two deviations of the angle about it. Where the pose is doubted.
 pub(super) fn uncertainty(cx: &Cx<'_>, source: ImprintSource) -> Option<LinesItem> {
     /// Half length of the fan, meters; beyond this share of it an ellipse is cut off, and beyond these radians a fan.
     const REACH_M: f64 = 0.03;
     const WIDEST: f64 = 0.5;
     const SIDES: i32 = 48;
     let found = results::pose(cx.state, source).shown()?;
-    let doubted = found.verdict.as_ref().is_some_and(|verdict| verdict.grade > Grade::Good);
-    let asked = cx.state.workbench.animate_weakest || cx.state.selection.panes.contains(&Pane::Layers);
-    let told = found.report.evidence.filter(|_| doubted || asked)?.uncertainty;
+    found.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good)?;
+    let told = found.report.evidence?.uncertainty;
     let pose = found.grasp_from_object;
     let center = told.center;
     let axes = told.half_axes(pose).map(|axis| (2.0 * axis).clamp_length_max(WIDEST * REACH_M));
     let turn = (2.0 * told.angle_rad()).min(WIDEST);
-    let color = if doubted { cx.p.caution } else { cx.p.accent };
+    let color = cx.p.caution;
     let bits = [center.x, center.y, axes[0].x, axes[0].y, axes[1].length(), turn, pose.theta_rad];
     let revision = bits.iter().fold(u64::from(color.r()), |hash, v| hash.rotate_left(9) ^ v.to_bits());
     let at = |yz: DVec2| DVec3::new(0.0, (center + yz).x, (center + yz).y);

@@ -9,11 +9,11 @@ use eframe::egui::{
 };
 use strum::IntoEnumIterator as _;
 
+use super::layers::{RESIDUAL_MAP, reason_rgb};
 use super::{Memory, build, ghost, steps};
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
 use crate::app::workbench::Layer;
-use crate::ui::panes::layers::{RESIDUAL_MAP, reason_rgb};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use crate::ui::parts::widget::colorbar::gradient;
@@ -144,7 +144,7 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         add(layer, &text);
     }
     if memory.mesh.is_some() {
-        for (layer, _) in build::models(cx, source, 0.0) {
+        for (layer, _) in build::models(cx, source) {
             add(layer, model_name(cx, source, layer));
         }
     }

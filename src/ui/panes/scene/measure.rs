@@ -3,12 +3,12 @@
 use eframe::egui::{Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
 use glam::DVec3;
 
+use super::layers::reason_rgb;
 use super::{Memory, distance_at, nearest};
 use crate::app::command::{Command, TasksCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::workbench::{Picked, SceneTool, WorkbenchCommand};
-use crate::ui::panes::layers::reason_rgb;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::scene_view::SceneOutput;
 use crate::ui::parts::theme::{SMALL, caption};

@@ -121,7 +121,6 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
             (Action::BothClouds, both),
             (Action::MembraneSurface, surface),
             (Action::EyeDome, edl),
-            (Action::AnimateWeakest, cx.state.workbench.animate_weakest),
         ] {
             cx.menu_row(ui, action, on);
         }

@@ -117,7 +117,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         text(cx, ui, &format!("Next: {stop}"), "What the registration does from here");
     }
     if let (Some(requested), Some(applied)) = (shown.inspection.requested(shown.run), start) {
-        let same = touch2touch_core::align::basin::is_same_place(requested, applied);
+        let same = touch2touch_core::inspect::is_same_place(requested, applied);
         let said = if same { "began as asked" } else { "asked for" };
         let color = if same { cx.p.weak } else { cx.p.caution };
         let line = if same {

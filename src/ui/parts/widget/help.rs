@@ -59,13 +59,6 @@ pub(crate) const STEPS: &[(&str, &str)] = &[
     ("[[pin_step]]", "pin the step for comparison"),
 ];
 
-/// Mouse controls of the basin map.
-pub(crate) const BASIN: &[(&str, &str)] = &[
-    ("Hover", "the start asked for, the one applied, and the end"),
-    ("Click", "load that run into the time machine"),
-    ("[[cancel_jobs]]", "give up what is being computed"),
-];
-
 /// The list of `controls`, with the keys in force.
 pub fn list(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
     egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {

@@ -431,7 +431,6 @@ impl<'a> Problem<'a> {
             observability: seen,
             joint: Some(answer.fit),
             evidence: None,
-            directions: None,
             trace: answer.trace,
             fits,
             runs,
