@@ -25,7 +25,6 @@ mod output;
 mod pose;
 mod recipe;
 mod report;
-mod seeds;
 mod shards;
 mod simulate;
 mod stats;

@@ -86,7 +86,6 @@ fn how(action: Action) -> How {
         A::ImportMasks => Verb(&["masks", "import", "demo", "--from", "folder"]),
         A::Generate => Verb(&["generate", "demo", "--out", "folder"]),
         A::GenerateNewSeed | A::LockSeed => Options(&["generate", "demo", "--out", "folder", "--seed", "7"]),
-        A::RunSeeds => Verb(&["generate", "demo", "--out", "folder", "--seeds", "8"]),
         A::FitPairs => Verb(&["adapt", "demo", "--out", "folder"]),
         A::UseFit => Options(&["generate", "demo", "--out", "folder", "--bundle", "fitted"]),
         A::TrainMasks | A::StartTraining => Verb(&["masks", "train", "demo", "--minutes", "10", "--out", "trained"]),

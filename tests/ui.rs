@@ -27,7 +27,6 @@ mod palette;
 mod queue;
 mod results;
 mod scene;
-mod seeds;
 mod shortcuts;
 mod train;
 mod unit;

@@ -5,8 +5,8 @@ use strum::IntoEnumIterator;
 use super::action::{Action, actions};
 use super::command::{
     AboutCommand, AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand, TrainCommand,
-    UiRequest, ViewCommand, WorkbenchCommand,
+    LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand, UiRequest,
+    ViewCommand, WorkbenchCommand,
 };
 use super::keys::{ImprintSource, ShiftMode};
 use super::pane::Workspace;
@@ -169,8 +169,6 @@ fn cancel(state: &State) -> Option<Command> {
         does(AboutCommand::Show(false))
     } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
         does(LibraryCommand::Brush(None))
-    } else if state.tasks.seeds_to_come() > 0 {
-        does(SeedsCommand::Run(false))
     } else {
         when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
     }

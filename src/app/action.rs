@@ -111,8 +111,6 @@ macro_rules! actions {
             state => when(results::can_generate(state).is_ok(), PredictCommand::Generate);
         GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)],
             state => when(results::can_generate(state).is_ok(), PredictCommand::GenerateNewSeed);
-        RunSeeds, Generate, "Several seeds", "Predicts the touch with several seeds, one after the other, or stops; shows where they disagree", [],
-            state => when(results::can_generate(state).is_ok() && state.selection.panes.contains(&Pane::Seeds), SeedsCommand::Run(!results::seeds_running(state)));
         LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)],
             _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
@@ -432,7 +430,6 @@ impl Action {
             Self::NextUnfinished => "todo open unlabeled remaining",
             Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",
-            Self::RunSeeds => "ensemble uncertainty spread repeat",
             Self::FitPairs => "adapt calibrate tune finetune train",
             Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
             Self::EvaluateDataset => "score metrics benchmark results table",

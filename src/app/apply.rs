@@ -4,8 +4,8 @@ use super::command::{Command, rooms};
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    about, adapt, answers, evaluate, export, follow, inspect, labels, library, predict, seeds, settings, tasks, train,
-    view, workbench,
+    about, adapt, answers, evaluate, export, follow, inspect, labels, library, predict, settings, tasks, train, view,
+    workbench,
 };
 use touch2touch_work::progress::Progress;
 

@@ -11,7 +11,6 @@ pub use super::labels::{LabelsCommand, UnsavedCommand};
 pub use super::library::LibraryCommand;
 pub use super::pane::Pane;
 pub use super::predict::PredictCommand;
-pub use super::seeds::SeedsCommand;
 pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::state::view::{CameraPreset, Hover, UiRequest};
@@ -32,8 +31,6 @@ macro_rules! rooms {
             View(ViewCommand) in view,
             /// To predictions.
             Predict(PredictCommand) in predict,
-            /// To several seeds of one touch.
-            Seeds(SeedsCommand) in seeds,
             /// To masks, review states and accepted poses.
             Labels(LabelsCommand) in labels,
             /// To the time machine.

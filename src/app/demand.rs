@@ -19,7 +19,6 @@ pub fn demands(state: &State) -> Vec<Request> {
     let mut wants = Demands { state, list: Vec::new() };
     selection(&mut wants);
     results::want_versus(&mut wants);
-    results::want_seeds(&mut wants);
     results::want_thumbnails(&mut wants);
     results::want_scores(&mut wants);
     results::want_table(&mut wants);

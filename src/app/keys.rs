@@ -24,14 +24,14 @@ pub use dataset::{
     AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey, ToolKey,
     TrainPlanKey,
 };
-pub use imprint::{AmbiguityKey, ColorKey, EnsembleKey, ImprintKey, LedgerKey, MetersKey, PictureKey};
+pub use imprint::{AmbiguityKey, ColorKey, ImprintKey, LedgerKey, MeanKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};
 pub use mask::{AutomaticMask, MaskKey, MaskVersion};
 pub use pose::{
     CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey,
 };
 pub(crate) use prediction::Keyed;
-pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, SeedKey, StoredKey};
+pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, StoredKey};
 pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};
 pub use versus::{CloudDifferenceKey, VersusKey};
 

@@ -82,8 +82,6 @@ pub enum Demand {
     Ambiguity,
     /// The depth chain.
     Ledger,
-    /// Several seeds.
-    Seeds,
     /// Any two imprints against each other.
     Versus,
     /// Cloud and pose in 3D, of the sides that are chosen.
@@ -143,10 +141,6 @@ macro_rules! panes {
             ledger { Ledger {
                 "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
                 Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
-            } }
-            seeds { Seeds {
-                "Seeds", "Several predictions of the touch: where they disagree, and how their poses fan out",
-                Form, needs [Seeds], at [Inspect Bottom(1)]
             } }
             timemachine { TimeMachine {
                 "Time machine", "The steps of a registration, forwards and backwards",
@@ -228,7 +222,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Comparison, Imprint, Ledger, Masks, Pair, Poses, Scene, Scores, Seeds,
+                    Ambiguity, Comparison, Imprint, Ledger, Masks, Pair, Poses, Scene, Scores,
                     Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }

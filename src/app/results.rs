@@ -40,7 +40,6 @@ pub(crate) mod ranking;
 pub(crate) mod run;
 pub(crate) mod sample;
 pub(crate) mod scores;
-pub(crate) mod seeds;
 pub(crate) mod shown;
 mod table;
 pub(crate) mod thumbnail;
@@ -80,8 +79,7 @@ pub use mask_plan::mask_plan_key;
 pub(crate) use mask_plan::want_mask_plan;
 pub use on_screen::proposes;
 pub(crate) use on_screen::{
-    fingers_to_generate, seeds_asked, seeds_of, shows_cloud, shows_deviation, shows_influence, shows_layers,
-    shows_steps,
+    fingers_to_generate, shows_cloud, shows_deviation, shows_influence, shows_layers, shows_steps,
 };
 pub use outdated::{Outdated, Why, outdated};
 pub(crate) use pose::{Registered, registered, want_pose};
@@ -96,8 +94,6 @@ pub(crate) use run::run_key;
 pub use sample::{bubble, gelslim, sample, touch, truth};
 pub use scores::evaluated;
 pub(crate) use scores::{evaluation_setup, scores_key, setup_of_all, want_scores};
-pub use seeds::{ensemble, seed_imprint, seed_poses, seed_recipes, seeds_running};
-pub(crate) use seeds::{seed_pose_absent, want_seeds};
 pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
 pub(crate) use table::want_table;
@@ -106,8 +102,8 @@ pub(crate) use thumbnail::want_thumbnails;
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
 pub(crate) use train_plan::{train_plan_key, want_train_plan};
+pub(crate) use versus::{pose_absent, subject_points, want_versus};
 pub use versus::{subject, subject_key, subject_pose, subjects_apart, subjects_compared};
-pub(crate) use versus::{subject_points, want_versus};
 
 /// A key that says how its result is computed.
 pub(crate) trait Computes: Key {

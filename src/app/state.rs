@@ -12,7 +12,6 @@ pub mod inspect;
 pub mod labels;
 pub mod library;
 pub mod results;
-pub mod seeds;
 pub mod settings;
 pub mod shown;
 pub mod tasks;
@@ -31,7 +30,6 @@ use inspect::Inspect;
 use labels::Document;
 use library::Library;
 use results::{Cached, Request, Results};
-use seeds::Seeds;
 use settings::Settings;
 use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
@@ -68,8 +66,6 @@ pub struct State {
     pub train: TrainState,
     /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,
-    /// The choices of a person about seeds.
-    pub seeds: Seeds,
     /// The preferences; while a case is open, those it was saved with.
     pub settings: Settings,
     /// The person's own preferences, while a case is open that has others.

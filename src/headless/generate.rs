@@ -14,7 +14,6 @@ use super::notes::Notes;
 use super::output::says;
 use super::recipe::{ModelArgs, misgiving};
 use super::report::{RunReport, output_stems};
-use super::seeds::{self, SeedArgs};
 use super::shards::{Parts, Shard, ShardArg, Sharded};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::ambiguity::ambiguity;
@@ -26,7 +25,6 @@ use touch2touch_core::sample::{PadTouch, Scale};
 use touch2touch_core::{metrics, resample};
 use touch2touch_work::compare;
 use touch2touch_work::doubts;
-use touch2touch_work::fan::seeds_of;
 use touch2touch_work::imprint::{self, imprint_of};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::names::with_ending;
@@ -56,8 +54,6 @@ pub(super) struct GenerateArgs {
     limit: LimitArgs,
     #[command(flatten)]
     shard: ShardArg,
-    #[command(flatten)]
-    ensemble: SeedArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -127,15 +123,6 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
                 write(&stem, &imprint)?;
                 let (drawn, on) = (Some((&predicted, shift)), OnPad { sample: &sample, pad: finger });
                 score(&dataset, id, on, (&imprint, drawn), &mut pair)?;
-                if args.ensemble.seeds > 1 {
-                    let count = usize::from(args.ensemble.seeds);
-                    let found = seeds_of(on, &recipe, count, &models, &JobCx::unwatched())?;
-                    let mut of_mean = Pair::default();
-                    score(&dataset, id, on, (&found.ensemble.spread.mean, None), &mut of_mean)?;
-                    let mut figures = seeds::write(&stem, &found, config.seed)?;
-                    (figures.mean_psnr_db, figures.mean_ssim) = (of_mean.psnr_db, of_mean.ssim);
-                    pair.ensemble = Some(figures);
-                }
                 made.push(pair);
             }
             Ok(made)

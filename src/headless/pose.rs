@@ -14,7 +14,7 @@ use super::output::says;
 use super::recipe::misgiving;
 use super::report::output_stems;
 use super::shards::{Parts, Sharded};
-use super::{Output, VerbResult, seeds};
+use super::{Output, VerbResult};
 use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
@@ -53,8 +53,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         }
     };
     // Names of files are those of one run.
-    let stems = stems(&args.fans.fan_out)?.into_iter().zip(stems(&args.influence)?);
-    let work = args.shard.share(ids.iter().copied().zip(stems).collect());
+    let work = args.shard.share(ids.iter().copied().zip(stems(&args.influence)?).collect());
     let output = Output::new(args.common, "aligning", work.len());
     let models = args.model.models();
     let recipe = args.recipe(&dataset.rig)?;
@@ -68,7 +67,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
     let open = TaskError::new("Pose", "the tool is not known yet");
-    for (id, (stem, influence)) in work {
+    for (id, influence) in work {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -116,7 +115,6 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             let pair = PairId(id as u32);
             let asked = PairInput {
                 name: &entry.name,
-                stem: stem.as_deref(),
                 influence: influence.as_deref(),
                 touch: Touch { dataset: &dataset, pair, sample: &sample, tool, labels: &labels },
                 tried: &tried,
@@ -166,8 +164,6 @@ pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
 /// A pair as `pose` asks for it.
 struct PairInput<'a> {
     name: &'a str,
-    /// Path of its pictures, without an ending.
-    stem: Option<&'a Path>,
     /// Path of the file for the influence of its pixels.
     influence: Option<&'a Path>,
     /// Of which the tool is left open where all are to be tried.
@@ -180,7 +176,7 @@ struct PairInput<'a> {
 
 /// One case per engine for one pair and one kind of imprint.
 fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
-    let PairInput { name, stem, influence, touch, tried, recipe, accepted } = *asked;
+    let PairInput { name, influence, touch, tried, recipe, accepted } = *asked;
     let (sample, imprint) = (touch.sample, recipe.imprint);
     let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = felt.contact();
@@ -191,7 +187,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
         sample.rig.pads().map(left_open).collect()
     });
-    let several = predicted && args.ensemble.seeds > 1;
     let one = |&by: &RegistrationChoice| {
         let ranked = match touch.tool {
             Ok(_) => None,
@@ -200,15 +195,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let likeliest = ranked.iter().flatten().next().map(|first| first.tool.as_str());
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
         let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
-        let fan = several
-            .then(|| {
-                let recipe = Recipe { registration: by, ..recipe.clone() };
-                seeds::fan(touch, &recipe, args.ensemble.seeds, models)
-            })
-            .transpose()?;
-        if let (Some(fan), Some(stem)) = (&fan, stem) {
-            fan.write(stem, name, by)?;
-        }
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
         let found = felt.pose_by(touch, &*registration(args, by), ask);
@@ -242,7 +228,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             ambiguity: left_open.clone(),
             no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(ToString::to_string)),
             influence: influence.and_then(Result::ok),
-            fan,
         })
     };
     args.registration.0.iter().map(one).collect()

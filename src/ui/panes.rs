@@ -11,7 +11,6 @@ pub(crate) mod metrics;
 pub(crate) mod results;
 pub(crate) mod scatter;
 pub(crate) mod scene;
-pub(crate) mod seeds;
 pub(crate) mod settings_pane;
 pub(crate) mod table;
 pub(crate) mod timemachine;

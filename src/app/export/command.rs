@@ -84,10 +84,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
         (Pane::Generate, _) => {
             of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
         }
-        (Pane::Seeds, _) => {
-            let words = of_pair("generate")?.option("--finger", &finger).option("--out", "predictions");
-            words.option("--seeds", state.seeds.count).then(drawn())
-        }
         (Pane::Compare, _) => {
             let versus = state.settings.compared();
             of_pair("compare")?

@@ -4,7 +4,6 @@ use super::super::keys::{ImprintSource, Key, PredictionKey, ShiftMode, TouchKey}
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_work::compare::Beside;
-use touch2touch_work::ensemble::Ensemble;
 use touch2touch_work::labels::ImprintOf;
 use touch2touch_work::ledger::LedgerResult;
 
@@ -16,7 +15,7 @@ pub enum ImprintKey {
     /// Derived from a prediction.
     Predicted(PredictionKey, ShiftMode),
     /// The mean of several predictions.
-    Mean(EnsembleKey),
+    Mean(MeanKey),
     /// The prediction of another program that lies beside the pair.
     Picture(TouchKey),
 }
@@ -73,9 +72,9 @@ impl Key for ColorKey {
     }
 }
 
-/// Several predictions of one touch, as far as they are there.
+/// The mean of several predictions of one touch.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct EnsembleKey {
+pub struct MeanKey {
     /// The touch.
     pub touch: TouchKey,
     /// At least one; they differ in their seeds.
@@ -84,11 +83,11 @@ pub struct EnsembleKey {
     pub shift: ShiftMode,
 }
 
-impl Key for EnsembleKey {
-    type Value = Ensemble;
+impl Key for MeanKey {
+    type Value = DepthMap;
 
-    fn bytes(found: &Ensemble) -> usize {
-        found.bytes()
+    fn bytes(mean: &DepthMap) -> usize {
+        mean.len() * 4
     }
 }
 

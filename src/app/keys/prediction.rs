@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::super::keys::{Key, TouchKey};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::ensemble::seeds;
 use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::job::PreviewPicture;
 use touch2touch_work::prediction::Prediction;
@@ -30,11 +29,6 @@ impl PredictionKey {
         Some(Self { touch, bundle: model.id.clone(), config: *config, runtime: recipe.engine })
     }
 
-    /// The keys that differ from it in their seeds alone: `count` of them, from its own on.
-    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
-        seeds(self.config.seed, count).into_iter().map(|seed| self.with_seed(seed)).collect()
-    }
-
     /// The key that differs in its seed alone.
     #[must_use]
     pub fn with_seed(&self, seed: u64) -> Self {
@@ -48,14 +42,6 @@ impl Key for PredictionKey {
     fn bytes(prediction: &Prediction) -> usize {
         prediction.raw.channels.iter().map(|c| c.len() * 4).sum()
     }
-}
-
-/// A prediction with one of several seeds.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct SeedKey(pub PredictionKey);
-
-impl Key for SeedKey {
-    type Value = Prediction;
 }
 
 /// The predictions of a touch that lie on the disk from before.

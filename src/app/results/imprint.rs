@@ -12,7 +12,6 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::compare::Beside;
-use touch2touch_work::ensemble::Ensemble;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::imprint;
 
@@ -44,7 +43,7 @@ pub(crate) fn imprint_input(state: &State, key: &ImprintKey) -> Option<Imprint> 
         ImprintKey::Predicted(recipe, shift) => {
             Imprint::Predicted(state.results.imprints.get(&MetersKey(recipe.clone(), *shift))?.clone())
         }
-        ImprintKey::Mean(several) => Imprint::Mean(state.results.ensembles.get(several)?.clone()),
+        ImprintKey::Mean(several) => Imprint::Predicted(state.results.means.get(several)?.clone()),
         ImprintKey::Picture(touch) => Imprint::Picture(state.results.pictures.get(&PictureKey(*touch))?.clone()),
     })
 }
@@ -53,7 +52,6 @@ pub(crate) fn imprint_input(state: &State, key: &ImprintKey) -> Option<Imprint> 
 pub(crate) enum Imprint {
     Measured(Arc<Sample>, TouchKey),
     Predicted(Arc<DepthMap>),
-    Mean(Arc<Ensemble>),
     Picture(Arc<Beside>),
 }
 
@@ -69,7 +67,6 @@ impl Imprint {
                 bubble.map(|bubble| &bubble.imprint).ok_or_else(gone)
             }
             Self::Predicted(depth) => Ok(depth),
-            Self::Mean(found) => Ok(&found.spread.mean),
             Self::Picture(found) => Ok(&found.imprint),
         }
     }

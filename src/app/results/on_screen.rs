@@ -1,10 +1,10 @@
 //! The needs of the panes on screen, as far as they decide what is computed.
 
-use super::super::keys::{ImprintSource, PredictionKey};
+use super::super::keys::ImprintSource;
 use super::super::pane::Demand;
+use super::super::results;
 use super::super::state::State;
 use super::super::state::workbench::Layer;
-use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
 use touch2touch_work::propose::{CadAt, Takes};
 
@@ -48,16 +48,6 @@ pub(crate) fn fingers_to_generate(state: &State) -> Vec<PadId> {
         fingers.truncate(1);
     }
     fingers
-}
-
-/// The recipe that a run of seeds belongs to: that of the first finger, of the pair on screen.
-pub(crate) fn seeds_of(state: &State) -> Option<PredictionKey> {
-    state.rig().pads().find_map(|pad| recipe::prediction(state, state.touch_key(pad)?))
-}
-
-/// True where the seeds that are missing are made, while their pane is on screen.
-pub(crate) fn seeds_asked(state: &State) -> bool {
-    state.seeds.every || (state.seeds.asked.is_some() && state.seeds.asked == seeds_of(state))
 }
 
 /// True where something on screen shows a step of an imprint's registration.

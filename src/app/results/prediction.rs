@@ -1,4 +1,4 @@
-//! Raw predictions: those kept on the disk, those that a pane needs, and those of several seeds.
+//! Raw predictions: those kept on the disk and those that a pane needs.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
@@ -7,7 +7,7 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{Key, Keyed, MetersKey, PredictionKey, SeedKey, ShiftMode, StoredKey, TouchKey};
+use super::super::keys::{Key, Keyed, MetersKey, PredictionKey, ShiftMode, StoredKey, TouchKey};
 use super::super::results;
 use super::super::results::preview::Onlooker;
 use super::super::results::{Computes, Demands};
@@ -38,17 +38,6 @@ impl Computes for PredictionKey {
 
     fn arrived(&self, state: &mut State, _: &Arc<Prediction>) {
         state.results.list_made(self, true);
-    }
-}
-
-impl Computes for SeedKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
-        self.0.job(state, services)
-    }
-
-    fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        // A seed among several does not push away what is looked at.
-        keep_prediction(state, self.0.clone(), made.clone(), false);
     }
 }
 
@@ -111,7 +100,7 @@ pub(crate) fn generate(
         let size = touch.depth().map_or([0, 0], |bubble| bubble.imprint.size());
         Some((recipe, (touch.picture(input)?, size)))
     };
-    // One picture for each finger, whatever the number of seeds: it is encoded once.
+    // One picture for each finger, whatever the number of predictions: it is encoded once.
     let mut pictures: BTreeMap<PadId, (Cow<'_, RgbGrid>, [usize; 2])> = BTreeMap::new();
     let mut keys: Vec<PredictionKey> = Vec::new();
     for (key, found) in recipes.into_iter().filter_map(touched) {

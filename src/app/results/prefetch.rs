@@ -49,11 +49,9 @@ pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
     let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison, Demand::Ledger];
     let (_, cloud) = results::shows_cloud(state, ImprintSource::Predicted);
     let shown = cloud || needs.into_iter().any(|need| state.needs(need));
-    let asked_for =
-        state.tasks.any_generating().is_some() || (results::seeds_asked(state) && state.needs(Demand::Seeds));
     if !state.settings.generate.by_itself
         || !shown
-        || asked_for
+        || state.tasks.any_generating().is_some()
         || !results::fingers_to_generate(state).contains(&finger)
     {
         return None;

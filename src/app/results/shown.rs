@@ -40,7 +40,7 @@ pub(crate) fn imprint_of(state: &State, key: ImprintKey) -> Lookup<'_, DepthMap>
             results::bubble(state, touch.finger).and_then(Absent::NoBubble, |b| Some(&b.imprint))
         }
         ImprintKey::Predicted(recipe, shift) => state.look(MetersKey(recipe, shift)).value(),
-        ImprintKey::Mean(key) => state.look(key).map(|found| &found.spread.mean),
+        ImprintKey::Mean(key) => state.look(key).value(),
         ImprintKey::Picture(touch) => state.look(PictureKey(touch)).map(|found| &found.imprint),
     }
 }

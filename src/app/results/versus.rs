@@ -5,8 +5,8 @@ use std::sync::Arc;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{
-    CloudDifferenceKey, CloudKey, ComparedKey, EnsembleKey, ImprintKey, ImprintSource, MaskKey, MetersKey, PictureKey,
-    PoseKey, PredictionKey, SeedKey, ShiftMode, TouchKey, VersusKey,
+    CloudDifferenceKey, CloudKey, ComparedKey, ImprintKey, ImprintSource, MaskKey, MeanKey, MetersKey, PictureKey,
+    PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
 use super::super::results::{Computes, Demands, Imprint};
@@ -19,20 +19,32 @@ use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::compare::{Comparison, Depicted, between, tile_of};
+use touch2touch_work::depict::mean;
 use touch2touch_work::deviation::{CloudDifference, cloud_difference};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::prediction::Prediction;
 use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 
+impl Computes for MeanKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+        let meters =
+            |recipe: &PredictionKey| state.results.imprints.get(&MetersKey(recipe.clone(), self.shift)).cloned();
+        let imprints: Vec<Arc<DepthMap>> = self.recipes.iter().map(meters).collect::<Option<_>>()?;
+        Some(Job::new(Lane::Compute, "Mean of the seeds", move |_| {
+            mean(&imprints.iter().map(|i| &**i).collect::<Vec<_>>())
+        }))
+    }
+}
+
 impl Computes for ComparedKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
         self.0.job(state, services)
     }
 
-    /// It does not push away what is looked at, as little as a seed among several.
+    /// It does not push away what is looked at.
     fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
-        SeedKey(self.0.clone()).arrived(state, made);
+        results::keep_prediction(state, self.0.clone(), made.clone(), false);
     }
 }
 
@@ -61,7 +73,7 @@ impl Part {
         let own = match &self.imprint {
             Imprint::Measured(..) => tile,
             Imprint::Picture(found) => Some(&found.tile),
-            Imprint::Predicted(_) | Imprint::Mean(_) => {
+            Imprint::Predicted(_) => {
                 let drawn = self.drawn.as_ref().map(|(prediction, shift)| (&**prediction, *shift));
                 return Depicted::predicted(imprint, drawn, sample, pad, tile);
             }
@@ -162,7 +174,7 @@ pub fn subject_key(state: &State, subject: &Subject, finger: PadId) -> Result<Im
         }
         Subject::Mean(..) => {
             let (recipes, shift) = made_for(state, subject, touch)?;
-            Ok(ImprintKey::Mean(EnsembleKey { touch, recipes, shift }))
+            Ok(ImprintKey::Mean(MeanKey { touch, recipes, shift }))
         }
         Subject::Stored => Ok(ImprintKey::Picture(touch)),
     }
@@ -223,6 +235,16 @@ fn subject_pose_key(state: &State, subject: &Subject) -> Option<PoseKey> {
     Some(PoseKey::of(cloud, results::tool_name(state).ok()?.into(), &recipe::in_force(state, ImprintSource::Predicted)))
 }
 
+/// Why the subjects have no poses, if they cannot have any.
+pub(crate) fn pose_absent(state: &State) -> Option<Absent> {
+    if let Err(absent) = results::tool_name(state) {
+        return Some(absent);
+    }
+    let sample = results::sample(state).ready()?;
+    let camera = sample.pads.iter().flatten().any(|touch| touch.camera().is_some());
+    (!camera).then_some(Absent::NoCamera)
+}
+
 /// The pose of a subject, where it is there.
 pub fn subject_pose<'a>(state: &'a State, subject: &Subject) -> Option<&'a PoseResult> {
     state.results.poses.get(&subject_pose_key(state, subject)?).map(|pose| &**pose)
@@ -247,7 +269,7 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
     }
     let Versus { a, b, mode } = state.settings.compared();
     let both = [a, b];
-    let posed = results::seed_pose_absent(state).is_none();
+    let posed = pose_absent(state).is_none();
     let shown = state.fingers();
     let needed: Vec<PadId> = state.rig().pads().filter(|finger| posed || shown.contains(finger)).collect();
     for subject in &both {

@@ -30,12 +30,10 @@ macro_rules! table {
         Stored(StoredKey);
         /// Raw predictions. One is asked for because a pane needs it beside that of the other finger.
         Prediction(PredictionKey) in predictions, 256 * MIB;
-        /// A prediction with one of several seeds: kept with the others.
-        Seed(SeedKey);
         /// A prediction of the pair on screen that nobody asked for: kept with the others.
         Prefetch(PrefetchKey);
-        /// Several predictions of one touch.
-        Ensemble(EnsembleKey) in ensembles, 32 * MIB;
+        /// The mean of several predictions of one touch.
+        Mean(MeanKey) in means, 16 * MIB;
         /// A prediction in meters, as large as the bubble image.
         Imprint(MetersKey) in imprints, 64 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.

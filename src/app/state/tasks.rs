@@ -133,11 +133,6 @@ impl Tasks {
         let mut tasks = self.running.iter();
         tasks.find(|(_, task)| task.kind == kind && !task.outdated).map(|(ticket, task)| (*ticket, task))
     }
-
-    /// Seeds that are still to come.
-    pub(crate) fn seeds_to_come(&self) -> usize {
-        self.demanded.iter().filter(|r| matches!(r, Request::Seed(_))).count()
-    }
 }
 
 /// The degree to which a person should care.

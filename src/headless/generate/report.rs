@@ -2,7 +2,6 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::super::seeds::SeedFigures;
 use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
 use touch2touch_core::evaluation;
 use touch2touch_core::findings::Finding;
@@ -51,9 +50,6 @@ pub(super) struct Pair {
     pub(super) seconds: f64,
     /// True where it was made before and only read now.
     pub(super) kept: bool,
-    /// With `--seeds`.
-    #[serde(skip_serializing_if = "Option::is_none", skip_deserializing)]
-    pub(super) ensemble: Option<SeedFigures>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]

@@ -9,7 +9,6 @@ use strum::IntoEnumIterator as _;
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
-use super::super::seeds::{FanArgs, SeedArgs};
 use super::super::shards::ShardArg;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
@@ -67,10 +66,6 @@ pub(in crate::headless) struct PoseArgs {
     /// registrations `distance_field` and `certified`.
     #[arg(long, value_name = "DIR")]
     pub(super) influence: Option<PathBuf>,
-    #[command(flatten)]
-    pub(super) ensemble: SeedArgs,
-    #[command(flatten)]
-    pub(super) fans: FanArgs,
     #[command(flatten)]
     pub(super) model: ModelArgs,
     #[command(flatten)]

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::super::seeds::PoseFan;
 use super::influence::Influences;
 use touch2touch_core::align::{AlignReport, Evidence};
 use touch2touch_core::ambiguity::Ambiguity;
@@ -60,9 +59,6 @@ pub(super) struct PoseRow {
     /// Why there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) no_influence: Option<String>,
-    /// With `--seeds`, for predicted imprints.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) fan: Option<PoseFan>,
 }
 
 /// A tool that was tried.

@@ -4,6 +4,7 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::EvaluateCommand;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_work::io::names::Outputs;
 use touch2touch_work::queue::QueueBy;
 use touch2touch_work::recipe::Stage;
 
@@ -47,6 +48,8 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
         // Predictions by it are the same, too.
         both.predict(&Recipe { shift: both.studio.state.settings.shift, ..recipe.clone() }, 1);
         let said = both.said(Pane::Generate).unwrap();
+        let stem =
+            Outputs::new(Path::new(&both.at("predictions"))).unwrap().stem(both.studio.state.pair_name()).unwrap();
         let mut count = 0;
         for finger in both.studio.state.rig().pads() {
             let Some(found) = results::comparison(&both.studio.state, finger).ready() else { continue };
@@ -54,11 +57,14 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
             let row = said["pairs"].as_array().unwrap().iter().find(|row| row["finger"] == *name).unwrap();
             count += same(&written(&found.psnr_db), &row["psnr_db"], &format!("{name}, {recipe:?}"));
             count += same(&written(&found.ssim), &row["ssim"], &format!("{name}, {recipe:?}"));
+            let imprint = results::imprint(&both.studio.state, ImprintSource::Predicted, finger).ready().unwrap();
+            let file = PathBuf::from(format!("{}_{name}.npy", stem.display()));
+            count += same_pixels(imprint, &file, &format!("{name}, {recipe:?}"));
         }
         shifted.push(count);
     }
     compared(&counts, 14);
-    compared(&shifted, 2);
+    compared(&shifted, 24_500);
 }
 
 #[test]

@@ -13,8 +13,8 @@ use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
     AboutCommand, AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover,
-    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SeedsCommand, SettingsCommand, TasksCommand,
-    TrainCommand, UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
+    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand,
+    UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
@@ -472,11 +472,6 @@ draws! {
         1 Refit,
         1 Choose(recipe()),
     }
-    seeds: SeedsCommand {
-        1 Count(0usize..4),
-        1 Run(any::<bool>()),
-        1 EveryPair(any::<bool>()),
-    }
     labels: LabelsCommand {
         6 BeginStroke(finger(), source(), position(), any::<bool>()),
         4 BeginIn3d((finger(), source(), position(), point(), any::<bool>()).prop_map(|(finger, source, at_px, size_at, erase)| {
@@ -623,7 +618,6 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
         (1, follow().boxed()),
         (6, view().boxed()),
         (4, predict().boxed()),
-        (2, seeds().boxed()),
         (36, labels().boxed()),
         (3, inspect().boxed()),
         (4, workbench().boxed()),
@@ -639,7 +633,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
     Union::new_weighted(ways).prop_map(|command: Command| {
         // A room that is not among the ways above does not compile.
         match command {
-            Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) | Command::Seeds(_) => {}
+            Command::Library(_) | Command::Follow(_) | Command::View(_) | Command::Predict(_) => {}
             Command::Labels(_)
             | Command::Inspect(_)
             | Command::Workbench(_)

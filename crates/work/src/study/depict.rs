@@ -4,10 +4,10 @@ use std::borrow::Cow;
 use std::sync::Arc;
 
 use super::compare::{Comparison, Depicted, beside, between, tile_of};
-use super::fan::seeds_of;
 use super::subject::{MadeFrom, Subject};
 use crate::error::TaskError;
 use crate::feel::{Felt, Touch, feel};
+use crate::imprint::imprint_of;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::{ImprintSource, PairLabels};
@@ -15,6 +15,7 @@ use crate::models::Models;
 use crate::on_pad::OnPad;
 use crate::recipe::{Recipe, Stage};
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::ensemble::Spread;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
@@ -80,16 +81,29 @@ pub fn depict(
         }
         MadeFrom::Mean(recipes) => {
             let recipe = recipes.first().ok_or_else(|| TaskError::new(WHAT, "no seed is asked for"))?;
+            let generating = recipe.generating()?;
+            let seeds: Vec<u64> = recipes.iter().filter_map(|one| Some(one.generator.as_ref()?.1.seed)).collect();
             let mut imprints = PerPad::default();
             for (pad, _) in sample.pads.entries() {
-                if recipe.generating()?.picture(sample, pad)?.is_some() {
-                    let made = seeds_of(OnPad { sample, pad }, recipe, recipes.len(), models, cx)?;
-                    imprints[pad] = Some(made.ensemble.spread.mean);
+                if generating.picture(sample, pad)?.is_some() {
+                    let made = generating.seeds(models, OnPad { sample, pad }, &seeds, cx)?;
+                    let meters = made.iter().map(|made| imprint_of(made, recipe.shift, sample, pad));
+                    let meters = meters.collect::<Result<Vec<_>, _>>()?;
+                    imprints[pad] = Some(mean(&meters.iter().collect::<Vec<_>>())?);
                 }
             }
             Ok(SubjectImprints { felt: Felt::of_imprints(recipe, imprints), tile: None })
         }
     }
+}
+
+/// The mean of several predictions of a touch, meters.
+///
+/// # Errors
+/// If there is none, or their sizes differ.
+pub fn mean(imprints: &[&DepthMap]) -> Result<DepthMap, TaskError> {
+    let spread = Spread::of(imprints).map(|spread| spread.mean);
+    spread.ok_or_else(|| TaskError::new("Mean of the seeds", "the predictions differ in size"))
 }
 
 /// Two subjects with the origin of their imprints, ready to be made.

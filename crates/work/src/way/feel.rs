@@ -74,11 +74,6 @@ impl Felt {
         Self { recipe: recipe.clone(), ..Self::default() }
     }
 
-    /// Predictions that were made together with others.
-    pub(crate) fn of_predictions(recipe: &Recipe, made: PerPad<Prediction>) -> Self {
-        Self { predictions: Arc::new(made), reached: Some(Stage::Prediction), ..Self::new(recipe) }
-    }
-
     /// Imprints of a recipe that were made together with others.
     pub(crate) fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
         Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(recipe) }

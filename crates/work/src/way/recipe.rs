@@ -17,7 +17,6 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::recipe_id::Named;
 use crate::labels::{ImprintOf, ImprintSource};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::ensemble::seeds;
 use touch2touch_core::pose::{Registration, RegistrationChoice};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
@@ -199,24 +198,18 @@ impl<M> Recipe<M> {
         Self { imprint, ..self.clone() }
     }
 
-    /// Recipe with another seed of its predictions.
-    #[must_use]
-    pub(crate) fn with_seed(&self, seed: u64) -> Self
-    where
-        M: Clone,
-    {
-        let mut with = self.clone();
-        with.generator.iter_mut().for_each(|(_, config)| config.seed = seed);
-        with
-    }
-
     /// So many recipes that differ from it in their seeds alone, from its own on; none where nothing is predicted.
     pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self>
     where
         M: Clone,
     {
-        let own = self.generator.as_ref().map(|(_, config)| config.seed);
-        own.map_or_else(Vec::new, |own| seeds(own, count).into_iter().map(|seed| self.with_seed(seed)).collect())
+        let Some((_, own)) = &self.generator else { return Vec::new() };
+        let with = |later: u64| {
+            let mut with = self.clone();
+            with.generator.iter_mut().for_each(|(_, config)| config.seed = own.seed.wrapping_add(later));
+            with
+        };
+        (0..count as u64).map(with).collect()
     }
 
     /// Only what decides the result of a stage: what comes later, and what is not used, is as it goes without saying.

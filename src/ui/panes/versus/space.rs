@@ -86,7 +86,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, space: &mut Space, versus: &Ver
 /// Why there is nothing to draw.
 fn missing(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let state = cx.state;
-    if let Some(absent) = results::seed_pose_absent(state) {
+    if let Some(absent) = results::pose_absent(state) {
         return super::absent_text(cx, ui, absent);
     }
     for subject in [&versus.a, &versus.b] {
