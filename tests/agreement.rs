@@ -3,7 +3,6 @@
 mod edits;
 mod exchange;
 mod in_3d;
-mod influence;
 mod proposals;
 mod python;
 mod random;
@@ -144,7 +143,6 @@ fn how(action: Action) -> How {
         A::PaintIn3d | A::PaintLayers => Verb(&["label", "demo", "--pair", "a", "--draw", IN_3D]),
         A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger | A::Ghosts | A::Lens => Window,
-        A::Influence => Verb(&["pose", "demo", "--pair", "a", "--influence", "folder"]),
         A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,

@@ -117,10 +117,7 @@ fn a_fit_to_spoilt_data_is_refused_and_one_to_sound_data_is_written() {
             assert!(found["bundle"].is_string() && out.is_dir(), "read rightly it is fitted: {}", said(&ran));
         }
     }
-    for (name, more) in [
-        ("sound", &["--seed", "5"][..]),
-        ("mixed", &["--seed", "5", "--condition", "mixed"]),
-    ] {
+    for (name, more) in [("sound", &["--seed", "5"][..]), ("mixed", &["--seed", "5", "--condition", "mixed"])] {
         let set = simulate(dir.path(), name, more);
         let out = dir.path().join(format!("fitted to {name}"));
         let (ran, found) = adapt(dir.path(), &set, &out, &[]);

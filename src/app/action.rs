@@ -210,8 +210,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
         MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)],
             _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
-        Influence, Mask, "What the angle hangs on", "Colors the pixels by how much the registered angle would change without them, or with those beside the mask", [shift(K::I)],
-            state => of_pair(state, ViewCommand::ShowInfluence(!state.selection.influence));
         Ghosts, Mask, "As it was before", "Keeps mask, points and pose as they were before the last change visible until the next one, or not", [shift(K::H)],
             _ => does(prefer(|s| s.ghosts ^= true));
         Lens, Mask, "Lens", "Magnifies the imprint under the pointer eight times, or not", [shift(K::M)],
@@ -446,7 +444,6 @@ impl Action {
             Self::ResetMask => "delete mask automatic again",
             Self::ClearMask => "delete erase empty nothing start over reset",
             Self::Undo => "revert back",
-            Self::Influence => "leverage sensitivity heat map pose pixels important",
             Self::Ghosts => "ghost previous before undo compare",
             Self::Lens => "magnify magnifier zoom loupe",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",

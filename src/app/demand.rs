@@ -99,7 +99,6 @@ fn workbench(wants: &mut Demands<'_>, source: ImprintSource) {
     }
     results::want_layers(wants, source);
     results::want_deviation(wants, source);
-    results::want_influence(wants, source);
 }
 
 fn neighbors(wants: &mut Demands<'_>) {

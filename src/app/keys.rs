@@ -27,9 +27,7 @@ pub use dataset::{
 pub use imprint::{AmbiguityKey, ColorKey, ImprintKey, LedgerKey, MeanKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};
 pub use mask::{AutomaticMask, MaskKey, MaskVersion};
-pub use pose::{
-    CloudKey, DeviationKey, InfluenceKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey,
-};
+pub use pose::{CloudKey, DeviationKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey};
 pub(crate) use prediction::Keyed;
 pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, StoredKey};
 pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};

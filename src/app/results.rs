@@ -19,7 +19,6 @@ pub(crate) mod comparison;
 pub(crate) mod deviation;
 pub(crate) mod import_plan;
 pub(crate) mod imprint;
-pub(crate) mod influence;
 pub(crate) mod input;
 pub(crate) mod inspection;
 pub(crate) mod labels;
@@ -60,8 +59,6 @@ pub use import_plan::import_plan_key;
 pub(crate) use import_plan::{import_setup, want_import_plan};
 pub(crate) use imprint::{Imprint, gone, imprint_input, want_imprint};
 pub use imprint::{imprint, predicted_color};
-pub(crate) use influence::want_influence;
-pub use influence::{influence, shown_influence};
 pub use input::can_generate;
 pub(crate) use input::can_start;
 pub use inspection::{inspected, inspection};
@@ -78,9 +75,7 @@ pub(crate) use mask::{
 pub use mask_plan::mask_plan_key;
 pub(crate) use mask_plan::want_mask_plan;
 pub use on_screen::proposes;
-pub(crate) use on_screen::{
-    fingers_to_generate, shows_cloud, shows_deviation, shows_influence, shows_layers, shows_steps,
-};
+pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
 pub use outdated::{Outdated, Why, outdated};
 pub(crate) use pose::{Registered, registered, want_pose};
 pub use pose::{pose, pose_key, provisional_pose};

@@ -22,8 +22,6 @@ pub enum ViewCommand {
     SelectImprint(ImprintSource),
     /// Shows a proposal over the mask, or no longer: nothing else changes.
     Propose(bool),
-    /// Shows over imprints which pixels the registered angle hangs on, or no longer.
-    ShowInfluence(bool),
     /// Magnifies imprints around the pointer, or no longer.
     ShowLens(bool),
     /// Shows both fingers, or only the active one.
@@ -68,7 +66,6 @@ pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Ef
             labels::end_stroke(state, effects);
             state.selection.proposing = shown;
         }
-        ViewCommand::ShowInfluence(shown) => selection.influence = shown,
         ViewCommand::ShowLens(shown) => selection.lens = shown,
         ViewCommand::ShowBothFingers(both) => {
             labels::end_stroke(state, effects);

@@ -1,18 +1,15 @@
 //! `touch2touch pose`: in-hand poses of a whole data set, with the error against the truth where it is known.
 
 mod args;
-mod influence;
 mod report;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 use super::contact_mask::labels_of;
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::recipe::misgiving;
-use super::report::output_stems;
 use super::shards::{Parts, Sharded};
 use super::{Output, VerbResult};
 use touch2touch_core::align::{AlignReport, Ask};
@@ -46,14 +43,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         Imprints::Predicted => &[ImprintSource::Predicted],
         Imprints::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
     };
-    let stems = |folder: &Option<PathBuf>| -> anyhow::Result<Vec<Option<PathBuf>>> {
-        match folder {
-            Some(folder) => Ok(output_stems(folder, &dataset, &ids)?.into_iter().map(Some).collect()),
-            None => Ok(vec![None; ids.len()]),
-        }
-    };
-    // Names of files are those of one run.
-    let work = args.shard.share(ids.iter().copied().zip(stems(&args.influence)?).collect());
+    let work = args.shard.share(ids);
     let output = Output::new(args.common, "aligning", work.len());
     let models = args.model.models();
     let recipe = args.recipe(&dataset.rig)?;
@@ -67,7 +57,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
     let open = TaskError::new("Pose", "the tool is not known yet");
-    for (id, influence) in work {
+    for id in work {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -115,7 +105,6 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             let pair = PairId(id as u32);
             let asked = PairInput {
                 name: &entry.name,
-                influence: influence.as_deref(),
                 touch: Touch { dataset: &dataset, pair, sample: &sample, tool, labels: &labels },
                 tried: &tried,
                 recipe: &recipe,
@@ -164,8 +153,6 @@ pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
 /// A pair as `pose` asks for it.
 struct PairInput<'a> {
     name: &'a str,
-    /// Path of the file for the influence of its pixels.
-    influence: Option<&'a Path>,
     /// Of which the tool is left open where all are to be tried.
     touch: Touch<'a>,
     /// Tools by name.
@@ -176,7 +163,7 @@ struct PairInput<'a> {
 
 /// One case per engine for one pair and one kind of imprint.
 fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
-    let PairInput { name, influence, touch, tried, recipe, accepted } = *asked;
+    let PairInput { name, touch, tried, recipe, accepted } = *asked;
     let (sample, imprint) = (touch.sample, recipe.imprint);
     let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
     let contact = felt.contact();
@@ -200,11 +187,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let found = felt.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
-        let influence = influence
-            .zip(answer)
-            .zip(touch.tool.ok())
-            .map(|((stem, found), tool)| influence::write(stem, &felt, touch, tool, by, found));
-        let influence = influence.transpose()?;
         Ok(PoseRow {
             name: name.to_owned(),
             registration: by.to_string(),
@@ -226,8 +208,6 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             // The evidence stands beside it.
             report: found.ok().filter(|_| args.trace).map(|found| AlignReport { evidence: None, ..found.report }),
             ambiguity: left_open.clone(),
-            no_influence: influence.as_ref().and_then(|found| found.as_ref().err().map(ToString::to_string)),
-            influence: influence.and_then(Result::ok),
         })
     };
     args.registration.0.iter().map(one).collect()

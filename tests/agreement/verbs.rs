@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{chain, compared, files, labels, posed, tables, watched};
-use super::{exchange, influence, proposals, python, recipes, shards, stills};
+use super::{exchange, proposals, python, recipes, shards, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -32,8 +32,6 @@ fn held(verb: &str) -> Option<Held> {
         "pose" => By(&[
             recipes::a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs,
             posed::every_step_of_a_registration_is_the_same_in_the_time_machine_and_by_the_verb,
-            posed::what_a_random_angle_hangs_on_is_the_same_over_the_imprint_and_by_the_verb,
-            influence::what_an_angle_hangs_on_is_the_same_on_the_screen_and_by_verb,
             python::a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb,
         ]),
         "compare" => By(&[

@@ -132,7 +132,7 @@ impl Stage {
                 ("FIRST", _) => at("first"),
                 ("SECOND", _) => at("second"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
-                ("DIR", "--out" | "--influence") => at(&format!("out {number}")),
+                ("DIR", "--out") => at(&format!("out {number}")),
                 ("DIR", "watch") => at("robot"),
                 ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),
                 ("FITTED", "--out") => at(&format!("fitted {number}")),

@@ -1,4 +1,4 @@
-//! After a stroke: what the pose hangs on, what was before, and the lens.
+//! After a stroke: what was before, and the lens.
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, pos2};
 use egui_kittest::kittest::Queryable as _;
@@ -29,39 +29,6 @@ impl Rig {
 
 fn state(rig: &Rig) -> &State {
     rig.harness.state().state()
-}
-
-#[test]
-fn what_the_angle_hangs_on_is_computed_while_it_is_shown_and_follows_the_mask() {
-    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    let there = |rig: &Rig| state(rig).results.influences.bytes();
-    assert_eq!(there(&rig), 0, "nobody looks at it");
-    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::I);
-    rig.harness.step();
-    rig.settle();
-    assert!(there(&rig) > 0);
-    let key = |rig: &Rig| {
-        let now = state(rig);
-        assert!(results::influence(now, MEASURED).ready().is_some(), "{:?}", now.tasks.failed);
-        results::shown_influence(now, MEASURED).unwrap().0
-    };
-    let before = key(&rig);
-    // The status bar says what hangs on the pixel under the pointer.
-    let picture = rig.harness.get_by_label("Measured imprint right").rect();
-    rig.harness.hover_at(picture.center());
-    rig.settle();
-    rig.shoot("label-influence");
-    assert!(rig.harness.query_all_by_label_contains("°/mm²").next().is_some());
-    rig.dab([60.0, 60.0], [110.0, 60.0]);
-    assert_ne!(key(&rig), before, "another mask, another pose");
-    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::I);
-    rig.harness.step();
-    rig.settle();
-    let bytes = there(&rig);
-    rig.dab([60.0, 80.0], [110.0, 80.0]);
-    assert_eq!(there(&rig), bytes, "not shown, not computed");
 }
 
 #[test]
@@ -151,11 +118,8 @@ fn pictures_of_the_live_loop() {
     rig.shoot("live-ghost");
     let picture = rig.harness.get_by_label("Measured imprint right").rect();
     rig.harness.hover_at(picture.center());
-    rig.send(ViewCommand::ShowInfluence(true));
-    rig.shoot("live-influence");
     let scene = state(&rig).settings.scene.clone();
     assert!(scene.layer(SceneLayer::Before).shown);
-    rig.send(ViewCommand::ShowInfluence(false));
     rig.send(ViewCommand::ShowLens(true));
     rig.shoot("live-lens");
     rig.send(LabelsCommand::ResetMask);

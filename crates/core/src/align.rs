@@ -17,7 +17,6 @@ mod certify;
 pub mod closed_form;
 pub mod correspond;
 pub mod icp;
-mod influence;
 mod joint;
 pub mod lab_icp;
 mod lanes;
@@ -40,8 +39,7 @@ use serde::{Deserialize, Serialize};
 use super::frames::PlanarPose;
 
 pub(crate) use icp::IcpConfig;
-pub use influence::influence;
-pub use joint::{Basis, Elsewhere, Evidence, Hold, JointConfig, JointFit, MaskWeight, MembraneEvidence};
+pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};

@@ -8,7 +8,6 @@ pub mod doubts;
 pub mod evaluate;
 pub mod figure;
 pub mod fonts;
-pub mod influence;
 pub mod layers;
 pub mod ledger;
 pub mod space;

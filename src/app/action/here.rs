@@ -13,7 +13,7 @@ impl Action {
     pub(crate) fn is_of_labeling(self) -> bool {
         use Action as A;
         let looks = matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-            || matches!(self, A::Influence | A::Ghosts | A::Lens);
+            || matches!(self, A::Ghosts | A::Lens);
         self.group() == Group::Mask && !looks
     }
 
@@ -50,7 +50,7 @@ impl Action {
                 picture
                     || range
                     || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-                    || matches!(self, A::Influence | A::Ghosts | A::Lens)
+                    || matches!(self, A::Ghosts | A::Lens)
             }
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene => picture || self.is_of_scene(),

@@ -8,7 +8,6 @@ use touch2touch_core::rig::PerPad;
 use touch2touch_core::which_tool::Candidate;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::deviation::Deviation;
-use touch2touch_work::influence::Influence;
 use touch2touch_work::layers::LayerResult;
 use touch2touch_work::pose::PoseResult;
 use touch2touch_work::recipe::Recipe;
@@ -137,18 +136,6 @@ impl Key for DeviationKey {
     type Value = Deviation;
 
     fn bytes(found: &Deviation) -> usize {
-        found.bytes()
-    }
-}
-
-/// The influence of the pixels on a registered angle.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct InfluenceKey(pub PoseKey);
-
-impl Key for InfluenceKey {
-    type Value = Influence;
-
-    fn bytes(found: &Influence) -> usize {
         found.bytes()
     }
 }

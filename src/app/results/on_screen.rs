@@ -15,7 +15,7 @@ pub(crate) fn shows_cloud(state: &State, source: ImprintSource) -> (bool, bool) 
     let both = state.workbench.both_clouds && state.shows_scene(other);
     let scene = both || state.shows_scene(source) || state.needs(Demand::Poses);
     let inspected = state.inspect.source == source && state.needs(Demand::Steps);
-    let scene = scene || proposes_at_pose(state, source) || shows_influence(state, source);
+    let scene = scene || proposes_at_pose(state, source);
     (scene, scene || inspected)
 }
 
@@ -29,11 +29,6 @@ pub(crate) fn proposes_at_pose(state: &State, source: ImprintSource) -> bool {
     proposes(state)
         && state.settings.mask.proposal.takes() == Takes::CadModel(CadAt::Registered)
         && results::worked_on(state, state.selection.finger) == source
-}
-
-/// True where the influence of the pixels is shown over an imprint.
-pub(crate) fn shows_influence(state: &State, source: ImprintSource) -> bool {
-    state.selection.influence && state.needs(Demand::Imprint(source))
 }
 
 /// The fingers whose prediction is looked at: those on screen, and both where a visible pane makes one cloud or

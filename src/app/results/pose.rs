@@ -10,7 +10,7 @@ use super::super::state::results::Computed;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use super::imprint::{Imprint, imprint_input};
-use touch2touch_core::align::{AlignReport, Ask, Contacts};
+use touch2touch_core::align::{Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_core::rig::PerPad;
@@ -18,7 +18,6 @@ use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::{Candidate, which_tool};
 use touch2touch_work::cloud::{Clouds, images};
 use touch2touch_work::error::TaskError;
-use touch2touch_work::influence::{Influence, influence};
 use touch2touch_work::pose::{self, PoseResult};
 use touch2touch_work::tool::NamedTool;
 
@@ -47,19 +46,6 @@ impl Registered {
     pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: RegistrationChoice) -> Vec<Candidate> {
         let tools = tools.iter().map(|tool| (tool.name.as_str(), &tool.model));
         self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
-    }
-
-    /// The influence of each pixel on the angle of a report of these contacts.
-    ///
-    /// # Errors
-    /// As [`influence`].
-    pub(crate) fn influence(
-        &self,
-        registration: RegistrationChoice,
-        report: &AlignReport,
-    ) -> Result<Influence, TaskError> {
-        let (clouds, sample, tool) = (&self.clouds, &self.sample, &self.tool.model);
-        self.with_contacts(|contacts| influence(clouds, contacts, sample, tool, registration, report))
     }
 
     fn with_contacts<T>(&self, of: impl FnOnce(Contacts<'_>) -> T) -> T {

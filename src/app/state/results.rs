@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 use super::super::keys::{
-    CloudKey, ImprintSource, InfluenceKey, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview, TouchKey,
+    CloudKey, ImprintSource, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview, TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
@@ -76,8 +76,6 @@ macro_rules! table {
         Deviation(DeviationKey) in deviations, 63 * MIB;
         /// All tools of the data set, ranked for the touch of a pose.
         Ranking(RankingKey) in rankings, MIB;
-        /// The influence of each pixel on a registered angle.
-        Influence(InfluenceKey) in influences, 16 * MIB;
         /// The steps of a recorded registration, made ready to be looked through.
         Inspection(InspectionKey) in inspections, 64 * MIB;
         /// The scores that are kept of all pairs.
@@ -107,8 +105,6 @@ pub struct Latest {
     pub pose: Option<PoseKey>,
     /// The recorded registration.
     pub inspection: Option<InspectionKey>,
-    /// The influence on its angle.
-    pub influence: Option<InfluenceKey>,
 }
 
 macro_rules! results {

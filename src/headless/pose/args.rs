@@ -1,7 +1,5 @@
 //! The arguments of `pose`.
 
-use std::path::PathBuf;
-
 use clap::builder::{PossibleValue, TypedValueParser};
 use clap::{Args, ValueEnum};
 use strum::IntoEnumIterator as _;
@@ -61,11 +59,6 @@ pub(in crate::headless) struct PoseArgs {
     /// residual, weight and fate.
     #[arg(long)]
     pub(super) trace: bool,
-    /// Write into this folder which pixels each angle hangs on: by how many degrees to the square millimeter it changes
-    /// without them, or with those up to 4 mm beside the mask. The report names the ten places that matter most. For the
-    /// registrations `distance_field` and `certified`.
-    #[arg(long, value_name = "DIR")]
-    pub(super) influence: Option<PathBuf>,
     #[command(flatten)]
     pub(super) model: ModelArgs,
     #[command(flatten)]

@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 use serde_json::value::RawValue;
 
-use super::influence::Influences;
 use touch2touch_core::align::{AlignReport, Evidence};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
@@ -53,12 +52,6 @@ pub(super) struct PoseRow {
     /// Of a predicted imprint: what the GelSlim images (right, left) leave open about where on the tool they are.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<PerPad<Ambiguity>>,
-    /// With `--influence`, where there is one.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) influence: Option<Influences>,
-    /// Why there is none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) no_influence: Option<String>,
 }
 
 /// A tool that was tried.
@@ -227,16 +220,6 @@ pub(super) fn text(report: &Report) -> String {
         }
         if let Some(verdict) = c.verdict.as_ref().filter(|verdict| verdict.grade > Grade::Good) {
             text += &format!("    {}: {}\n", verdict.grade, verdict.why);
-        }
-    }
-    for case in &report.cases {
-        let (name, imprint) = (&case.name, case.imprint);
-        if let Some(found) = &case.influence {
-            text += &format!("\n{name} ({imprint} imprint): where the angle changes most, by the upper left corner\n");
-            text += &found.places.iter().map(|place| format!("  {}\n", place.text())).collect::<String>();
-        }
-        if let Some(why) = &case.no_influence {
-            text += &format!("\n{name} ({imprint} imprint): {why}\n");
         }
     }
     text + "\n" + &summary_text(&report.summary)

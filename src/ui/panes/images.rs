@@ -1,7 +1,6 @@
 //! The image panes: GelSlim, measured and predicted imprint. Linked pan, zoom and cross-hair.
 
 pub(crate) mod bar;
-mod influence;
 mod lens;
 pub(crate) mod link;
 mod paint;
@@ -418,7 +417,6 @@ fn depth_pane(
     let (texture, histogram) = (picture.texture.id(), picture.histogram.clone());
     output.paint(texture, if stale { Color32::from_gray(130) } else { Color32::WHITE });
     if !paint::is_bared(ui) {
-        influence::overlay(cx, ui, &output, source, finger);
         paint::mask(cx, ui, memory, &output, source, finger);
     }
     marks(cx, &output, finger);
@@ -518,14 +516,9 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, pane: Pane, finger: PadId, de
     let name = pane.title();
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!(" ({note})") };
-    let influence = match pane {
-        Pane::Measured => influence::readout(cx.state, ImprintSource::Measured, finger, [x, y]),
-        Pane::Predicted => influence::readout(cx.state, ImprintSource::Predicted, finger, [x, y]),
-        _ => String::new(),
-    };
     cx.shared.readout = Some(if v.is_finite() {
         format!(
-            "{name} {} ({x}, {y})   {}{note}   {v:.6} m{influence}",
+            "{name} {} ({x}, {y})   {}{note}   {v:.6} m",
             cx.state.finger_name(finger),
             units::text_mm(f64::from(v))
         )

@@ -13,7 +13,6 @@ mod certify;
 mod cost;
 mod curvature;
 mod evidence;
-mod hold;
 mod image;
 mod problem;
 mod pyramid;
@@ -29,7 +28,6 @@ use super::{AlignConfig, AlignError, AlignReport, Ask, Register, Scene};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
 pub use evidence::{Elsewhere, Evidence, MembraneEvidence};
-pub use hold::Hold;
 use problem::{Problem, check};
 
 /// Choices of the registration by membrane and mask. The default is what the product uses.

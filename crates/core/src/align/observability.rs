@@ -16,7 +16,7 @@ pub(crate) const DEGENERATE_BELOW: f64 = 0.015;
 /// Points this far outside the silhouette, meters, still tell about it.
 const REACH_M: f64 = 0.002;
 /// Fewer telling points than this tell nothing.
-pub(super) const MIN_TELLING: usize = 8;
+const MIN_TELLING: usize = 8;
 
 /// Curvature of the fit at its end, per telling point.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]

@@ -127,28 +127,6 @@ impl RegistrationChoice {
         }
     }
 
-    /// The gate in force, meters; `None` where contacts are left out in another way, or none are.
-    pub fn gate_m(self) -> Option<f64> {
-        match self.rejection {
-            Rejection::Gate(_) => self.rejection.number(),
-            Rejection::Trim(_) => None,
-            Rejection::Own => {
-                let of_pairs = |config: IcpConfig| match config.rejector {
-                    Rejector::MaxDistance { distance_m } => Some(distance_m),
-                    Rejector::None | Rejector::Trimmed { .. } => None,
-                };
-                match self.by {
-                    Registration::DistanceField | Registration::Certified => {
-                        Some(AlignConfig::default().final_kernel_m())
-                    }
-                    Registration::LabIcp | Registration::Joint | Registration::JointCertified => None,
-                    Registration::Refined => of_pairs(RefineConfig::default().space),
-                    by => by.icp().and_then(of_pairs),
-                }
-            }
-        }
-    }
-
     /// The registration with the settings that the product uses, apart from what is left out.
     pub fn method(self) -> Box<dyn Register> {
         let rejection = self.rejection;
@@ -287,6 +265,19 @@ mod tests {
         }
     }
 
+    /// The gate of a registration by itself, meters.
+    fn own_gate_m(by: Registration) -> Option<f64> {
+        let of_pairs = |config: IcpConfig| match config.rejector {
+            Rejector::MaxDistance { distance_m } => Some(distance_m),
+            Rejector::None | Rejector::Trimmed { .. } => None,
+        };
+        match by {
+            Registration::DistanceField | Registration::Certified => Some(AlignConfig::default().final_kernel_m()),
+            Registration::Refined => of_pairs(RefineConfig::default().space),
+            by => by.icp().and_then(of_pairs),
+        }
+    }
+
     #[test]
     fn the_own_gate_changes_no_bit_and_another_one_the_answer() {
         let tool = ToolModel::new(cross()).unwrap();
@@ -301,7 +292,7 @@ mod tests {
                 let choice = RegistrationChoice::new(by, rejection).ok()?;
                 Some(register_with(&*choice.method(), &points, &tool, Ask::default()).unwrap())
             };
-            if let Some(gate_m) = RegistrationChoice::from(by).gate_m() {
+            if let Some(gate_m) = own_gate_m(by) {
                 assert_eq!(with(Rejection::gate(gate_m).unwrap()).unwrap(), own, "{by:?}");
                 let narrow = with(Rejection::gate(gate_m / 4.0).unwrap()).unwrap();
                 assert_ne!(narrow.grasp_from_object, own.grasp_from_object, "{by:?}");

@@ -33,8 +33,7 @@ pub(super) fn mask(
     let Ok(in_force) = results::mask_in_force(cx.state, source, finger) else { return };
     let key: (&MaskVersion, _) = (&in_force.version, results::imprint_key(cx.state, source, finger).ok());
     // Where nobody paints the data itself is what counts: the outline says enough.
-    let veiled = !settings.mask_outline && !results::shows_influence(cx.state, source);
-    if veiled && cx.state.selection.panes.contains(&Pane::Masks) {
+    if !settings.mask_outline && cx.state.selection.panes.contains(&Pane::Masks) {
         let mask = in_force.mask;
         let slot = ("mask", source, finger);
         let texture = cx.shared.textures.mask(ui.ctx(), slot, &key, mask);

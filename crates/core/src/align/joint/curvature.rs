@@ -1,10 +1,10 @@
-//! [`Uncertainty`] of a pose from the membranes, and how sharply their cost holds it.
+//! [`Uncertainty`] of a pose from the membranes.
 
 use glam::DVec2;
 use nalgebra::Matrix3;
 
 use super::cost::{Joint, Relief, noise_m};
-use super::problem::{LAST, Problem};
+use super::problem::Problem;
 use crate::align::Uncertainty;
 use crate::align::batch::State;
 use crate::align::search::Cost as _;
@@ -30,14 +30,6 @@ fn in_the_hand([a, b, c, d, e, f]: &[f64; 6], pose: PlanarPose) -> Matrix3<f64> 
 }
 
 impl Problem<'_> {
-    /// Curvature of the membranes' part of the cost that decides the answer, about (angle times
-    /// [`ANGLE_SCALE_M`](crate::align::ANGLE_SCALE_M), y, z) of the tool turned about the centroid.
-    pub(super) fn answer_curvature(&self, pose: PlanarPose) -> Matrix3<f64> {
-        let patches = self.patches(LAST);
-        let mut joint = Joint { fingers: &patches, kernel_m: self.config().kernels_m[LAST], mask: None, lookups: 0 };
-        in_the_hand(&joint.sums(State::from_pose(pose, self.centroid())).h, pose)
-    }
-
     /// Uncertainty of a pose from the membranes.
     pub(super) fn uncertainty(&self, pose: PlanarPose) -> Uncertainty {
         let at = State::from_pose(pose, self.centroid());

@@ -238,7 +238,7 @@ impl<'a> Problem<'a> {
     }
 
     /// The images as a stage compares them.
-    pub(super) fn patches(&self, stage: usize) -> Patches<'_> {
+    fn patches(&self, stage: usize) -> Patches<'_> {
         self.patches_of(stage.min(self.answer_band()), self.config.points[stage])
     }
 
