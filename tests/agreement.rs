@@ -599,7 +599,7 @@ fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
 fn commands_of_tables_and_fits_say_what_decides_them() {
     let home = tempfile::tempdir().unwrap();
     let mut studio = Studio::open(Place::Demo, home.path());
-    for pane in [Pane::Results, Pane::Table, Pane::Scatter] {
+    for pane in [Pane::Results, Pane::Table] {
         studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
         studio.send(prefer(|s| s.runtime = EngineChoice::Rten).into());
         assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"), "{pane:?}");

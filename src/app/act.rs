@@ -167,8 +167,6 @@ fn cancel(state: &State) -> Option<Command> {
         does(command)
     } else if state.about.shown {
         does(AboutCommand::Show(false))
-    } else if state.library.brush.is_some() && state.tasks.running.is_empty() {
-        does(LibraryCommand::Brush(None))
     } else {
         when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
     }

@@ -3,7 +3,6 @@
 pub(crate) use super::state::library::OpenDataset;
 pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -59,8 +58,6 @@ pub enum LibraryCommand {
     SetScore(ScoreChoice),
     /// Sorts it by what is uncertain.
     SetUncertainBy(QueueBy),
-    /// Shows only these pairs, or all.
-    Brush(Option<Arc<BTreeSet<PairId>>>),
     /// Ticks a pair for figures, or no longer.
     Tick(PairId),
     /// Takes all ticks away.
@@ -121,10 +118,6 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::SetUncertainBy(by) => {
             state.table.uncertain_by = by;
             state.library.sort = Sort::Uncertain;
-            state.reorder();
-        }
-        LibraryCommand::Brush(brush) => {
-            state.library.brush = brush;
             state.reorder();
         }
         LibraryCommand::Tick(pair) => {
@@ -359,7 +352,6 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.result = None;
     state.table.looked_up = None;
     state.table.scores = Arc::default();
-    state.library.brush = None;
     state.library.ticked.clear();
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     // Somebody's own folder is said what it is, unless it was open when the window was closed.

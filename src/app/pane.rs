@@ -164,10 +164,6 @@ macro_rules! panes {
             table {
                 Table { "All metrics", "The scores of all pairs by every source", Form, needs [Scores], at [Evaluate Top(1)] }
             }
-            scatter { Scatter {
-                "Scatter", "Two scores of all pairs against each other, or one score by tool", Form, needs [Scores],
-                at [Evaluate Right(2)]
-            } }
             log { Log {
                 "Log", "What happened", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]

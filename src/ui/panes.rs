@@ -9,7 +9,6 @@ pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod metrics;
 pub(crate) mod results;
-pub(crate) mod scatter;
 pub(crate) mod scene;
 pub(crate) mod settings_pane;
 pub(crate) mod table;

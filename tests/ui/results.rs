@@ -1,6 +1,6 @@
 //! The results table of the Evaluate workspace, with the shipped models on a few simulated grasps.
 
-use eframe::egui::{self, Key, Modifiers};
+use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::{Command, LibraryCommand, Pane, UiRequest, ViewCommand};
 use touch2touch::app::evaluate::EvaluateCommand;
@@ -94,30 +94,6 @@ fn a_table_is_made_by_a_click_shown_and_exported() {
     rig.send(LibraryCommand::SetFilter(format!("psnr<{bound}")));
     assert_eq!(listed(&rig), psnr[2..]);
     rig.send(LibraryCommand::SetFilter(String::new()));
-    // A rectangle around all points of the scatter lists those, Escape all again; a click on a bar lists a tool's.
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Scatter)));
-    rig.shoot("results-scatter");
-    let area = rig.harness.get_by_label_contains("Scatter of 4 points").rect();
-    let half = egui::Rect::from_min_max(area.min, egui::pos2(area.right(), area.center().y));
-    rig.harness.drag_at(half.min + egui::vec2(2.0, 2.0));
-    rig.harness.step();
-    rig.harness.hover_at(half.max - egui::vec2(2.0, 0.0));
-    rig.harness.step();
-    rig.harness.drop_at(half.max - egui::vec2(2.0, 0.0));
-    rig.harness.step();
-    rig.settle();
-    let brushed = rig.harness.state().state().library.brush.clone().expect("something is brushed");
-    assert!((1..4).contains(&brushed.len()), "{brushed:?}");
-    assert_eq!(rig.harness.state().state().library.order.len(), brushed.len());
-    rig.shoot("results-brushed");
-    rig.harness.key_press_modifiers(Modifiers::NONE, Key::Escape);
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(rig.harness.state().state().library.order.len(), 4);
-    rig.harness.get_by_label("histograms").click();
-    rig.harness.step();
-    rig.shoot("results-histograms");
-    assert_eq!(rig.harness.get_all_by_label_contains("Histogram of").count(), 2);
 
     // A table is of one data set.
     rig.send(LibraryCommand::Open(Place::Demo));

@@ -93,7 +93,7 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
         }
         (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
         (Pane::Masks, _) => of_pair("label")?,
-        (Pane::Results | Pane::Table | Pane::Scatter, _) => {
+        (Pane::Results | Pane::Table, _) => {
             let mut words = verb("evaluate");
             for (bundle, _) in results::evaluated(state).filter(|(_, chosen)| *chosen) {
                 words = words.option("--bundle", bundle.origin.path().display());

@@ -128,8 +128,6 @@ pub struct Library {
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
     /// `has:note` are pairs with one; `angle>5` is a condition on a score.
     pub filter: String,
-    /// Shows only these pairs: those brushed in a picture of the scores.
-    pub brush: Option<Arc<BTreeSet<PairId>>>,
     /// The pairs that a person ticked, for figures.
     pub ticked: BTreeSet<PairId>,
     /// Shows only this tool.
@@ -198,10 +196,7 @@ impl Library {
     /// Recomputes `order` from filter, tool and sort.
     pub(in crate::app) fn reorder(&mut self, document: &Document, table: &TableState) {
         let filter = Filter::parse(&self.filter);
-        let scored = |id: PairId| {
-            self.brush.as_ref().is_none_or(|brush| brush.contains(&id))
-                && filter.conditions.iter().all(|condition| table.meets(id, condition))
-        };
+        let scored = |id: PairId| filter.conditions.iter().all(|condition| table.meets(id, condition));
         let review = |entry: &PairEntry| document.review(&entry.name);
         let passes = |entry: &PairEntry| {
             self.tool.as_ref().is_none_or(|tool| entry.tool.as_ref() == Some(tool))

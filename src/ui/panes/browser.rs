@@ -246,7 +246,6 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
             cx.push(LibraryCommand::SetFilter(String::new()));
             cx.push(LibraryCommand::SetToolFilter(None));
-            cx.push(LibraryCommand::Brush(None));
         }
         return;
     }
@@ -280,16 +279,8 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// Brushed pairs, and the progress of the scoring.
+/// Ticked pairs, and the progress of the scoring.
 fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
-    if let Some(brush) = &cx.state.library.brush {
-        let button = egui::Button::new(format!("{} brushed ×", brush.len())).selected(true);
-        let response = ui.add(button).accessible_name("Show all pairs again");
-        let tip = "Only the pairs brushed in the scatter are listed. Shows all again";
-        if response.on_hover_text(cx.keys().behind(tip, Action::CancelJobs)).clicked() {
-            cx.push(LibraryCommand::Brush(None));
-        }
-    }
     let ticked = cx.state.library.ticked.len();
     if ticked > 0 {
         let button = ui.add(egui::Button::new(format!("{ticked} ticked ×")).selected(true));

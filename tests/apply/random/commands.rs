@@ -438,7 +438,6 @@ draws! {
         })),
         1 Tick(pair()),
         1 Untick,
-        1 Brush(proptest::option::of(pair().prop_map(|pair| Arc::new([pair].into())))),
         1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
         4 Select(pair()),
         1 Step(any::<i64>()),
