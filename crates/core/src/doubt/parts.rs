@@ -12,8 +12,11 @@ use crate::units::counted;
 
 /// Fewest pairs that tell the fingers apart.
 const FEWEST: usize = 3;
-/// Share of the pairs in which the sound finger is right and the other one contradicts the touch, and in which that may be right.
-const RIGHT: f64 = 0.5;
+/// Share of the pairs in which the sound finger is right: beside a wrong finger nearly all, of bare shafts, which leave the
+/// place along them open to a finger alone, half.
+const RIGHT: f64 = 0.75;
+/// Share of the pairs in which the other one contradicts the touch, and in which it may be right.
+const CONTRADICTS: f64 = 0.5;
 const STILL_RIGHT: f64 = 0.2;
 
 /// A finger of some pairs, alone.
@@ -53,7 +56,7 @@ pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, m
     let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;
     let is_wrong = |finger: &&Alone| {
-        let contradicts = finger.contradicting as f64 >= RIGHT * finger.tried as f64;
+        let contradicts = finger.contradicting as f64 >= CONTRADICTS * finger.tried as f64;
         finger.tried >= FEWEST && contradicts && !finger.is_at_least(STILL_RIGHT)
     };
     let wrong = fingers.iter().find(is_wrong)?;
