@@ -15,8 +15,8 @@ use touch2touch_work::export::{DrawnMasks, ExportChoice, ExportSetup, Which, exp
 use touch2touch_work::import::{Import, ImportSetup, import_masks, plan_import};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::exchange::{Format, MANIFEST, PARTS};
+use touch2touch_work::io::images;
 use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::io::{images, npz};
 use touch2touch_work::job::{Cancel, JobCx, Progress};
 use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
@@ -125,8 +125,7 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
         }
         let part = match format {
             Format::Unet => folder.join("train/masks"),
-            Format::Coco => folder.join("annotations/train.json"),
-            Format::Npy | Format::Png => folder.join("train"),
+            Format::Png => folder.join("train"),
         };
         let found = import(&dataset, &from(&part));
         assert!(found.same > 0 && found.same < 8 && found.complete, "{format:?}: {found:?}");
@@ -162,45 +161,6 @@ fn rule_12_an_exported_training_folder_passes_the_loaders_rules_with_no_edits() 
         }
     }
     assert_eq!(pictures, 8);
-}
-
-#[test]
-fn arrays_say_meters_and_annotations_are_what_loaders_read() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = painted(&dir.path().join("set"));
-    let (arrays, coco) = (dir.path().join("npy"), dir.path().join("coco"));
-    export(&dataset, &arrays, Format::Npy);
-    export(&dataset, &coco, Format::Coco);
-    let said = std::fs::read_to_string(arrays.join("README.txt")).unwrap();
-    assert!(said.contains("float32") && said.contains("meters") && said.contains("(height, width)"), "{said}");
-    let (mut seen, mut ids, mut images_of) = (0, Vec::new(), 0);
-    for part in PARTS {
-        let text = std::fs::read(coco.join("annotations").join(format!("{part}.json"))).unwrap();
-        let content: serde_json::Value = serde_json::from_slice(&text).unwrap();
-        assert_eq!(content["categories"][0]["name"], "contact");
-        for image in content["images"].as_array().unwrap() {
-            images_of += 1;
-            let file = coco.join(part).join(image["file_name"].as_str().unwrap());
-            assert_eq!(images::read_gray8(&file).unwrap().size(), [175, 140]);
-            let stem = file.file_stem().unwrap().to_str().unwrap().to_owned();
-            let imprint = npz::read_npy(&arrays.join(part).join(format!("{stem}.imprint.npy"))).unwrap();
-            assert_eq!(imprint.shape, [140, 175]);
-            assert!(imprint.into_f32().iter().all(|m| m.abs() < 0.05), "meters");
-        }
-        for one in content["annotations"].as_array().unwrap() {
-            ids.push(one["id"].as_u64().unwrap());
-            // Ignored pixels are a crowd, so that training leaves them out; masks are none, so that it does not.
-            assert_eq!(one["iscrowd"].as_u64().unwrap() + 1, one["category_id"].as_u64().unwrap());
-            assert_eq!(one["segmentation"]["size"], serde_json::json!([140, 175]));
-            let (area, bbox) = (one["area"].as_u64().unwrap(), one["bbox"].as_array().unwrap());
-            assert!(area > 0 && area <= bbox[2].as_u64().unwrap() * bbox[3].as_u64().unwrap(), "{one}");
-            seen += 1;
-        }
-    }
-    // One of eight masks has no contact, six have ignored pixels.
-    assert_eq!((images_of, seen), (8, 7 + 6));
-    ids.sort_unstable();
-    assert!(ids[0] == 1 && ids.windows(2).all(|pair| pair[0] < pair[1]), "{ids:?}");
 }
 
 #[test]
@@ -302,63 +262,16 @@ fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
     let empty = dir.path().join("empty");
     std::fs::create_dir(&empty).unwrap();
     assert!(fail(&empty, None).why.contains("no masks here"));
-    assert!(fail(&folder, Some(Format::Npy)).why.contains("no masks in the form"));
+    assert!(fail(&folder, Some(Format::Unet)).why.contains("no masks in the form"));
     assert!(fail(&dir.path().join("none"), None).why.contains("no such file"));
-    std::fs::create_dir(empty.join("masks")).unwrap();
-    images::write_gray8(&empty.join("masks/a.png"), &gray(0)).unwrap();
-    npz::write_npy_gray(&empty.join("a.npy"), &gray(0)).unwrap();
-    let several = fail(&empty, None);
-    assert!(several.why.contains("several forms") && several.hint.unwrap().contains("unet, npy, coco or png"));
-}
-
-#[test]
-fn annotations_of_other_programs_are_read_by_category_and_never_by_iscrowd() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = painted(&dir.path().join("set"));
-    let folder = dir.path().join("png");
-    export(&dataset, &folder, Format::Png);
-    let stems: Vec<String> = {
-        let list: serde_json::Value = serde_json::from_slice(&std::fs::read(folder.join(MANIFEST)).unwrap()).unwrap();
-        list["stems"].as_object().unwrap().keys().cloned().collect()
-    };
-    forget(&dataset);
-    let image = |id: usize| serde_json::json!({"id": id, "file_name": format!("imgs/{}.png", stems[id]), "width": 175, "height": 140});
-    let note = |id: usize, segmentation: serde_json::Value| serde_json::json!({"image_id": id, "category_id": 9, "iscrowd": 1, "segmentation": segmentation});
-    // Two columns in contact, as numbers; a polygon; and an image that nobody labeled.
-    let mut content = serde_json::json!({
-        "images": [image(0), image(1), image(2)],
-        "categories": [{"id": 9, "name": "tool"}],
-        "annotations": [
-            note(0, serde_json::json!({"size": [140, 175], "counts": [280, 280, 23940]})),
-            note(1, serde_json::json!([[1, 1, 5, 1, 5, 5]])),
-        ],
-    });
-    let file = dir.path().join("theirs.json");
-    let write = |content: &serde_json::Value| std::fs::write(&file, content.to_string()).unwrap();
-    write(&content);
-    let found = import(&dataset, &from(&file));
-    assert_eq!((found.new, found.refused.len(), found.unmatched.len()), (1, 1, 0), "{found:?}");
-    assert!(found.refused[0].why.contains("polygons"), "{found:?}");
-    let columns = Mask::from_fn(175, 140, |x, _| x == 2 || x == 3);
-    assert!(all(&dataset).values().all(|hand| *hand.mask == columns));
-    // Of several categories one must be the contact.
-    content["categories"] = serde_json::json!([{"id": 9, "name": "tool"}, {"id": 10, "name": "rim"}]);
-    write(&content);
-    let err = plan_import(&dataset, &from(&file), &JobCx::unwatched()).unwrap_err();
-    assert!(err.why.contains("\"contact\"") && err.why.contains("theirs.json"), "{err}");
-    content["categories"][0]["name"] = "contact".into();
-    content["annotations"][0]["segmentation"]["counts"] = "no runs\u{7f}".into();
-    write(&content);
-    let found = import(&dataset, &from(&file));
-    assert!(found.refused.iter().any(|r| r.why.contains("run lengths are not understood")), "{found:?}");
 }
 
 #[test]
 fn an_import_stops_between_pairs_and_keeps_what_was_done() {
     let dir = tempfile::tempdir().unwrap();
     let dataset = painted(&dir.path().join("set"));
-    let folder = dir.path().join("npy");
-    export(&dataset, &folder, Format::Npy);
+    let folder = dir.path().join("png");
+    export(&dataset, &folder, Format::Png);
     forget(&dataset);
     let cancel = Cancel::default();
     let told = cancel.clone();
@@ -381,16 +294,16 @@ fn the_verb_says_what_it_would_do_and_does_it() {
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     let dataset = painted(&set);
-    let folder = dir.path().join("coco");
+    let folder = dir.path().join("png");
     let [set, out] = [&set, &folder].map(|path| path.to_str().unwrap());
     let verb = |args: &[&str]| {
         let done = run(args, dir.path());
         let (said, error) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
         (done.status.code(), said, error)
     };
-    let export = ["masks", "export", set, "--out", out, "--format", "coco", "--pairs", "begun", "--json"];
+    let export = ["masks", "export", set, "--out", out, "--format", "png", "--pairs", "begun", "--json"];
     let (code, said, error) = verb(&export);
-    assert!(code == Some(0) && said.contains("\"format\":\"coco\""), "{said} {error}");
+    assert!(code == Some(0) && said.contains("\"format\":\"png\""), "{said} {error}");
     let before = all(&dataset);
     forget(&dataset);
     let (code, said, error) = verb(&["masks", "import", set, "--from", out, "--dry-run"]);
@@ -400,6 +313,6 @@ fn the_verb_says_what_it_would_do_and_does_it() {
     assert!(code == Some(0) && said.contains("8 masks new") && error.contains("8 masks new"), "{said} {error}");
     let after = all(&dataset);
     assert!(before.iter().all(|(of, hand)| hand.mask == after[of].mask));
-    let (code, _, error) = verb(&["masks", "import", set, "--from", out, "--format", "npy"]);
+    let (code, _, error) = verb(&["masks", "import", set, "--from", out, "--format", "unet"]);
     assert!(code != Some(0) && error.contains("no masks in the form"), "{error}");
 }

@@ -77,9 +77,9 @@ macro_rules! actions {
             state => export(state, ImprintSource::Measured);
         ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [],
             state => export(state, ImprintSource::Predicted);
-        ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads, as NPY, COCO or PNG", [ctrl(K::E)],
+        ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads, or as PNG alone", [ctrl(K::E)],
             state => opened(state, ExportCommand::AskMasks(true));
-        ImportMasks, File, "Import masks…", "Takes masks over from a folder of PNG, NPY or COCO files, named as an export names them; hand work stays", [],
+        ImportMasks, File, "Import masks…", "Takes masks over from a folder of PNG files, named as an export names them; hand work stays", [],
             state => opened(state, ViewCommand::Ui(UiRequest::PickMasks));
 
         PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)],
@@ -421,8 +421,8 @@ impl Action {
             Self::Follow => "live watch camera stream",
             Self::Reload => "refresh again",
             Self::AboutData => "doctor facts summary info problems what is own",
-            Self::ExportMasks => "unet training labels npy coco png save",
-            Self::ImportMasks => "unet labels npy coco png load read",
+            Self::ExportMasks => "unet training labels png save",
+            Self::ImportMasks => "unet labels png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",
             Self::RankMasks => "queue active learning doubt disagreement unsure probability hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",

@@ -47,8 +47,7 @@ pub(super) struct ExportArgs {
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
-    /// The form: a folder as the lab's UNet loader reads it, numpy arrays, COCO annotations with run lengths, or masks alone as
-    /// pictures.
+    /// The form: a folder as the lab's UNet loader reads it, or masks alone as pictures.
     #[arg(long, default_value = Format::default().key(), value_parser = keyed::<Format>())]
     format: Format,
     /// Pairs that go along: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the

@@ -18,11 +18,11 @@ pub(super) fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_
         json(&["label", &path, "--pair", name, "--adopt", "--mask", "truth", "--review", "done"], home.path());
     }
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
-    let choice = ExportChoice { format: Format::Npy, ..ExportChoice::default() };
+    let choice = ExportChoice { format: Format::Png, ..ExportChoice::default() };
     studio.send(ExportCommand::SetMasks(choice).into());
     studio.send(ExportCommand::Write(Output::Masks, exported.clone()).into());
     let by_verb = home.path().join("by_verb");
-    json(&["masks", "export", &path, "--out", &text(&by_verb), "--format", "npy"], home.path());
+    json(&["masks", "export", &path, "--out", &text(&by_verb), "--format", "png"], home.path());
     let list = |folder: &Path| std::fs::read(folder.join(touch2touch_work::io::exchange::MANIFEST)).unwrap();
     assert!(list(&exported) == list(&by_verb), "the hashes of all files are in it");
     drop(studio);

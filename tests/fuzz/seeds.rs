@@ -198,20 +198,6 @@ pub(super) fn npz() -> Vec<Seed> {
     ]
 }
 
-/// Arrays that are masks.
-pub(super) fn npy_masks() -> Vec<Seed> {
-    let raw = |shape: &str, data: &[u8]| Content::Raw(npy(shape, data));
-    let mask = touch2touch_core::grid::Grid::from_fn(5, 4, |x, _| if x > 2 { 255u8 } else { 0 });
-    vec![
-        good("bytes", Content::Raw(written(|file| touch2touch_work::io::npz::write_npy_gray(file, &mask).unwrap()))),
-        good("numbers", raw("2, 2", &[0; 16])),
-        bad("other numbers", raw("1, 1", &2.5f32.to_le_bytes()), "the value 2.5"),
-        bad("a long list", raw("4,", &[0; 16]), "(height, width)"),
-        bad("a product that wraps", raw("4294967296, 4294967296", &[]), "do not fit"),
-        bad("a bomb", raw("4194305, 4, ", &[]), "do not fit"),
-    ]
-}
-
 /// A picture's file.
 pub(super) fn picture(picture: &image::DynamicImage, format: image::ImageFormat) -> Vec<u8> {
     let mut out = std::io::Cursor::new(Vec::new());

@@ -25,7 +25,7 @@ use touch2touch_work::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
 use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
 use touch2touch_work::io::pt::Tensor;
 use touch2touch_work::io::statistics::{Provenance, ShiftStatistics};
-use touch2touch_work::io::{cases, exchange, images, npz, pt, stl};
+use touch2touch_work::io::{cases, images, npz, pt, stl};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::models::Models;
@@ -124,8 +124,6 @@ pub(super) fn all() -> Vec<Target> {
             |dir, bytes| put(dir.join("a.npz"), bytes),
             |_, file| npz::read(file).map(drop).map_err(said),
         ),
-        target("array", NPZ_MIB, seeds::npy_masks(), |dir, bytes| put(dir.join("a.npy"), bytes), read_masks),
-        target("annotations", NPZ_MIB, annotations_seeds(), |dir, bytes| put(dir.join("a.json"), bytes), read_masks),
         target(
             "case",
             NPZ_MIB,
@@ -174,37 +172,6 @@ pub(super) fn all() -> Vec<Target> {
             |dir, bytes| put(dir.join("s.json"), bytes),
             |_, file| ShiftStatistics::read(file).map(drop).map_err(said),
         ),
-    ]
-}
-
-/// Masks in a form of other programs.
-fn read_masks(_: &Path, file: &Path) -> Outcome {
-    let found = exchange::list(file, None).map_err(said)?;
-    if let Some(refused) = found.refused.first() {
-        return Err(said(refused));
-    }
-    found.masks.iter().try_for_each(|listed| listed.read().map(drop).map_err(said))
-}
-
-/// COCO's annotations, and bombs.
-fn annotations_seeds() -> Vec<Seed> {
-    let with = |size: [usize; 2], segmentation: &str| {
-        let [height, width] = size;
-        text(&format!(
-            r#"{{"images":[{{"id":1,"file_name":"a.png","width":{width},"height":{height}}}],
-            "categories":[{{"id":1,"name":"contact"}},{{"id":2,"name":"ignore"}}],
-            "annotations":[{{"id":1,"image_id":1,"category_id":1,"segmentation":{segmentation},"iscrowd":0}},
-            {{"id":2,"image_id":1,"category_id":2,"segmentation":{{"size":[{height},{width}],"counts":"122O"}}}}]}}"#
-        ))
-    };
-    vec![
-        good("text and numbers", with([3, 2], r#"{"size":[3,2],"counts":[2,2,2]}"#)),
-        bad("another size", with([3, 2], r#"{"size":[2,3],"counts":[6]}"#), "pixels"),
-        bad("too short", with([3, 2], r#"{"size":[3,2],"counts":"1"}"#), "cover"),
-        bad("no end", with([3, 2], r#"{"size":[3,2],"counts":"ooooooooooooooo"}"#), "not understood"),
-        bad("a polygon", with([3, 2], "[[0,0,1,1,2,2]]"), "polygons"),
-        bad("a bomb", with([60_000, 60_000], r#"{"size":[60000,60000],"counts":[3600000000]}"#), "more than are read"),
-        bad("no annotations", text("{}"), "no COCO annotations"),
     ]
 }
 

@@ -423,7 +423,7 @@ fn undo_and_redo_go_on_where_they_were_after_a_restart() {
 }
 
 #[test]
-fn masks_are_exported_as_annotations_and_imported_again_by_clicks() {
+fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
@@ -434,12 +434,12 @@ fn masks_are_exported_as_annotations_and_imported_again_by_clicks() {
     let drawn = rig.mask(lab::RIGHT);
     rig.send(LabelsCommand::SetReview(Review::Done));
     rig.clicks(&["Open", "Export masks…"]);
-    rig.clicks(&["COCO"]);
+    rig.clicks(&["PNG"]);
     rig.shoot("export-forms");
-    let folder = rig.data.join("annotated");
+    let folder = rig.data.join("pictures");
     rig.clicks(&["Choose the folder of the export"]);
     rig.take_to(&folder);
-    assert!(folder.join("annotations/train.json").is_file());
+    assert!(folder.join("train").is_dir());
     rig.harness.get_all_by_label("Open folder").next().expect("the note opens the folder");
 
     // The mask is another one when it comes back, and nobody judged the pair.
@@ -448,7 +448,7 @@ fn masks_are_exported_as_annotations_and_imported_again_by_clicks() {
     assert_ne!(rig.mask(lab::RIGHT), drawn);
     rig.clicks(&["Open", "Import masks…"]);
     rig.take_to(&folder);
-    rig.harness.get_by_label("Form of the masks: COCO");
+    rig.harness.get_by_label("Form of the masks: PNG");
     rig.harness.get_by_label("1 mask new");
     rig.shoot("import-masks");
     rig.clicks(&["Import these masks"]);

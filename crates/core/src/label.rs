@@ -5,7 +5,6 @@
 mod agreement;
 mod carry;
 mod clean_up;
-mod coco;
 mod doubt;
 mod drawing;
 mod gate;
@@ -27,7 +26,6 @@ use super::grid::Mask;
 pub use agreement::{Agreement, agreement, iou};
 pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
-pub use coco::{coco_runs, coco_runs_of, coco_text, mask_of_coco_runs};
 pub use doubt::{Doubt, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};
 pub use gate::Gate;

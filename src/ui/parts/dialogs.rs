@@ -176,9 +176,7 @@ impl Dialogs {
                     None => "A folder; it is made if it is not there.".to_owned(),
                 },
                 Purpose::Labels => "A folder on another disk; touch2touch_masks is made in it.".to_owned(),
-                Purpose::Masks => {
-                    "The folder of an export, one of its parts, or one .png, .npy or .json of masks.".to_owned()
-                }
+                Purpose::Masks => "The folder of an export, one of its parts, or one .png of a mask.".to_owned(),
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));

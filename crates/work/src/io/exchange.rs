@@ -6,18 +6,13 @@
 //! | form | image | mask | ignored pixels |
 //! | --- | --- | --- | --- |
 //! | [`Format::Unet`] | `PART/imgs/STEM.png` | `PART/masks/STEM.png`, 0 and 255 | `PART/ignore/STEM.png`, 255 = ignored |
-//! | [`Format::Npy`] | `PART/STEM.imprint.npy`, f32, meters | `PART/STEM.mask.npy`, u8, 0 and 255 | `PART/STEM.ignore.npy` |
-//! | [`Format::Coco`] | `PART/STEM.png` | `annotations/PART.json`, run lengths, category `contact` | category `ignore` |
 //! | [`Format::Png`] | | `PART/STEM.png`, 0 and 255 | `PART/STEM.ignore.png` |
 //!
 //! Images are 8-bit gray: `(imprint + 0.0116) / 0.0341 * 255`, cut to whole numbers, limited to 0..255. A file of ignored
 //! pixels is there only where some are. All are in the raw orientation of the data set.
 
-mod arrays;
-mod coco;
 mod format;
 mod found;
-mod plain;
 mod read;
 mod split;
 mod unet;
@@ -32,14 +27,12 @@ use super::digest::sha256;
 use super::files;
 use super::images::PictureError;
 use super::masks::MaskStore;
-use super::npz::NpzError;
 use super::staging::{self, Staging};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::rig::{PadId, Rig};
 
 pub use format::Format;
-use format::{Place, Writer};
 pub use found::Listed;
 pub(crate) use found::ReadError;
 pub use read::list;
@@ -73,9 +66,6 @@ pub enum ExportError {
     /// A picture cannot be written or read again.
     #[error(transparent)]
     Picture(#[from] PictureError),
-    /// An array cannot be written.
-    #[error(transparent)]
-    Array(#[from] NpzError),
     /// The folder holds something else.
     #[error("the folder is not empty and not a previous export: it holds {found} ({})", folder.display())]
     NotOurs {
@@ -194,11 +184,11 @@ impl Default for ExportConfig {
 pub struct ExportReport {
     /// Masks in train, val and test.
     pub counts: [usize; 3],
-    /// Pixels below or above the range of the image; they were limited to it. None where there is no image, or it is an array.
+    /// Pixels below or above the range of the image; they were limited to it. None where there is no image.
     pub out_of_range_px: usize,
     /// Pixels of which their masks say nothing.
     pub ignored_px: usize,
-    /// Pixels without measurement; in pictures they are an imprint of 0, in arrays NaN.
+    /// Pixels without measurement; in images they are an imprint of 0.
     pub unmeasured_px: usize,
     /// Parts without any image: the lab's trainer refuses those.
     pub empty_parts: Vec<&'static str>,
@@ -208,8 +198,7 @@ pub struct ExportReport {
 struct Manifest {
     format: String,
     version: u32,
-    /// The form of the masks; exports before there were several say none.
-    #[serde(default)]
+    /// The form of the masks.
     masks: Format,
     seed: u64,
     /// Relative path to the SHA-256 of the file.
@@ -275,15 +264,6 @@ pub struct Content {
     pub ignored: Option<Mask>,
 }
 
-fn writer(format: Format) -> Box<dyn Writer> {
-    match format {
-        Format::Unet => Box::new(unet::Folders),
-        Format::Npy => Box::new(arrays::Arrays),
-        Format::Coco => Box::new(coco::Annotations::default()),
-        Format::Png => Box::new(plain::Pictures),
-    }
-}
-
 /// Number of `entries` that go to each of [`PARTS`].
 ///
 /// # Errors
@@ -319,9 +299,11 @@ pub fn export(
     staging::sweep(&parent);
     let staging = Staging::new(&folder).map_err(|s| io(&parent, "make a folder in", s))?;
     let root = staging.new_content();
-    let mut writer = writer(config.format);
-    for relative in writer.folders() {
-        make_folder(&root.join(relative))?;
+    for folder in PARTS.map(|part| root.join(part)) {
+        match config.format {
+            Format::Unet => ["imgs", "masks"].iter().try_for_each(|kind| make_folder(&folder.join(kind)))?,
+            Format::Png => make_folder(&folder)?,
+        }
     }
     let mut report = ExportReport::default();
     let source = |entry: &ExportEntry| (entry.pair.clone(), config.rig.pad_key(entry.finger).into_owned());
@@ -358,15 +340,17 @@ pub fn export(
         let ignored = content.ignored.iter().flat_map(Mask::as_slice).filter(|v| **v);
         report.ignored_px += ignored.count();
         report.counts[part] += 1;
-        let (pair, finger) = source(&entries[i]);
-        let to = Place { root: &root, part, stem, pair: &pair, finger: &finger };
-        writer.add(&to, &content, &mut report).map_err(|err| meant(err, &root, &folder))?;
+        let to = root.join(PARTS[part]);
+        match config.format {
+            Format::Unet => unet::write(&to, stem, &content, &mut report),
+            Format::Png => format::write_masks(&to, stem, &content),
+        }
+        .map_err(|err| meant(err, &root, &folder))?;
         written.insert(stem.clone(), digest(&content.mask, content.ignored.as_ref()));
     }
     if !failures.is_empty() {
         return Err(ExportError::Sources { failures });
     }
-    writer.finish(&root)?;
     let problems = check_written(&root, config.format, written);
     if !problems.is_empty() {
         return Err(meant(ExportError::Check { problems }, &root, &folder));
@@ -478,7 +462,6 @@ mod tests {
     use strum::IntoEnumIterator as _;
 
     use super::*;
-    use crate::io::npz;
     use touch2touch_core::rig::lab;
 
     /// Another mask, a mask that is gone, and one that nobody wrote are told with their files.
@@ -509,21 +492,9 @@ mod tests {
             let (other, stem) = (format::gray(&mask(5)), &stems[2]);
             let file = match format {
                 Format::Unet => folder.join(format!("train/masks/{stem}.png")),
-                Format::Npy => folder.join(format!("train/{stem}.mask.npy")),
                 Format::Png => folder.join(format!("train/{stem}.png")),
-                Format::Coco => folder.join("annotations/train.json"),
             };
-            match format {
-                Format::Unet | Format::Png => crate::io::images::write_gray8(&file, &other).unwrap(),
-                Format::Npy => npz::write_npy_gray(&file, &other).unwrap(),
-                Format::Coco => {
-                    let text = String::from_utf8(files::read(&file, files::SMALL).unwrap()).unwrap();
-                    let counts = touch2touch_core::label::coco_text(&touch2touch_core::label::coco_runs(&mask(2)));
-                    let wrong = touch2touch_core::label::coco_text(&touch2touch_core::label::coco_runs(&mask(5)));
-                    assert!(text.contains(&counts));
-                    std::fs::write(&file, text.replace(&format!("\"{counts}\""), &format!("\"{wrong}\""))).unwrap();
-                }
-            }
+            crate::io::images::write_gray8(&file, &other).unwrap();
             let found = check(&[0, 1, 2]);
             assert!(found.len() == 1 && found[0].file == file, "{format:?}: {found:?}");
             let err = meant(ExportError::Check { problems: found }, &folder, Path::new("/there"));

@@ -70,14 +70,6 @@ pub(crate) fn image_of_npy(bytes: &[u8]) -> Result<Grid<f32>, String> {
     }
 }
 
-/// Writes a gray picture as `.npy`: u8, shape `(height, width)`, row-major.
-///
-/// # Errors
-/// [`NpzError::Io`] if the file cannot be written.
-pub fn write_npy_gray(file: &Path, picture: &Grid<u8>) -> Result<(), NpzError> {
-    write_values(file, &[picture.height(), picture.width()], Values::U8(picture.as_slice().to_vec()))
-}
-
 /// Reads a `.npy` file of numbers, row-major. Integers other than `u8` become `i64`.
 ///
 /// # Errors

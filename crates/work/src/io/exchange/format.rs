@@ -1,13 +1,13 @@
-//! [`Format`]: the forms, and what a writer of one does.
+//! [`Format`]: the forms.
 
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::{Content, ExportError, ExportReport, PARTS};
+use super::found::IGNORE_PNG;
+use super::{Content, ExportError};
 use crate::io::images;
-use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{Grid, Mask};
 
 /// A form of masks that other programs read and write.
@@ -33,10 +33,6 @@ pub enum Format {
     /// Images and masks as the lab's UNet training reads them.
     #[default]
     Unet,
-    /// Numpy arrays: imprints in meters, masks, ignored pixels.
-    Npy,
-    /// COCO: annotations with run lengths, and images.
-    Coco,
     /// Masks alone, as pictures.
     Png,
 }
@@ -51,8 +47,6 @@ impl Format {
     pub fn name(self) -> &'static str {
         match self {
             Self::Unet => "UNet folder",
-            Self::Npy => "NPY",
-            Self::Coco => "COCO",
             Self::Png => "PNG",
         }
     }
@@ -64,55 +58,18 @@ impl Format {
                 "{train,val,test}/{imgs,masks} of 8-bit pictures, as the lab's UNet training reads them; ignored pixels \
                  beside them"
             }
-            Self::Npy => {
-                "Numpy arrays by part: imprints as float32 in meters, masks and ignored pixels as uint8, 0 and 255"
-            }
-            Self::Coco => {
-                "An annotations file for each part with run lengths as pycocotools reads them, and 8-bit images; ignored \
-                 pixels are a category of their own with iscrowd 1"
-            }
             Self::Png => "Masks alone as 8-bit pictures by part, 0 and 255; ignored pixels as pictures of their own",
         }
     }
 }
 
-/// Place of a mask in an export.
-pub(super) struct Place<'a> {
-    /// The folder of the export.
-    pub(super) root: &'a Path,
-    /// An index into [`PARTS`].
-    pub(super) part: usize,
-    pub(super) stem: &'a str,
-    pub(super) pair: &'a str,
-    pub(super) finger: &'a str,
-}
-
-/// Writes masks in one form.
-pub(super) trait Writer {
-    /// Folders that are there even where nothing lies in them, relative to the export's.
-    fn folders(&self) -> Vec<String> {
-        PARTS.map(str::to_owned).to_vec()
+/// Writes a mask alone into the folder of its part, as a picture, and its ignored pixels where there are any.
+pub(super) fn write_masks(part: &Path, stem: &str, content: &Content) -> Result<(), ExportError> {
+    images::write_gray8(&part.join(format!("{stem}.png")), &gray(&content.mask))?;
+    if let Some(ignored) = &content.ignored {
+        images::write_gray8(&part.join(format!("{stem}{IGNORE_PNG}")), &gray(ignored))?;
     }
-
-    /// Writes one mask; `content.ignored` is there only where pixels are ignored.
-    fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError>;
-
-    /// Writes what is said about all of them.
-    fn finish(&mut self, _root: &Path) -> Result<(), ExportError> {
-        Ok(())
-    }
-}
-
-/// Writes an image, which must read back the same.
-pub(super) fn write_image(file: &Path, picture: &Grid<u8>) -> Result<(), ExportError> {
-    images::write_gray8(file, picture)?;
-    if images::read_gray8(file)? == *picture { Ok(()) } else { Err(differs(file)) }
-}
-
-/// That a file reads back differently.
-pub(super) fn differs(file: &Path) -> ExportError {
-    let (what, hint) = ("the file reads back differently".into(), "check the disk".into());
-    ExportError::Check { problems: vec![Problem { file: file.to_owned(), what, hint }] }
+    Ok(())
 }
 
 /// A mask as the values 0 and 255.

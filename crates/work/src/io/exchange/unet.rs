@@ -9,35 +9,32 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use super::format::{Place, Writer, gray, write_image};
+use super::format::gray;
 use super::{Content, ExportError, ExportReport, IGNORED, IMAGE_HI_M, IMAGE_LO_M, PARTS, make_folder};
 use crate::io::images;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{DepthMap, Grid};
 
-/// Writes the layout.
-pub(super) struct Folders;
-
-impl Writer for Folders {
-    fn folders(&self) -> Vec<String> {
-        PARTS.iter().flat_map(|part| ["imgs", "masks"].map(|kind| format!("{part}/{kind}"))).collect()
+/// Writes an image and its mask into the folders of their part.
+pub(super) fn write(part: &Path, stem: &str, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
+    let file = |kind: &str| part.join(kind).join(format!("{stem}.png"));
+    let picture = image_from_imprint(&content.imprint, report);
+    let image = file("imgs");
+    images::write_gray8(&image, &picture)?;
+    if images::read_gray8(&image)? != picture {
+        let (what, hint) = ("the file reads back differently".into(), "check the disk".into());
+        return Err(ExportError::Check { problems: vec![Problem { file: image, what, hint }] });
     }
-
-    fn add(&mut self, to: &Place<'_>, content: &Content, report: &mut ExportReport) -> Result<(), ExportError> {
-        let part = to.root.join(PARTS[to.part]);
-        let file = |kind: &str| part.join(kind).join(format!("{}.png", to.stem));
-        write_image(&file("imgs"), &image_from_imprint(&content.imprint, report))?;
-        images::write_gray8(&file("masks"), &gray(&content.mask))?;
-        if let Some(ignored) = &content.ignored {
-            make_folder(&part.join(IGNORED))?;
-            images::write_gray8(&file(IGNORED), &gray(ignored))?;
-        }
-        Ok(())
+    images::write_gray8(&file("masks"), &gray(&content.mask))?;
+    if let Some(ignored) = &content.ignored {
+        make_folder(&part.join(IGNORED))?;
+        images::write_gray8(&file(IGNORED), &gray(ignored))?;
     }
+    Ok(())
 }
 
 /// The loader's 8-bit image of an imprint, in 32-bit arithmetic as the lab's script has it.
-pub(super) fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
+fn image_from_imprint(imprint: &DepthMap, report: &mut ExportReport) -> Grid<u8> {
     let range = (IMAGE_HI_M - IMAGE_LO_M) as f32;
     imprint.map(|&meters| {
         let meters = if meters.is_finite() {
