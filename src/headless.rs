@@ -6,7 +6,6 @@
 mod adapt;
 mod args;
 mod cache;
-mod case;
 mod compare;
 mod contact_mask;
 mod doctor;
@@ -110,9 +109,6 @@ enum Verb {
     Masks(masks::MasksVerb),
     /// Open a data set and list what is wrong with it, or say for good how it is read.
     Doctor(doctor::DoctorArgs),
-    /// A pair with everything that its results depend on, in one file.
-    #[command(subcommand)]
-    Case(case::CaseVerb),
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
@@ -275,7 +271,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
-        Some(Verb::Case(verb)) => case::run(&verb),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
         Some(Verb::Merge(args)) => merge::run(&args),
         Some(Verb::Cache(args)) => cache::run(&args),

@@ -78,7 +78,6 @@ fn how(action: Action) -> How {
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
         A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
-        A::SaveCase => Verb(&["case", "make", "demo", "--pair", "a", "--out", "a.t2tcase"]),
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
         A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
@@ -157,7 +156,7 @@ fn how(action: Action) -> How {
         }
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
         // Image panes are drawn by `figure`; these are photographs of the window.
-        A::SavePane | A::CopyPane | A::OwnPreferences => Window,
+        A::SavePane | A::CopyPane => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
 }

@@ -18,12 +18,11 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
+use touch2touch_work::bundles;
 use touch2touch_work::infer::engine::{EngineChoice, EngineKind};
 use touch2touch_work::infer::kept_key::KeptKey;
 use touch2touch_work::infer::store::{DEFAULT_BUDGET, Store};
 use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::{bundles, case};
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::run;
@@ -218,26 +217,6 @@ fn preferences_are_read() {
     assert_eq!((bundle.as_deref(), preset, steps, seed, eta), (Some("my generator"), None, 7, u64::MAX, 0.1));
     assert_eq!((settings.runtime, settings.shift), (EngineChoice::Rten, ShiftMode::PaperShift));
     assert_eq!((settings.mask.choice.source, settings.mask.choice.cad_distance_m), (MaskSource::Cad, 0.0015));
-}
-
-#[test]
-fn a_case_is_opened_and_its_results_are_the_same() {
-    let dir = tempfile::tempdir().unwrap();
-    let file = fixture("measured.t2tcase", dir.path());
-    let opened = case::open(&file, dir.path()).unwrap();
-    let recipe = &opened.case.recipe;
-    assert!(recipe.hand && recipe.generator.is_none() && recipe.imprint == ImprintSource::Measured);
-    assert_eq!((recipe.mask.source, recipe.mask.threshold_m), (MaskSource::Threshold, 0.0045));
-    assert_eq!(
-        (recipe.registration.to_string(), recipe.engine),
-        ("distance_field:gate=1.5".into(), EngineChoice::Rten)
-    );
-    let accepted = opened.labels.accepted(&ImprintOf::Measured).unwrap().pose.planar;
-    assert_eq!((accepted.theta_rad, opened.labels.note.as_str()), (0.1, "by an earlier build"));
-    let checked = run(&["case", "check", file.to_str().unwrap()], dir.path());
-    // The demo was of other tools then, which the check says.
-    let said = String::from_utf8_lossy(&checked.stdout).into_owned() + &String::from_utf8_lossy(&checked.stderr);
-    assert!(!checked.status.success() && said.contains("the imprint itself is another one"), "{said}");
 }
 
 #[test]

@@ -13,7 +13,6 @@ mod apply;
 #[cfg(feature = "onnx")]
 mod before;
 #[cfg(feature = "onnx")]
-mod case;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;

@@ -69,10 +69,6 @@ macro_rules! actions {
             _ => does(LabelsCommand::Save);
         Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],
             state => when(export::can_draw(state), ExportCommand::Ask(!state.export.asking));
-        SaveCase, File, "Save case…", "Writes this pair with all that its results depend on into one file, which opens to the same picture elsewhere", [],
-            state => when(export::can_draw(state), ExportCommand::Place(Output::Case));
-        OwnPreferences, File, "Back to my preferences", "Gives your own preferences back, while the case stays open", [],
-            state => when(state.own.is_some(), ExportCommand::OwnPreferences);
         ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [],
             state => export(state, ImprintSource::Measured);
         ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [],

@@ -12,7 +12,7 @@ use super::state::labels::Merged;
 use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
-use super::{evaluate, export, follow, labels, library, results, settings, tasks, workbench};
+use super::{evaluate, follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_work::bundles::BundleInfo;
 use touch2touch_work::error::{TaskError, TaskErrorKind};
 use touch2touch_work::job::Progress;
@@ -62,7 +62,6 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
         }
         Answer::Bundles(bundles, problems) => {
             library::found(state, bundles, problems);
-            export::case_models(state, effects);
         }
         Answer::SettingsLoaded(settings, problem) => {
             state.settings = settings.validated();
@@ -127,7 +126,6 @@ fn ended(state: &mut State, ticket: Ticket, end: &Ended, effects: &mut Vec<Effec
     {
         let again = before.is_some_and(|(_, place)| place == open.place);
         follow::opened(state, again, effects);
-        export::opened(state, effects);
     }
 }
 

@@ -9,36 +9,30 @@ pub use super::state::export::{FigureForm, FigureRows, Output, StillAsked};
 pub(crate) use super::state::export::{MOST_PAIRS, SCALES};
 pub(crate) use column::in_figure;
 pub use command::{equivalent, equivalent_words};
-pub(crate) use setup::{
-    CaseView, can_draw, case_setup, compared, figure_recipes, figure_setup, picture_setup, space_recipe, still_setup,
-};
-pub use setup::{PairExport, case_lacks, pair_export};
+pub use setup::{PairExport, pair_export};
+pub(crate) use setup::{can_draw, compared, figure_recipes, figure_setup, picture_setup, space_recipe, still_setup};
 
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::effect::Effect;
 use super::jobs::Lane;
-use super::keys::{ImprintSource, PredictionKey};
 use super::labels::ImportMasks;
+use super::results;
 use super::results::prediction::generate;
 use super::state::State;
-use super::state::settings::GenerateSettings;
 use super::state::tasks::TaskKind;
 use super::state::view::UiRequest;
 use super::tasks::{self, Write};
-use super::{library, predict, results, settings};
 use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::case;
 use touch2touch_work::depict::apart;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::ExportChoice;
 use touch2touch_work::figure::{FigureMakers, FigurePane, FigureSetup, figure};
 use touch2touch_work::infer::bundle::Ends;
-use touch2touch_work::io::case_file;
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::PairLabels;
 use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
@@ -65,10 +59,6 @@ pub enum ExportCommand {
     Place(Output),
     /// Writes it.
     Write(Output, PathBuf),
-    /// Writes a case of the selected pair; the text is where 3D views look from.
-    WriteCase(PathBuf, String),
-    /// Gives the person's own preferences back, while a case stays open.
-    OwnPreferences,
 }
 
 pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<Effect>) {
@@ -89,97 +79,7 @@ pub(super) fn step(state: &mut State, command: ExportCommand, effects: &mut Vec<
         }
         ExportCommand::Import => import(state, effects),
         ExportCommand::Place(output) => effects.push(Effect::Ui(UiRequest::PickOutput(output))),
-        ExportCommand::WriteCase(file, camera) => {
-            let (Some(setup), Some(open)) = (case_setup(state, &camera), &state.library.open) else { return };
-            let source = open.source.clone();
-            let (what, file) = ("Save the case", ended(file, case_file::ENDING));
-            let write = Write::new(Lane::Models, what, file, move |file, access, cx| {
-                case::make(source.on_disk("Case")?, &setup, access.services.models(), &file, cx)?;
-                Ok((format!("Saved {}", file.display()), file))
-            });
-            tasks::start(state, what, write, effects);
-        }
-        ExportCommand::OwnPreferences => own_preferences(state, effects),
-        ExportCommand::Write(Output::Case, file) => {
-            step(state, ExportCommand::WriteCase(file, String::new()), effects);
-        }
         ExportCommand::Write(output, file) => write(state, output, file, effects),
-    }
-}
-
-/// Shows the pair of a case that was opened as it was shown when it was made, and has it predicted again.
-pub(super) fn opened(state: &mut State, effects: &mut Vec<Effect>) {
-    state.export.predict = false;
-    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-    state.library.lacking = None;
-    let Some((pair, case, held)) = source.case() else { return own_preferences(state, effects) };
-    let now = state.settings.clone();
-    // Of several cases in a row the first took over from the person.
-    state.own.get_or_insert_with(|| Box::new(now.clone()));
-    let view = case.view.clone().and_then(|view| serde_json::from_value::<CaseView>(view).ok());
-    if let Some(view) = &view {
-        state.settings = view.settings.clone().of_person(&now).validated();
-        state.selection.both_fingers = view.both_fingers;
-        if state.rig().pads().any(|pad| pad == view.finger) {
-            state.selection.finger = view.finger;
-        }
-    }
-    let recipe = &case.recipe;
-    state.settings.shift = recipe.shift;
-    state.settings.mask.choice = recipe.mask;
-    state.settings.registration = recipe.registration;
-    state.settings.runtime = recipe.engine;
-    if let Some((model, config)) = &recipe.generator {
-        state.settings.generate = GenerateSettings {
-            bundle: Some(model.name.clone()),
-            preset: None,
-            steps: config.steps,
-            seed: config.seed,
-            sampler: config.sampler,
-            eta: config.eta,
-            spacing: config.spacing,
-            guidance: config.guidance,
-            ..state.settings.generate.clone()
-        };
-    }
-    state.export.predict = true;
-    state.settings = state.settings.clone().validated();
-    settings::save(state, effects);
-    library::select(state, pair, effects);
-    effects.push(Effect::Ui(UiRequest::ShowView(view.map_or_else(String::new, |view| view.camera))));
-    let text = "with the preferences that it was saved with; yours come back with the next data set";
-    state.log.info(format!("A case of {}, {text}", case.dataset));
-    // With the answer it is known which of the case's models are here.
-    let folders = state.settings.bundle_folders.iter().chain(&held.models).cloned();
-    effects.push(Effect::FindBundles(folders.collect()));
-}
-
-/// Gives the person's own preferences back, where a case has brought others.
-fn own_preferences(state: &mut State, effects: &mut Vec<Effect>) {
-    let Some(own) = state.own.take() else { return };
-    state.settings = own.of_person(&state.settings).validated();
-    settings::save(state, effects);
-    effects.push(Effect::Ui(UiRequest::ShowView(String::new())));
-}
-
-/// Predicts what an opened case showed, now that it is known which models are here; where its generator is not, shows the
-/// imprints that it holds.
-pub(super) fn case_models(state: &mut State, effects: &mut Vec<Effect>) {
-    let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
-    let Some((pair, case, held)) = source.case().filter(|_| std::mem::take(&mut state.export.predict)) else { return };
-    let Some((model, config)) = &case.recipe.generator else { return };
-    if let Some(bundle) = state.library.bundle(&model.id) {
-        state.settings.generate.bundle = Some(bundle.name.clone());
-        return predict::same_seed(state, effects);
-    }
-    let id: Arc<str> = model.id.as_str().into();
-    state.library.lacking = Some((id.clone(), model.name.clone()));
-    let Some(open) = &state.library.open else { return };
-    let (pair, runtime) = (open.key(pair), case.recipe.engine);
-    let imprints = held.imprints.iter().filter(|((source, _), _)| *source == ImprintSource::Predicted);
-    for ((_, finger), imprint) in imprints {
-        let recipe = PredictionKey { touch: pair.finger(*finger), bundle: id.clone(), config: *config, runtime };
-        results::hold(state, recipe, case.recipe.shift, Arc::new(imprint.clone()), &model.name);
     }
 }
 
@@ -200,7 +100,6 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
             let setup = figure_setup(state);
             draw(state, "Draw the figure", setup, ended(file, "png"), effects);
         }
-        Output::Case => {}
         Output::Masks => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
             state.export.asking_masks = false;

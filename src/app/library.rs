@@ -355,7 +355,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.library.ticked.clear();
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
-    let own = opened.source.root().is_some() && opened.source.case().is_none() && !resumed;
+    let own = opened.source.root().is_some() && !resumed;
     let shown = if same_place { state.about.shown } else { own && state.settings.about_own_data };
     state.about = AboutState { shown, ..AboutState::default() };
     state.train = TrainState { form: state.train.form, ..TrainState::default() };

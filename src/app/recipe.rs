@@ -59,9 +59,7 @@ pub fn bundle(state: &State, kind: BundleKind) -> Result<&BundleInfo, Absent> {
         BundleKind::Classifier | BundleKind::Features => (None, Absent::NoClassifier),
     };
     let rig = state.rig();
-    let lacking = state.library.lacking.as_ref().is_some_and(|(_, lacking)| Some(&**lacking) == name);
-    let absent = if lacking && kind == BundleKind::Generator { Absent::NoSuchGenerator } else { absent };
     let others = state.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));
-    let absent = if others && !lacking { Absent::OtherSensors } else { absent };
+    let absent = if others { Absent::OtherSensors } else { absent };
     state.library.bundle_named(kind, name, &rig).ok_or(absent)
 }

@@ -79,7 +79,7 @@ pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, sh
 pub use outdated::{Outdated, Why, outdated};
 pub(crate) use pose::{Registered, registered, want_pose};
 pub use pose::{pose, pose_key, provisional_pose};
-pub(crate) use prediction::{hold, keep_prediction, want_other_finger, want_stored};
+pub(crate) use prediction::{keep_prediction, want_other_finger, want_stored};
 pub(crate) use prefetch::{prefetch, want_predictions_ahead};
 pub use preview::{Onlooker, PreviewRequest, preview, preview_request};
 pub(crate) use proposal::want_proposal;

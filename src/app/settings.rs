@@ -72,7 +72,6 @@ pub(super) fn step(state: &mut State, command: SettingsCommand, effects: &mut Ve
         SettingsCommand::ResetSettings => {
             let recent = std::mem::take(&mut settings.recent);
             *settings = Settings { recent, hint_dismissed: true, ..Settings::default() };
-            state.own = None;
         }
     }
     state.settings = std::mem::take(&mut state.settings).validated();
@@ -134,10 +133,5 @@ fn range_from_shown(state: &mut State) {
 
 /// Has the settings written.
 pub(super) fn save(state: &State, effects: &mut Vec<Effect>) {
-    // What a case brought is gone with it.
-    let kept = match &state.own {
-        Some(own) => own.as_ref().clone().of_person(&state.settings),
-        None => state.settings.clone(),
-    };
-    effects.push(Effect::SaveSettings(Box::new(kept)));
+    effects.push(Effect::SaveSettings(Box::new(state.settings.clone())));
 }

@@ -8,7 +8,6 @@ use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::case::{Case, Held};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{ExportChoice, Plan};
 use touch2touch_work::follow::Following;
@@ -34,10 +33,6 @@ pub trait DataSource: Send + Sync {
     fn on_disk(&self, what: &str) -> Result<&Dataset, TaskError> {
         let why = "this kind of source cannot be read outside the studio";
         self.as_dataset().ok_or_else(|| TaskError::new(what, why))
-    }
-    /// The case that it is, with its pair and what it brings besides, if it was opened from one.
-    fn case(&self) -> Option<(PairId, &Case, &Held)> {
-        None
     }
     /// The sensors that its touches were felt with.
     fn rig(&self) -> Arc<Rig> {

@@ -66,10 +66,8 @@ pub struct State {
     pub train: TrainState,
     /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,
-    /// The preferences; while a case is open, those it was saved with.
+    /// The preferences.
     pub settings: Settings,
-    /// The person's own preferences, while a case is open that has others.
-    pub own: Option<Box<Settings>>,
     /// The tasks: everything that runs.
     pub tasks: Tasks,
     /// The event, in words.

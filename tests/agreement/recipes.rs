@@ -13,8 +13,8 @@ use touch2touch::app::evaluate::EvaluateCommand;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::GenerateSettings;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::state::{Lookup, State};
-use touch2touch::app::{export, recipe, results};
+use touch2touch::app::state::Lookup;
+use touch2touch::app::{export, results};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::{Registration, RegistrationChoice, Rejection};
@@ -25,8 +25,6 @@ use touch2touch_work::infer::engine::EngineChoice;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::mask::{MaskChoice, MaskSource};
 use touch2touch_work::recipe::{Model, Recipe, Stage};
-
-use crate::support::run;
 
 use super::{Studio, json, lab_folder, number, optional, pictures_folder};
 
@@ -133,7 +131,7 @@ pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
 
 /// What the studio shows of the selected pair, and what the verbs say of it with the words that the studio gives for it.
 /// How many numbers there were.
-fn same(studio: &Studio, path: &str, home: &Path) -> usize {
+fn same(studio: &Studio, home: &Path) -> usize {
     let (state, mut compared) = (&studio.state, 0);
     let said = |pane| {
         let words = export::equivalent_words(state, pane, 0.004).unwrap();
@@ -143,23 +141,12 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
         json(&words.map(String::as_str).collect::<Vec<_>>(), home)
     };
     let (poses, name) = (said(Pane::Metrics), state.pair_name());
-    let made = {
-        let words = recipe::in_force(state, ImprintSource::Predicted).words(Stage::Pose).list();
-        let case = home.join(format!("{}.t2tcase", file_name(state)));
-        let begin = ["case", "make", path, "--pair", name, "--out", case.to_str().unwrap(), "--json"];
-        let done = run(&begin.into_iter().chain(words.iter().map(String::as_str)).collect::<Vec<_>>(), home);
-        // Of a mask that cannot be made there is no case.
-        serde_json::from_slice::<Value>(&done.stdout).ok()
-    };
     let cases: &[Value] = poses["cases"].as_array().map_or(&[], Vec::as_slice);
     for source in ImprintSource::iter() {
         let case = cases.iter().find(|case| case["imprint"] == source.key());
         let angle = case.map_or(&Value::Null, |case| &case["angle_deg"]);
         let shown = results::pose(state, source).ready();
         assert_eq!(*angle, optional(shown.map(|pose| pose.angle_rad.to_degrees())), "{name} {source:?}: {case:?}");
-        let in_case = made.as_ref().map_or(&[][..], |made| made["angles_deg"].as_array().unwrap());
-        let in_case = in_case.iter().find(|of| of[0] == source.key());
-        assert_eq!(in_case.map_or(&Value::Null, |of| &of[1]), angle, "{name} {source:?} in a case");
         if let (Some(pose), Some(case)) = (shown, case) {
             let place = pose.object_from_grasp();
             assert_eq!([&case["y_m"], &case["z_m"]], [&number(place.y_m), &number(place.z_m)], "{name} {source:?}");
@@ -179,11 +166,6 @@ fn same(studio: &Studio, path: &str, home: &Path) -> usize {
     compared
 }
 
-/// A name of the pair that is one of a file.
-fn file_name(state: &State) -> String {
-    state.pair_name().replace('/', "-")
-}
-
 #[test]
 pub(super) fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_verbs() {
     let mut runner = TestRunner::deterministic();
@@ -198,17 +180,13 @@ pub(super) fn a_random_recipe_gives_the_same_numbers_in_the_studio_and_by_the_ve
     let lab = lab_folder(home.path());
     let pictures = pictures_folder(home.path());
     let mut compared = Vec::new();
-    for (place, path, pairs) in [
-        (Place::Demo, "demo", 96),
-        (Place::Path(lab.clone()), lab.to_str().unwrap(), 3),
-        (Place::Path(pictures.clone()), pictures.to_str().unwrap(), 2),
-    ] {
+    for (place, pairs) in [(Place::Demo, 96), (Place::Path(lab), 3), (Place::Path(pictures), 2)] {
         let mut studio = Studio::open(place, home.path());
         let mut count = 0;
         for at in 0..3 {
             put(&mut studio, &draw());
             studio.predict((at * 31) % pairs);
-            count += same(&studio, path, home.path());
+            count += same(&studio, home.path());
         }
         compared.push(count);
     }

@@ -71,9 +71,6 @@ fn held(verb: &str) -> Option<Held> {
             super::the_most_uncertain_masks_are_in_one_order_in_both,
         ]),
         "masks train" => By(&[learned::TESTS[1]]),
-        "case make" | "case check" => {
-            By(&[files::a_case_of_a_random_recipe_is_the_same_by_button_and_verb_and_the_verb_finds_it_so])
-        }
         "merge" => By(&[
             shards::parts_of_a_run_are_merged_to_what_one_run_prints,
             shards::masks_are_proposed_in_parts_as_at_once,

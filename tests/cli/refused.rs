@@ -33,10 +33,9 @@ fn a_full_disk_ends_in_an_error_and_leaves_no_halves() {
     let set = at("set");
     simulate(&set);
     let set = set.to_str().unwrap();
-    let (shards, case) = (at("shards"), at("a.t2tcase"));
+    let shards = at("shards");
     for (args, left) in [
         (vec!["training-data", set, "--out", shards.to_str().unwrap()], &shards),
-        (vec!["case", "make", set, "--pair", "data_0", "--measured-only", "--out", case.to_str().unwrap()], &case),
     ] {
         let full = cramped(4, &args, dir.path());
         let text = error_text(&full);

@@ -15,7 +15,6 @@ use touch2touch_core::postprocess::{RawPrediction, ShiftFit};
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sensor::Intrinsics;
-use touch2touch_work::case::{self, CaseSetup};
 use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_work::infer::engine::EngineKind;
 use touch2touch_work::infer::kept_key::KeptKey;
@@ -26,10 +25,6 @@ use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
 use touch2touch_work::io::pt::Tensor;
 use touch2touch_work::io::statistics::{Provenance, ShiftStatistics};
 use touch2touch_work::io::{cases, images, npz, pt, stl};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::models::Models;
-use touch2touch_work::recipe::Recipe;
 
 use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
 
@@ -46,37 +41,6 @@ pub(super) struct Target {
 }
 
 type Outcome = Result<(), String>;
-
-/// A case of the demo, one of a file more than its manifest names, and bombs.
-fn t2tcase_seeds() -> Vec<Seed> {
-    let whole = opened(&written(|file| {
-        let setup = CaseSetup {
-            pair: PairId(0),
-            recipe: Recipe {
-                mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
-                ..Recipe::default()
-            },
-            labels: Default::default(),
-            view: None,
-        };
-        case::make(&Dataset::demo(), &setup, &Models::new(None), file, &JobCx::unwatched()).unwrap();
-    }));
-    let with = |name: &str, bytes: Vec<u8>| match &whole {
-        Content::Zip(entries) => Content::Zip([&entries[..], &[(name.to_owned(), bytes)]].concat()),
-        other => other.clone(),
-    };
-    vec![
-        good("a case", whole.clone()),
-        bad("a file too many", with("data/x.stl", vec![1; 99]), "its files are not those"),
-        bad("a way out", with("data/../../x", vec![1]), "no file of a case"),
-        bad("a bomb", with("data/x.stl", vec![0; (64 << 20) + 1]), "unpacks to more than"),
-        bad("no case", text("PK"), "not a readable case"),
-    ]
-}
-
-fn read_t2tcase(dir: &Path, file: &Path) -> Outcome {
-    case::open(file, &dir.join("unpacked")).map(drop).map_err(said)
-}
 
 fn said(error: impl std::fmt::Display) -> String {
     error.to_string()
@@ -101,7 +65,6 @@ const PLAIN_MIB: u64 = 16;
 pub(super) fn all() -> Vec<Target> {
     let target = |name, base_mib, seeds, place, read| Target { name, base_mib, seeds, place, read };
     vec![
-        target("t2tcase", 400, t2tcase_seeds(), |dir, bytes| put(dir.join("a.t2tcase"), bytes), read_t2tcase),
         target("pt", PT_MIB, seeds::pt(), |dir, bytes| put(dir.join("a.pt"), bytes), read_pt),
         target(
             "bubble",

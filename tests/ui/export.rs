@@ -5,20 +5,13 @@ use std::path::Path;
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::library::Place;
-use touch2touch::app::services::Services as _;
-use touch2touch::app::services::live::LiveServices;
+use touch2touch::app::command::{LabelsCommand, Pane, PredictCommand};
+use touch2touch::app::export;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{ColorRange, Theme, Workspace};
-use touch2touch::app::state::State;
-use touch2touch::app::{export, results};
-use touch2touch_core::dataset::PairId;
-use touch2touch_core::rig::lab;
+use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_work::io::images;
 
-use super::rig::{Rig, write_dataset};
+use super::rig::Rig;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
@@ -127,70 +120,4 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     let files = exported.write(&folder).unwrap();
     let text = std::fs::read_to_string(files.iter().find(|f| f.ends_with(&names[2])).unwrap()).unwrap();
     assert!(text.contains("\"mask\": \"hand"), "{text}");
-}
-
-#[test]
-fn a_case_is_saved_and_opened_elsewhere_to_the_same_picture_in_eight_actions() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("grasps");
-    write_dataset(&data, 2);
-    let Some(mut rig) = Rig::live(SIZE, Place::Path(data)) else { return };
-    rig.send(LibraryCommand::Select(PairId(3)));
-    rig.predicted();
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    rig.send(LabelsCommand::AdoptAutomatic);
-    rig.send(ViewCommand::SelectFinger(lab::LEFT));
-    rig.send(prefer(move |s| s.range = ColorRange { min_m: 0.001, max_m: 0.012, locked: true }));
-    let file = folder.path().join("grasp.t2tcase");
-    let mut actions = rig.clicks(&["Open", "Save case…"]) + rig.take_to(&file);
-    assert!(file.is_file(), "{:?}", rig.harness.state().state().log.entries.back());
-
-    let Some(mut other) = Rig::live(SIZE, Place::Demo) else { return };
-    other.send(prefer(|s| s.hint_dismissed = true));
-    let own = ColorRange { min_m: 0.002, max_m: 0.009, locked: true };
-    other.send(prefer(move |s| s.range = own));
-    actions += other.clicks(&["Open", "Path…"]) + other.take_to(&file);
-    assert!(actions <= 8, "{actions}");
-    other.shoot("case-elsewhere");
-    rig.shoot("case-here");
-    let [here, there] = [&rig, &other].map(|rig| rig.harness.state().state());
-    assert_eq!(here.pair_name(), there.pair_name());
-    assert_eq!((here.selection.finger, here.settings.range), (there.selection.finger, there.settings.range));
-    assert_eq!((here.settings.workspace, &here.settings.layouts), (there.settings.workspace, &there.settings.layouts));
-    let masks = |state: &State| {
-        let labels = state.document.pair(state.pair_name()).unwrap();
-        labels.masks.iter().map(|(place, hand)| (place.clone(), hand.mask.clone())).collect::<Vec<_>>()
-    };
-    assert!(!masks(here).is_empty() && masks(here) == masks(there));
-    for source in ImprintSource::iter() {
-        for pad in lab::PADS {
-            let depth = |state: &State| results::imprint(state, source, pad).ready().cloned();
-            let bits = |state: &State| depth(state).map(|d| d.map(|v| v.to_bits()));
-            assert!(bits(here).is_some() && bits(here) == bits(there), "{source:?} {pad:?}");
-        }
-        let pose = |state: &State| results::pose(state, source).ready().map(|found| found.grasp_from_object);
-        assert_eq!(pose(here), pose(there), "{source:?}");
-    }
-
-    // What the case brought holds for the case alone: neither the disk nor the next data set has it.
-    let range = |rig: &Rig| rig_state(rig).settings.range;
-    let kept = |rig: &Rig| {
-        let services = LiveServices::with_config_folder(Some(rig.config.clone()));
-        services.load_settings().0
-    };
-    other.send(prefer(|s| s.mask_opacity = 0.5));
-    assert_eq!((kept(&other).range, kept(&other).workspace), (own, Workspace::Inspect));
-    other.send(LibraryCommand::Open(Place::Demo));
-    let state = rig_state(&other);
-    assert_eq!((state.settings.range, state.settings.workspace), (own, Workspace::Inspect));
-    // And while it is open, where a person asks for it.
-    other.send(LibraryCommand::Open(Place::Path(file)));
-    assert_ne!(range(&other), own);
-    other.clicks(&["Open", "Back to my preferences"]);
-    assert_eq!((range(&other), rig_state(&other).own.is_none()), (own, true));
-    other.shoot("case-own-preferences");
-}
-
-fn rig_state(rig: &Rig) -> &State {
-    rig.harness.state().state()
 }

@@ -4,7 +4,6 @@
 
 pub(crate) mod archive;
 pub mod atomic;
-pub mod case_file;
 pub mod cases;
 pub mod caught;
 pub mod dataset;

@@ -12,7 +12,7 @@
 //! * `way` ([`recipe`], [`feel`]): the steps from a touch to its pose.
 //! * `study` ([`evaluate`], [`compare`], [`figure`]): results looked into.
 //! * `assist` ([`propose`], [`label_edit`], [`mod@label_pair`]): help for those who draw masks.
-//! * `exchange` ([`case`], [`mod@export`]): results and labels as files.
+//! * `exchange` ([`mod@export`], [`import`]): results and labels as files.
 //! * `learn` ([`adapt`], [`train`]): networks fitted to the data at hand.
 //! * [`about`]: what a data set is, and what would better it.
 
@@ -31,7 +31,7 @@ mod study;
 mod way;
 
 pub use assist::{label_edit, label_pair, propose, queue};
-pub use exchange::{case, export, import, pair_files};
+pub use exchange::{export, import, pair_files};
 pub use labeling::{filter, labels, progress};
 pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{

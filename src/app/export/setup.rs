@@ -1,16 +1,14 @@
-//! The contents of what is taken away: figures, pairs, cases.
+//! The contents of what is taken away: figures and pairs.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
 use super::super::pane::Pane;
 use super::super::state::State;
 use super::super::state::export::{FigureRows, StillAsked};
-use super::super::state::settings::Settings;
 use super::super::state::workbench::Layer;
 use super::super::{recipe, results};
 use super::column::in_figure;
@@ -18,9 +16,8 @@ use super::command::recipe_shown;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_core::rig::Rig;
 use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::case::CaseSetup;
 use touch2touch_work::cloud::Clouds;
 use touch2touch_work::depict::Compared;
 use touch2touch_work::error::TaskError;
@@ -29,23 +26,10 @@ use touch2touch_work::labels::PairLabels;
 use touch2touch_work::mask::made_of;
 use touch2touch_work::pair_files::{PairFile, PairParts, write};
 use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::{ModelName, Recipe};
+use touch2touch_work::recipe::Recipe;
 use touch2touch_work::still::StillSetup;
 use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
 use touch2touch_work::tool::NamedTool;
-
-/// The view of the studio on a case.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct CaseView {
-    /// The preferences, with the arrangement of the panes.
-    pub settings: Settings,
-    /// The camera of 3D views, in the window's own format.
-    pub camera: String,
-    /// The active finger.
-    pub finger: PadId,
-    /// True where all fingers were shown.
-    pub both_fingers: bool,
-}
 
 /// The export of the selected pair for other programs, gathered for a job.
 #[derive(Clone, Debug)]
@@ -88,24 +72,6 @@ impl PairExport {
 
 /// A pair of a figure with the predictions that it needs.
 pub(crate) type Recipes = Vec<(PairId, Vec<(PredictionKey, BundleInfo)>)>;
-
-/// The parts of the open case that cannot be made again on this machine, in sentences.
-pub fn case_lacks(state: &State) -> Vec<String> {
-    let case = state.library.open.as_ref().and_then(|open| open.source.case());
-    // Which models are here is not known at once.
-    let Some((_, case, _)) = case.filter(|_| !state.export.predict) else { return Vec::new() };
-    let lacks = |model: &&ModelName| state.library.bundle(&model.id).is_none();
-    let generator = case.recipe.generator.as_ref().map(|(model, _)| model);
-    let imprints = generator.filter(lacks).map(|model| {
-        let name = &model.name;
-        format!("Predicted imprints are shown as the case holds them: its generator {name} is not on this machine.")
-    });
-    let masks = case.recipe.mask_model.as_ref().filter(lacks).map(|model| {
-        let name = &model.name;
-        format!("Masks are made another way than in the case: its mask model {name} is not on this machine.")
-    });
-    imprints.into_iter().chain(masks).collect()
-}
 
 /// The setup of the figure that the form describes, before anything is drawn.
 pub(crate) fn figure_setup(state: &State) -> FigureSetup {
@@ -242,28 +208,6 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
         pose,
         truth: results::sample(state).ready()?.grasp_from_object,
         tool: results::tool_key(state).ok().and_then(|key| state.results.tools.get(&key)).cloned(),
-    })
-}
-
-/// The contents of a case of the selected pair; `camera` is where 3D views look from, as the window says it.
-pub(crate) fn case_setup(state: &State, camera: &str) -> Option<CaseSetup> {
-    let pair = state.selection.pair?;
-    let chosen = results::chosen(state, state.selection.finger)
-        .or_else(|| state.rig().pads().find_map(|pad| results::chosen(state, pad)));
-    let generator = chosen.and_then(|key| Some((state.library.bundle(&key.bundle)?.clone().into(), key.config)));
-    // What is of the person stays with the person.
-    let settings = state.settings.clone().of_person(&Settings::default());
-    let view = CaseView {
-        settings,
-        camera: camera.to_owned(),
-        finger: state.selection.finger,
-        both_fingers: state.selection.both_fingers,
-    };
-    Some(CaseSetup {
-        pair,
-        recipe: Recipe { generator, ..recipe::in_force(state, ImprintSource::Measured) },
-        labels: state.document.pair(state.pair_name()).cloned().unwrap_or_default(),
-        view: serde_json::to_value(view).ok(),
     })
 }
 

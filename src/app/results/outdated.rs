@@ -18,8 +18,6 @@ pub struct Outdated {
 pub enum Why {
     /// A person picked it under these settings.
     Picked,
-    /// The open case holds it, and its model is not here.
-    Held,
     /// The prediction that the settings ask for is on its way.
     OnItsWay,
     /// The prediction that the settings ask for was not made.
@@ -29,7 +27,7 @@ pub enum Why {
 impl Why {
     /// True where it is meant to be shown.
     pub(crate) fn is_meant(self) -> bool {
-        matches!(self, Self::Picked | Self::Held)
+        self == Self::Picked
     }
 }
 
@@ -42,9 +40,7 @@ pub fn outdated(state: &State, finger: PadId) -> Option<Outdated> {
         return None;
     }
     let generating = || named.as_ref().is_some_and(|named| state.tasks.generating(named).is_some());
-    let why = if state.library.lacks(&shown.bundle) {
-        Why::Held
-    } else if results::picked(state, touch).is_some() {
+    let why = if results::picked(state, touch).is_some() {
         Why::Picked
     } else if generating() || results::prefetch(state, finger).is_some() {
         Why::OnItsWay

@@ -7,15 +7,14 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{Key, Keyed, MetersKey, PredictionKey, ShiftMode, StoredKey, TouchKey};
+use super::super::keys::{Key, Keyed, PredictionKey, StoredKey, TouchKey};
 use super::super::results;
 use super::super::results::preview::Onlooker;
 use super::super::results::{Computes, Demands};
 use super::super::services::{Services, SharedServices};
 use super::super::source::DataSource;
 use super::super::state::State;
-use touch2touch_core::grid::{DepthMap, RgbGrid};
-use touch2touch_core::postprocess::RawPrediction;
+use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::BundleInfo;
@@ -145,25 +144,6 @@ pub(crate) fn want_other_finger(wants: &mut Demands<'_>, finger: PadId) {
     if state.library.bundle(&recipe.bundle).is_some() && results::can_start(state, finger) && !under_way {
         wants.ask(recipe);
     }
-}
-
-/// Keeps an imprint in place of the prediction that it was made of, which cannot be made here.
-pub(crate) fn hold(state: &mut State, recipe: PredictionKey, shift: ShiftMode, imprint: Arc<DepthMap>, model: &str) {
-    let why = format!("only this imprint is in the case; the model {model} that would make it anew is not here");
-    let chains = ShiftMode::iter().map(|mode| (mode, Err(why.clone()))).collect();
-    let made = Prediction {
-        raw: RawPrediction { channels: vec![(*imprint).clone()] },
-        chains: Arc::new(chains),
-        fit: None,
-        color: None,
-        bundle: recipe.bundle.clone(),
-        engine: "the case".into(),
-        seconds: 0.0,
-        kept: true,
-    };
-    keep_prediction(state, recipe.clone(), Arc::new(made), true);
-    let bytes = MetersKey::bytes(&imprint);
-    state.results.imprints.insert(MetersKey(recipe, shift), imprint, bytes);
 }
 
 /// Keeps a prediction of the open data set; with `in_front` it is shown where the settings name none that is there.

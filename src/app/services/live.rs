@@ -24,7 +24,6 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::bundles::{self, BundleInfo};
-use touch2touch_work::case::{self, Case, Held};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
@@ -34,7 +33,7 @@ use touch2touch_work::infer::store::{self, Store};
 use touch2touch_work::io::dataset::Dataset;
 use touch2touch_work::io::masks::FOLDER;
 use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, case_file, files, folders};
+use touch2touch_work::io::{atomic, files, folders};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
 use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
@@ -93,16 +92,8 @@ pub fn open_source(place: &Place) -> Result<LiveSource, TaskError> {
 
 /// [`open_source`], with what waits in a folder of labels that could not be saved before.
 fn open_recovering(place: &Place, waiting: Option<&Path>) -> Result<LiveSource, TaskError> {
-    let mut case = None;
     let dataset = match place {
         Place::Demo => Dataset::demo(),
-        Place::Path(path) if case_file::is_case(path) && path.is_file() => {
-            let cache = folders::program_cache().unwrap_or_else(std::env::temp_dir);
-            let opened = case::open(path, &cache.join("cases"))?;
-            opened.keep_labels()?;
-            case = Some((opened.pair, opened.case, opened.held));
-            opened.dataset
-        }
         Place::Path(path) => Dataset::open(path)
             .map_err(|err| TaskError::from_error(format!("Open {place}"), &err).with_hint(err.hint()))?,
     };
@@ -113,7 +104,7 @@ fn open_recovering(place: &Place, waiting: Option<&Path>) -> Result<LiveSource, 
     let mut reviews = labels.reviews();
     problems.append(&mut reviews.problems);
     let (dataset, waiting) = (Arc::new(dataset), waiting.map(Path::to_owned));
-    Ok(LiveSource { dataset, labels, problems, reviews, case, waiting, recovered })
+    Ok(LiveSource { dataset, labels, problems, reviews, waiting, recovered })
 }
 
 /// An open data set with its store of labels.
@@ -123,7 +114,6 @@ pub struct LiveSource {
     labels: Labels,
     problems: Vec<Problem>,
     reviews: Reviews,
-    case: Option<(PairId, Case, Held)>,
     /// The folder of labels that could not be saved.
     waiting: Option<PathBuf>,
     recovered: Recovered,
@@ -147,10 +137,6 @@ impl DataSource for LiveSource {
 
     fn as_dataset(&self) -> Option<&Dataset> {
         Some(&self.dataset)
-    }
-
-    fn case(&self) -> Option<(PairId, &Case, &Held)> {
-        self.case.as_ref().map(|(pair, case, held)| (*pair, case, held))
     }
 
     fn rig(&self) -> Arc<Rig> {
@@ -186,7 +172,6 @@ impl DataSource for LiveSource {
             labels: self.labels.continued(dataset),
             problems: dataset.problems.clone(),
             reviews: self.reviews.clone(),
-            case: None,
             waiting: self.waiting.clone(),
             recovered: Recovered::default(),
         }))

@@ -4,7 +4,6 @@ use super::super::keys::{ImportForm, ImprintSource};
 use super::super::pane::Pane;
 use touch2touch_work::export::ExportChoice;
 use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
-use touch2touch_work::io::case_file;
 use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
 
 /// Pairs of the list that a figure may take.
@@ -84,8 +83,6 @@ pub struct ExportState {
     pub importing: Option<ImportForm>,
     /// The number of imports that were asked about.
     pub(in crate::app) imports: u64,
-    /// True where the prediction of a case that was opened is still to be made.
-    pub predict: bool,
 }
 
 /// A picture of the selected pair in 3D, as a person asks for it.
@@ -121,8 +118,6 @@ pub enum Output {
     Still(StillAsked),
     /// Cloud, pose and mesh of an imprint of the selected pair, into a folder.
     Pair(ImprintSource),
-    /// The selected pair with everything that its results depend on.
-    Case,
     /// Masks for training, as the form says, into a folder.
     Masks,
 }
@@ -134,7 +129,6 @@ impl Output {
             Self::Still(StillAsked { turntable: None, .. }) => "Save the 3D picture (.png)",
             Self::Still(_) => "Save the frames of a turntable to a folder",
             Self::Figure => "Save the figure (.png or .svg)",
-            Self::Case => "Save the case (.t2tcase)",
             Self::Masks => "Export masks to a folder",
             Self::Pair(_) => "Export cloud, pose and mesh to a folder",
             Self::Picture { scale: Some(_), .. } => "Save the picture (.png)",
@@ -149,7 +143,6 @@ impl Output {
             Self::Still(StillAsked { turntable: Some(_), .. }) => None,
             Self::Still(asked) => Some(format!("3d-{}.png", asked.pane.name().to_lowercase())),
             Self::Picture { pane, scale, .. } => Some(pane.picture_name(scale.is_some())),
-            Self::Case => Some(format!("case.{}", case_file::ENDING)),
             Self::Pair(_) | Self::Masks => None,
         }
     }

@@ -142,8 +142,6 @@ pub struct Library {
     pub bundles: Vec<BundleInfo>,
     /// The problems of bundles that were refused.
     pub bundle_problems: Vec<TaskError>,
-    /// The generator that the open case was made with, by identity and name, where this machine does not have it.
-    pub lacking: Option<(Arc<str>, String)>,
 }
 
 impl Library {
@@ -179,15 +177,12 @@ impl Library {
         by_id(&self.bundles, id)
     }
 
-    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind; nothing in
-    /// place of what the open case names and this machine lacks.
+    /// The first bundle of a kind for the sensors of `rig` whose name is `name`, else the first of that kind.
     pub(crate) fn bundle_named(&self, kind: BundleKind, name: Option<&str>, rig: &Rig) -> Option<&BundleInfo> {
         let mut of_kind = self.bundles.iter().filter(|b| b.kind == kind && b.fits(rig));
         // What was made for one's own data is used where it is chosen.
         let first = of_kind.clone().find(|bundle| !bundle.is_own()).or_else(|| of_kind.clone().next());
-        let lacking = self.lacking.as_ref().filter(|_| kind == BundleKind::Generator).map(|(_, lacking)| &**lacking);
         match name {
-            Some(name) if lacking == Some(name) => None,
             Some(name) => of_kind.find(|b| b.name == name).or(first),
             None => first,
         }
@@ -235,14 +230,7 @@ impl Library {
 
     /// The name of the model that made a prediction.
     pub(crate) fn model_name(&self, bundle: &str) -> &str {
-        let known = self.bundle(bundle).map(|bundle| &*bundle.name);
-        let lacking = self.lacking.as_ref().filter(|(id, _)| **id == *bundle).map(|(_, name)| &**name);
-        known.or(lacking).unwrap_or("a model that is not there any more")
-    }
-
-    /// True where the open case was made with this generator, and it is not here.
-    pub(in crate::app) fn lacks(&self, bundle: &str) -> bool {
-        self.lacking.as_ref().is_some_and(|(id, _)| **id == *bundle)
+        self.bundle(bundle).map_or("a model that is not there any more", |bundle| &*bundle.name)
     }
 
     /// The making of a prediction, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.

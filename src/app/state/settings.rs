@@ -173,24 +173,6 @@ impl Settings {
         self.versus.entry(self.workspace).or_default()
     }
 
-    /// These preferences, with what is of the person and the machine as `person` has it: a case brings none of that.
-    #[must_use]
-    pub(crate) fn of_person(self, person: &Self) -> Self {
-        Self {
-            theme: person.theme,
-            ui_zoom: person.ui_zoom,
-            recent: person.recent.clone(),
-            bundle_folders: person.bundle_folders.clone(),
-            cache_mib: person.cache_mib,
-            person: person.person.clone(),
-            hint_dismissed: person.hint_dismissed,
-            about_own_data: person.about_own_data,
-            keys: person.keys.clone(),
-            last: person.last.clone(),
-            ..self
-        }
-    }
-
     /// Brings numbers from a file or a text box back into the ranges that can be drawn and computed with.
     #[must_use]
     pub fn validated(mut self) -> Self {

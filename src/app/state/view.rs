@@ -97,8 +97,6 @@ pub enum UiRequest {
         /// To the clipboard instead of a file.
         copied: bool,
     },
-    /// Arrange the panes as the settings say, and look at 3D views from there (the window's own text, or nothing).
-    ShowView(String),
     /// Copy a picture of a pane.
     PictureOf(Pane),
     /// Fill the screen, or stop it.

@@ -137,16 +137,6 @@ impl Memory {
         serde_json::to_string(&self.views[source as usize].camera).unwrap_or_default()
     }
 
-    /// Lets both sides look from where [`Self::camera_text`] says; what is no camera changes nothing.
-    pub(crate) fn look_as(&mut self, text: &str) {
-        if let Some(camera) = serde_json::from_str::<Camera>(text).ok().filter(Camera::is_valid) {
-            for view in &mut self.views {
-                view.camera = camera;
-                view.placed = true;
-            }
-        }
-    }
-
     /// Follows the pen no further; whether it was drawing.
     pub(crate) fn lift_pen(&mut self) -> bool {
         self.drawing.take().is_some()

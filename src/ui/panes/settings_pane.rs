@@ -39,10 +39,6 @@ pub(crate) fn person(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     let settings = &cx.state.settings;
-    if cx.state.own.is_some() {
-        ui.label(caption("A case is open: these are its preferences. Yours come back with the next data set.", cx.p));
-        cx.action_button(ui, Action::OwnPreferences, Action::OwnPreferences.name());
-    }
     ui.label(section("Window", cx.p));
     ui.horizontal(|ui| {
         for (theme, name) in [(Theme::Dark, "Dark"), (Theme::Light, "Light")] {

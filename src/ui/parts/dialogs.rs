@@ -252,8 +252,8 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let (file, new) = (dir.path().join("file"), dir.path().join("new"));
         std::fs::write(&file, "").unwrap();
-        let case = Purpose::Output(Output::Case);
-        assert!(Output::Case.file_name().is_some());
+        let figure = Purpose::Output(Output::Figure);
+        assert!(Output::Figure.file_name().is_some());
         for (purpose, path, said) in [
             (Purpose::Folder, dir.path(), None),
             (Purpose::Folder, &new, Some("nothing at")),
@@ -262,10 +262,10 @@ mod tests {
             (Purpose::File, &file, None),
             (Purpose::Labels, &new, None),
             (Purpose::Labels, &file, Some("is a file")),
-            (case, &new, None),
-            (case, dir.path(), Some("is a folder")),
-            (case, &new.join("a"), Some("no folder")),
-            (case, Path::new("a"), None),
+            (figure, &new, None),
+            (figure, dir.path(), Some("is a folder")),
+            (figure, &new.join("a"), Some("no folder")),
+            (figure, Path::new("a"), None),
         ] {
             let why = purpose.objection(path);
             assert_eq!(why.is_some(), said.is_some(), "{purpose:?} {}: {why:?}", path.display());

@@ -64,7 +64,6 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
         None => ("", "What is shown was predicted so"),
         Some(Why::OnItsWay) => ("Predicting anew; this is ", "The settings ask for another prediction"),
         Some(Why::Picked) => ("Picked: ", "Shown until the settings change, or Generate"),
-        Some(Why::Held) => ("As in the case: ", "The case's model is not on this machine"),
         Some(Why::NotMade) => ("Made with ", "The settings in force would make another prediction"),
     };
     let text = format!("{lead}{model}{settings}");
@@ -75,9 +74,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
     let again = matches!(why, Some(Why::NotMade | Why::Picked)) && results::can_generate(cx.state).is_ok();
     let room = line.with_max_x(line.right() - if again { BUTTON + 6.0 } else { 0.0 });
     let color = match (why, shift) {
-        (None | Some(Why::Picked), ShiftMode::Raw) | (Some(Why::NotMade | Why::OnItsWay | Why::Held), _) => {
-            cx.p.caution
-        }
+        (None | Some(Why::Picked), ShiftMode::Raw) | (Some(Why::NotMade | Why::OnItsWay), _) => cx.p.caution,
         _ => cx.p.weak,
     };
     let painter = ui.painter_at(room);

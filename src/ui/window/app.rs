@@ -22,7 +22,6 @@ use crate::app::command::{
     UiRequest, UnsavedCommand, ViewCommand,
 };
 use crate::app::evaluate::EvaluateCommand;
-use crate::app::export::Output;
 use crate::app::keys::ImprintSource;
 use crate::app::library::Place;
 use crate::app::pane::{Kind, Workspace};
@@ -379,11 +378,6 @@ impl StudioApp {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
             }
-            UiRequest::ShowView(camera) => {
-                self.trees.clear();
-                self.panes.maximized = None;
-                self.panes.memories.scene.look_as(&camera);
-            }
             UiRequest::PictureOf(pane) => {
                 if let Some(place) = self.panes.places.get(&pane).copied() {
                     self.shoot(ctx, Some(place), true);
@@ -555,7 +549,6 @@ impl eframe::App for StudioApp {
                 }
             }
             edited = bars::top(&mut cx, ui, &mut tree);
-            bars::case(&cx, ui);
             // Drawn before the panes, so it shows the read-out of the frame before: at rest they are the same.
             bars::bottom(&mut cx, ui, self.frame_ms);
             log_pane::notices(&mut cx, ui);
@@ -583,10 +576,6 @@ impl eframe::App for StudioApp {
             if let Some((purpose, path)) = cx.shared.dialogs.show(&ctx) {
                 cx.push(match purpose {
                     Purpose::Folder | Purpose::File => Command::Library(LibraryCommand::Open(Place::Path(path))),
-                    Purpose::Output(Output::Case) => {
-                        let camera = self.panes.memories.scene.camera_text(ImprintSource::default());
-                        Command::Export(ExportCommand::WriteCase(path, camera))
-                    }
                     Purpose::Output(output) => Command::Export(ExportCommand::Write(output, path)),
                     Purpose::Labels => Command::Labels(LabelsCommand::Unsaved(UnsavedCommand::Elsewhere(path))),
                     Purpose::Masks => Command::Export(ExportCommand::AskImport(Some(path))),

@@ -1,8 +1,8 @@
 //! The bar at the top (workspaces, search, theme, help) and the one at the bottom (finger, read-out, jobs).
 
 use crate::app::pane::Workspace;
+use crate::app::results;
 use crate::app::settings::prefer;
-use crate::app::{export, results};
 use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2, vec2};
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
@@ -69,8 +69,6 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         for action in [
             Action::AboutData,
-            Action::SaveCase,
-            Action::OwnPreferences,
             Action::Figure,
             Action::ExportMeasured,
             Action::ExportPredicted,
@@ -168,20 +166,6 @@ fn tab(cx: &mut Cx<'_>, ui: &mut Ui, workspace: Workspace) {
     if response.on_hover_text(tip.tooltip()).clicked() {
         cx.push(prefer(move |s| s.workspace = workspace));
     }
-}
-
-/// A line below the top bar while a case is open that cannot be made again here.
-pub(crate) fn case(cx: &Cx<'_>, ui: &mut Ui) {
-    let lacks = export::case_lacks(cx.state);
-    if lacks.is_empty() {
-        return;
-    }
-    let frame = egui::Frame::new().fill(cx.p.panel).inner_margin(egui::Margin::symmetric(12, 3));
-    Panel::top("case").frame(frame).resizable(false).show(ui, |ui| {
-        let text = RichText::new(lacks.join(" ")).size(SMALL).color(cx.p.caution);
-        let hint = "Put the model's folder into one that the preferences name, or have the case saved again with it.";
-        ui.add(egui::Label::new(text).truncate()).on_hover_text(format!("{}\n{hint}", lacks.join("\n")));
-    });
 }
 
 /// The bar at the bottom. `frame_ms`: time of the last frame, milliseconds.

@@ -255,7 +255,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         None => &[],
     };
     let table: &[Action] = if matches!(pane, Pane::Results | Pane::Table) { &[Action::ExportTable] } else { &[] };
-    for action in [Action::Figure].iter().chain(sides).chain(&[Action::SaveCase]).chain(table).copied() {
+    for action in [Action::Figure].iter().chain(sides).chain(table).copied() {
         if cx.menu_row(ui, action, false).clicked() {
             ui.close();
         }

@@ -306,7 +306,6 @@ fn output() -> impl Strategy<Value = Output> {
     });
     prop_oneof![
         Just(Output::Figure),
-        Just(Output::Case),
         Just(Output::Masks),
         source().prop_map(Output::Pair),
         still.prop_map(Output::Still),
@@ -544,8 +543,6 @@ draws! {
         1 ImportOverHand(any::<bool>()),
         1 Import,
         1 Place(output()),
-        1 OwnPreferences,
-        1 WriteCase(Just(PathBuf::from("/dev/null/folder/a.t2tcase")), Just(String::new())),
         1 Write(output(), Just(PathBuf::from("/dev/null/folder/picture.png"))),
     }
     about: AboutCommand {

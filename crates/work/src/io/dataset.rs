@@ -214,14 +214,6 @@ impl Dataset {
         }
     }
 
-    /// Built-in data set that this is, if it is one.
-    pub(crate) fn built_in_set(&self) -> Option<BuiltIn> {
-        match self.source {
-            Source::BuiltIn(set) => Some(set),
-            Source::Lab(_) | Source::Pictures(_) => None,
-        }
-    }
-
     /// Loads a pair. Takes tens of milliseconds: not for the thread that draws.
     ///
     /// Pixels without measurement are NaN in the imprint, also where the file has infinities or the camera said 0.

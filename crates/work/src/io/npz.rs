@@ -49,27 +49,6 @@ pub fn write_npy(file: &Path, image: &Grid<f32>) -> Result<(), NpzError> {
     write_values(file, &[image.height(), image.width()], Values::F32(image.as_slice().to_vec()))
 }
 
-/// An image as the bytes of a `.npy` file: f32, shape `(height, width)`, row-major.
-pub(crate) fn npy_bytes(image: &Grid<f32>) -> Vec<u8> {
-    npy::bytes(&[image.height(), image.width()], &Values::F32(image.as_slice().to_vec()))
-}
-
-/// The image in the bytes of such a file.
-///
-/// # Errors
-/// In words, if they are not those of an image of 32-bit floats.
-pub(crate) fn image_of_npy(bytes: &[u8]) -> Result<Grid<f32>, String> {
-    let mut from = bytes;
-    let header = npy::header(&mut from, bytes.len())?;
-    let tensor = header.values(&mut from, bytes.len() as u64)?;
-    match (&*tensor.shape, tensor.values) {
-        ([height, width], Values::F32(values)) => {
-            Grid::from_vec(*width, *height, values).map_err(|err| err.to_string())
-        }
-        (shape, _) => Err(format!("it is no image of 32-bit floats (shape {shape:?})")),
-    }
-}
-
 /// Reads a `.npy` file of numbers, row-major. Integers other than `u8` become `i64`.
 ///
 /// # Errors

@@ -6,7 +6,6 @@ mod journal;
 mod recovery;
 mod stored;
 
-pub(crate) use accepted::{by_imprint, of_imprints};
 pub use journal::{Act, Change, JournalHistory, Operation, Past};
 pub use recovery::{Recovered, Unsaved, recover, take_in};
 pub use stored::Labels;

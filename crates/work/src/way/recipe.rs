@@ -7,7 +7,7 @@ use std::ops::Deref;
 use std::path::Path;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::bundles::{BundleInfo, BundleKind, FoundBundles};
 use super::mask::{MaskChoice, MaskRecipe, MaskSource};
@@ -40,22 +40,22 @@ pub enum Stage {
     Pose,
 }
 
-/// Everything that decides the result of a touch. Models are `M`: [`Model`] where they can be used, [`ModelName`] in files.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Recipe<M = Model> {
+/// Everything that decides the result of a touch.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Recipe {
     /// The imprint that mask, cloud and pose are made from.
-    #[serde(default, skip_serializing_if = "is_measured")]
+    #[serde(skip_serializing_if = "is_measured")]
     pub imprint: ImprintSource,
     /// The generator with the choices of a generation; `None` where nothing is predicted.
-    pub generator: Option<(M, GenerateConfig)>,
+    pub generator: Option<(Model, GenerateConfig)>,
     /// The mapping of predictions to meters.
     pub shift: ShiftMode,
     /// The source of the masks that nobody drew.
     pub mask: MaskChoice,
     /// The mask model, where there is one.
-    pub mask_model: Option<M>,
+    pub mask_model: Option<Model>,
     /// A mask drawn by hand wins where there is one.
-    #[serde(default = "yes", skip_serializing_if = "is_yes")]
+    #[serde(skip_serializing_if = "is_yes")]
     pub hand: bool,
     /// The registration; files have called it the engine from the beginning.
     #[serde(rename = "engine")]
@@ -69,17 +69,13 @@ fn is_measured(source: &ImprintSource) -> bool {
     *source == ImprintSource::Measured
 }
 
-fn yes() -> bool {
-    true
-}
-
 #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde's signature")]
 fn is_yes(value: &bool) -> bool {
     *value
 }
 
 /// A model bundle, as files name it.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
 pub struct ModelName {
     /// Name for people.
     pub name: String,
@@ -145,7 +141,7 @@ impl Serialize for Model {
     }
 }
 
-impl<M> Default for Recipe<M> {
+impl Default for Recipe {
     fn default() -> Self {
         Self {
             imprint: ImprintSource::Measured,
@@ -160,7 +156,7 @@ impl<M> Default for Recipe<M> {
     }
 }
 
-impl<M> Recipe<M> {
+impl Recipe {
     /// The choices that an identity does not name. Part of the format: they stay when defaults change.
     fn unnamed() -> Self {
         Self {
@@ -175,34 +171,14 @@ impl<M> Recipe<M> {
         }
     }
 
-    /// Recipe with other models; `None` where one has no counterpart.
-    pub(crate) fn with_models<N>(self, find: impl Fn(M) -> Option<N>) -> Option<Recipe<N>> {
-        let generator = match self.generator {
-            Some((model, config)) => Some((find(model)?, config)),
-            None => None,
-        };
-        let mask_model = match self.mask_model {
-            Some(model) => Some(find(model)?),
-            None => None,
-        };
-        let Self { imprint, shift, mask, hand, registration, engine, .. } = self;
-        Some(Recipe { imprint, generator, shift, mask, mask_model, hand, registration, engine })
-    }
-
     /// Recipe from another imprint.
     #[must_use]
-    pub fn of(&self, imprint: ImprintSource) -> Self
-    where
-        M: Clone,
-    {
+    pub fn of(&self, imprint: ImprintSource) -> Self {
         Self { imprint, ..self.clone() }
     }
 
     /// So many recipes that differ from it in their seeds alone, from its own on; none where nothing is predicted.
-    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self>
-    where
-        M: Clone,
-    {
+    pub(crate) fn with_seeds(&self, count: usize) -> Vec<Self> {
         let Some((_, own)) = &self.generator else { return Vec::new() };
         let with = |later: u64| {
             let mut with = self.clone();
@@ -214,10 +190,7 @@ impl<M> Recipe<M> {
 
     /// Only what decides the result of a stage: what comes later, and what is not used, is as it goes without saying.
     #[must_use]
-    pub fn until(&self, stage: Stage) -> Self
-    where
-        M: Clone,
-    {
+    pub fn until(&self, stage: Stage) -> Self {
         let predicted = self.imprint == ImprintSource::Predicted;
         let masked = stage >= Stage::Mask;
         let unet = masked && self.takes_mask_model() && self.mask_model.is_some();
