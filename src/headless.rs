@@ -17,14 +17,12 @@ mod guard;
 mod label;
 mod ledger;
 mod masks;
-mod merge;
 mod models;
 mod notes;
 mod output;
 mod pose;
 mod recipe;
 mod report;
-mod shards;
 mod simulate;
 mod stats;
 mod still;
@@ -112,9 +110,6 @@ enum Verb {
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
-    /// Put the parts of a run together that `--shard I/N` made of `generate`, `pose` or `masks propose`: what one run prints.
-    /// (`evaluate` keeps its parts beside the predictions: run it without --shard.)
-    Merge(merge::MergeArgs),
     /// Predictions kept on the disk: how many, where, and a way to remove them.
     Cache(cache::CacheArgs),
     /// Say which model runtime is used and why, and which GPUs it can use.
@@ -272,7 +267,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
-        Some(Verb::Merge(args)) => merge::run(&args),
         Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),
     }

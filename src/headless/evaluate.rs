@@ -8,9 +8,7 @@ use clap::Args;
 use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
-use super::shards::{self, Shard};
 use super::{Common, Output, ToolArgs, VerbResult};
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_core::pose::RegistrationChoice;
@@ -56,10 +54,6 @@ pub(super) struct EvaluateArgs {
     /// Take only this many grasps of each tool, spread evenly.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     grasps: Option<usize>,
-    /// Score only the I-th of N parts of the pairs, counted from 1, as a job of an array. The figures are kept beside the
-    /// predictions, where all jobs must see them: without this option, afterwards, they are found and the whole table is made.
-    #[arg(long, value_name = "I/N", value_parser = shards::parse, conflicts_with_all = ["no_cache", "grasps"])]
-    shard: Option<Shard>,
     /// Sampling steps (default: each bundle's; a bundle that draws in one step keeps it).
     #[arg(long)]
     steps: Option<u32>,
@@ -201,9 +195,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,
-        pairs: args.shard.map(|shard| {
-            shard.share((0..dataset.index.pairs.len() as u32).map(PairId).collect()).into_iter().collect()
-        }),
+        pairs: None,
         grasps_per_tool: args.grasps,
         finger,
         batch: args.batch,

@@ -6,7 +6,6 @@ mod write;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde_json::value::RawValue;
 
 use super::args::{DatasetArgs, FingerArg, LimitArgs};
 use super::guard::{Bug, guarded};
@@ -14,7 +13,6 @@ use super::notes::Notes;
 use super::output::says;
 use super::recipe::{ModelArgs, misgiving};
 use super::report::{RunReport, output_stems};
-use super::shards::{Parts, Shard, ShardArg, Sharded};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
@@ -53,8 +51,6 @@ pub(super) struct GenerateArgs {
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
-    shard: ShardArg,
-    #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
     common: Common,
@@ -68,19 +64,16 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;
     let (generating, shift) = (recipe.generating()?, recipe.shift);
     let config = *generating.config;
-    // Names of files are those of one run; each part has a report of its own.
     let stems = output_stems(&args.out, &dataset, &ids)?;
-    let work = args.shard.share(ids.into_iter().zip(stems).collect());
-    let output = Output::new(args.common, "generating", work.len());
-    let suffix = args.shard.shard.map_or_else(String::new, Shard::suffix);
-    let begun = RunReport::begin(&args.out, &format!("generate{suffix}.json"), work.len())?;
+    let output = Output::new(args.common, "generating", ids.len());
+    let begun = RunReport::begin(&args.out, "generate.json", ids.len())?;
     let mut pairs = Vec::new();
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &doubts::notes(&dataset));
-    let mut complete = !work.is_empty() || args.shard.shard.is_some();
+    let mut complete = !ids.is_empty();
     let mut scale = Scale::Measured;
     let mut unit = Unit::Meters;
-    for (id, stem) in work {
+    for (id, stem) in ids.into_iter().zip(stems) {
         let id = PairId(id as u32);
         let name = dataset.index.pairs[id.0 as usize].name.clone();
         output.step(&name);
@@ -138,7 +131,6 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
             }
         }
     }
-    let problems = notes.for_part(args.shard);
     let report = Report {
         mean: mean(&pairs),
         convention: (if unit == Unit::Levels { COLOR_CONVENTION } else { convention(scale) }).into(),
@@ -152,20 +144,8 @@ pub(super) fn run(args: &GenerateArgs) -> VerbResult {
         pairs,
     };
     begun.finish(&report)?;
-    args.shard.finish(output, (Sharded::Generate, complete), problems, &report, || text(&report, &report.pairs))
-}
-
-/// The parts of a run as one.
-pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
-    let mut reports: Vec<Report<Box<RawValue>>> = parts.reports()?;
-    let rows: Vec<_> = reports.iter_mut().flat_map(|report| std::mem::take(&mut report.pairs)).collect();
-    let pairs = rows.iter().map(|row| serde_json::from_str(row.get())).collect::<Result<Vec<Pair>, _>>()?;
-    // A part without a pair does not know what its figures would mean.
-    let of = reports.into_iter().max_by_key(|report| report.mean.seconds.is_some());
-    let of = of.ok_or_else(|| anyhow::anyhow!("there are no parts to merge"))?;
-    let report = Report { mean: mean(&pairs), notes: parts.notes(), pairs: rows, ..of };
-    output.finish(&report, || text(&report, &pairs))?;
-    Ok(parts.complete() && !pairs.is_empty())
+    output.finish(&report, || text(&report))?;
+    Ok(complete)
 }
 
 /// Fills in the figures of a predicted color picture against the measured one.

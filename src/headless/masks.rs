@@ -5,7 +5,6 @@ mod propose;
 mod queue;
 mod train;
 
-pub(super) use propose::merge as merge_proposals;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 

@@ -10,8 +10,6 @@ use touch2touch_work::io::dataset::Dataset;
 #[derive(Debug)]
 pub(super) struct Notes {
     findings: Findings,
-    /// One by one.
-    problems: Vec<Problem>,
     /// Number of each kind in the data set itself, which was said when it was opened.
     said: Vec<usize>,
 }
@@ -21,22 +19,16 @@ impl Notes {
     pub(super) fn of(dataset: &Dataset) -> Self {
         let findings = problems(dataset);
         let said = findings.list().iter().map(|kind| kind.count).collect();
-        Self { said, findings, problems: dataset.problems.clone() }
+        Self { said, findings }
     }
 
     /// Takes notes; the first of each kind is said at once.
     pub(super) fn take(&mut self, output: &Output, notes: &[Problem]) {
-        self.problems.extend_from_slice(notes);
         for note in notes {
             if self.findings.add(note.clone()) {
                 output.note(&line(note));
             }
         }
-    }
-
-    /// The notes so far, one by one.
-    pub(super) fn problems(&self) -> &[Problem] {
-        &self.problems
     }
 
     /// All kinds of notes; how often there were more of one is said now.

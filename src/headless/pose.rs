@@ -10,7 +10,6 @@ use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
 use super::recipe::misgiving;
-use super::shards::{Parts, Sharded};
 use super::{Output, VerbResult};
 use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::ambiguity::ambiguity;
@@ -30,7 +29,7 @@ use touch2touch_work::tool::load_tool;
 
 use args::{Imprints, registration};
 pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
-use report::{Accepted, Figures, First, PoseParts, PoseRow, RankedTool, Report, summary, summary_text, text};
+use report::{Accepted, First, PoseRow, RankedTool, Report, summary, text};
 
 /// Word of `--tool` for trying all tools.
 const ANY: &str = "any";
@@ -43,8 +42,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
         Imprints::Predicted => &[ImprintSource::Predicted],
         Imprints::Both => &[ImprintSource::Measured, ImprintSource::Predicted],
     };
-    let work = args.shard.share(ids);
-    let output = Output::new(args.common, "aligning", work.len());
+    let output = Output::new(args.common, "aligning", ids.len());
     let models = args.model.models();
     let recipe = args.recipe(&dataset.rig)?;
     let mut tools: BTreeMap<String, Option<ToolModel>> = BTreeMap::new();
@@ -57,7 +55,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     let all_labels = Labels::of(&dataset);
     let mut complete = true;
     let open = TaskError::new("Pose", "the tool is not known yet");
-    for id in work {
+    for id in ids {
         let entry = &dataset.index.pairs[id];
         output.step(&entry.name);
         let sample = match dataset.load(PairId(id as u32)) {
@@ -129,25 +127,12 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
             }
         }
     }
-    complete &= !cases.is_empty() || args.shard.shard.is_some();
-    let problems = notes.for_part(args.shard);
+    complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let figures: Vec<Figures> = cases.iter().map(Figures::from).collect();
     let of = First { registration: args.registration.0[0].to_string(), imprint: imprints[0].key().to_owned() };
-    let report = Report { summary: summary(&figures, of), cases, notes };
-    args.shard.finish(output, (Sharded::Pose, complete), problems, &report, || text(&report))
-}
-
-/// The parts of a run as one.
-pub(super) fn merge(parts: &Parts, output: Output) -> VerbResult {
-    let reports: Vec<PoseParts> = parts.reports()?;
-    let of = reports.iter().map(|report| report.summary.of.clone()).next();
-    let of = of.ok_or_else(|| anyhow::anyhow!("there are no parts to merge"))?;
-    let cases: Vec<_> = reports.into_iter().flat_map(|report| report.cases).collect();
-    let figures = cases.iter().map(|case| serde_json::from_str(case.get())).collect::<Result<Vec<Figures>, _>>()?;
-    let report = Report { summary: summary(&figures, of), cases, notes: parts.notes() };
-    output.finish(&report, || summary_text(&report.summary))?;
-    Ok(parts.complete() && !report.cases.is_empty())
+    let report = Report { summary: summary(&cases, of), cases, notes };
+    output.finish(&report, || text(&report))?;
+    Ok(complete)
 }
 
 /// A pair as `pose` asks for it.

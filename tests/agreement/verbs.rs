@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{chain, compared, files, labels, posed, tables, watched};
-use super::{exchange, proposals, python, recipes, shards, stills};
+use super::{exchange, proposals, python, recipes, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -71,11 +71,6 @@ fn held(verb: &str) -> Option<Held> {
             super::the_most_uncertain_masks_are_in_one_order_in_both,
         ]),
         "masks train" => By(&[learned::TESTS[1]]),
-        "merge" => By(&[
-            shards::parts_of_a_run_are_merged_to_what_one_run_prints,
-            shards::masks_are_proposed_in_parts_as_at_once,
-            shards::an_evaluation_finds_what_its_parts_have_kept,
-        ]),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "training-data" => Not("only the training in Python reads it"),
         "doctor" => By(&[

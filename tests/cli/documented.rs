@@ -57,7 +57,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch cache", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
-    ("touch2touch merge", How::Run(&[], "", &[0])),
     // Without an engine on the machine it says so by its exit code.
     ("touch2touch runtime", How::Run(&[], "", &[0, 1])),
 ];
@@ -108,10 +107,6 @@ impl Stage {
         std::fs::create_dir(&robot).unwrap();
         let touch = dataset.gelslim_file(id).unwrap();
         std::fs::copy(&touch, robot.join(touch.file_name().unwrap())).unwrap();
-        for (part, share) in [("first", "1/2"), ("second", "2/2")] {
-            let done = run(&["pose", set, "--shard", share, "--json"], dir.path());
-            std::fs::write(dir.path().join(part), done.stdout).unwrap();
-        }
         let small_bundle = full_size_bundle(dir.path());
         Self { dir, name, small_bundle }
     }
@@ -127,8 +122,6 @@ impl Stage {
                 ("NAME", _) => self.name.clone(),
                 ("OTHER", _) => at("other"),
                 ("MASKS", _) => at("masks"),
-                ("FIRST", _) => at("first"),
-                ("SECOND", _) => at("second"),
                 ("TOOL.stl", _) => at("set/tools_stls/pattern_36.stl"),
                 ("DIR", "--out") => at(&format!("out {number}")),
                 ("DIR", "watch") => at("robot"),

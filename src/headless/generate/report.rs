@@ -1,6 +1,6 @@
 //! Answer of `generate`: the metrics of each prediction, their means, and the table.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
 use touch2touch_core::evaluation;
@@ -23,7 +23,7 @@ pub(super) const COLOR_CONVENTION: &str = "difference image of the color sensor 
     by footprint, contact and pose need depth and are left out";
 
 /// Metrics of one prediction. PSNR and SSIM are those of `convention`.
-#[derive(Debug, Default, Clone, Serialize, Deserialize)]
+#[derive(Debug, Default, Clone, Serialize)]
 pub(super) struct Pair {
     pub(super) name: String,
     pub(super) finger: Text,
@@ -52,7 +52,7 @@ pub(super) struct Pair {
     pub(super) kept: bool,
 }
 
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize)]
 pub(super) struct Mean {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
@@ -75,12 +75,12 @@ pub(super) struct Mean {
 }
 
 /// [`Unstretched`] metrics of the prediction that lay by.
-#[derive(Debug, Clone, Copy, Serialize, Deserialize)]
-#[serde(into = "StoredKeys", from = "StoredKeys")]
+#[derive(Debug, Clone, Copy, Serialize)]
+#[serde(into = "StoredKeys")]
 pub(super) struct Stored(pub(super) Unstretched);
 
 /// [`Stored`] under its keys.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize)]
 struct StoredKeys {
     vqvae_psnr_raw_db: Option<f64>,
     vqvae_ssim_raw: Option<f64>,
@@ -93,17 +93,9 @@ impl From<Stored> for StoredKeys {
     }
 }
 
-impl From<StoredKeys> for Stored {
-    fn from(of: StoredKeys) -> Self {
-        let StoredKeys { vqvae_psnr_raw_db, vqvae_ssim_raw, vqvae_psnr_line_db } = of;
-        Self(Unstretched { psnr_raw_db: vqvae_psnr_raw_db, ssim_raw: vqvae_ssim_raw, psnr_line_db: vqvae_psnr_line_db })
-    }
-}
-
 /// Means over the pictures that have them.
 fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretched> {
-    // Of a row that was read again, nothing is a figure like any other.
-    let all: Vec<Unstretched> = all.filter(|one| *one != Unstretched::default()).collect();
+    let all: Vec<Unstretched> = all.collect();
     (!all.is_empty()).then(|| Unstretched {
         psnr_raw_db: evaluation::mean(all.iter().filter_map(|u| u.psnr_raw_db)),
         ssim_raw: evaluation::mean(all.iter().filter_map(|u| u.ssim_raw)),
@@ -112,7 +104,7 @@ fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretche
 }
 
 /// Means of the figures of one part.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, Serialize)]
 pub(super) struct PartMean {
     pub(super) psnr_db: Option<f64>,
     pub(super) ssim: Option<f64>,
@@ -133,10 +125,10 @@ impl PartMean {
     }
 }
 
-/// The answer; of rows that were read again, their text.
-#[derive(Debug, Serialize, Deserialize)]
-pub(super) struct Report<Row = Pair> {
-    pub(super) pairs: Vec<Row>,
+/// The answer.
+#[derive(Debug, Serialize)]
+pub(super) struct Report {
+    pub(super) pairs: Vec<Pair>,
     pub(super) mean: Mean,
     pub(super) convention: String,
     pub(super) bundle: String,
@@ -183,7 +175,8 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
 }
 
 /// The report as a table of its pairs.
-pub(super) fn text<Row>(report: &Report<Row>, pairs: &[Pair]) -> String {
+pub(super) fn text(report: &Report) -> String {
+    let pairs = &report.pairs;
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
         "{:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}\n",

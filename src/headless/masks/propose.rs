@@ -5,13 +5,12 @@ use clap::Args;
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
-use super::super::shards::{Parts, ShardArg, Sharded};
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use touch2touch_core::dataset::{PairEntry, PairId};
 use touch2touch_core::pose::RegistrationChoice;
 use touch2touch_work::filter::Filter;
 use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::propose::{Batch, BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 /// Arguments of `masks propose`.
 #[derive(Debug, Args)]
@@ -49,8 +48,6 @@ pub(in super::super) struct ProposeArgs {
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
-    shard: ShardArg,
-    #[command(flatten)]
     common: Common,
 }
 
@@ -69,7 +66,6 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
         anyhow::bail!("no pair answers to \"{}\"; `touch2touch doctor` lists what the data set has", args.filter);
     }
     let pairs: Vec<PairId> = args.limit.spread(meant.len()).into_iter().map(|at| PairId(meant[at])).collect();
-    let pairs = args.shard.share(pairs);
     let output = Output::new(args.common, "proposing", pairs.len());
     let models = args.model.models();
     let setup = BatchSetup {
@@ -83,21 +79,11 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
         over_drawn: args.over_drawn,
         person: args.person.clone(),
     };
-    // A share of few pairs may have none.
-    let found = match setup.pairs.is_empty() && args.shard.shard.is_some() {
-        true => Batch { source: args.source, complete: true, ..Batch::default() },
-        false => propose_all(&dataset, &setup, &models, &output.job())?,
-    };
+    let found = propose_all(&dataset, &setup, &models, &output.job())?;
     for remark in &found.left_out {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));
     }
     let complete = found.complete && found.left_out.is_empty();
-    args.shard.finish(output, (Sharded::MasksPropose, complete), Vec::new(), &found, || found.text())
-}
-
-/// The parts of a run as one.
-pub(in super::super) fn merge(parts: &Parts, output: Output) -> VerbResult {
-    let found = Batch::joined(parts.reports()?).ok_or_else(|| anyhow::anyhow!("there are no parts to merge"))?;
     output.finish(&found, || found.text())?;
-    Ok(parts.complete())
+    Ok(complete)
 }

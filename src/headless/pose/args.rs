@@ -7,7 +7,6 @@ use strum::IntoEnumIterator as _;
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
-use super::super::shards::ShardArg;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
 use touch2touch_core::frames::PlanarPose;
@@ -53,8 +52,6 @@ pub(in crate::headless) struct PoseArgs {
     pub(super) pair: Option<String>,
     #[command(flatten)]
     pub(super) limit: LimitArgs,
-    #[command(flatten)]
-    pub(super) shard: ShardArg,
     /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's
     /// residual, weight and fate.
     #[arg(long)]

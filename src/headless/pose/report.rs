@@ -2,8 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use serde::{Deserialize, Serialize};
-use serde_json::value::RawValue;
+use serde::Serialize;
 
 use touch2touch_core::align::{AlignReport, Evidence};
 use touch2touch_core::ambiguity::Ambiguity;
@@ -121,53 +120,24 @@ pub(super) struct Summary {
 }
 
 /// The registration and the kind of imprint that a summary begins with.
-#[derive(Debug, Clone, Serialize, Deserialize)]
+#[derive(Debug, Clone, Serialize)]
 pub(super) struct First {
     #[serde(rename = "engine")]
     pub(super) registration: String,
     pub(super) imprint: String,
 }
 
-/// The answer; of rows that were read again, their text.
+/// The answer.
 #[derive(Debug, Serialize)]
-pub(super) struct Report<Row = PoseRow> {
-    pub(super) cases: Vec<Row>,
+pub(super) struct Report {
+    pub(super) cases: Vec<PoseRow>,
     pub(super) summary: Summary,
     /// Oddities of the files and of the numbers in them, by kind.
     pub(super) notes: Vec<Finding>,
 }
 
-/// A part of a run, as far as `merge` needs it.
-#[derive(Deserialize)]
-pub(super) struct PoseParts {
-    pub(super) cases: Vec<Box<RawValue>>,
-    pub(super) summary: PartSummary,
-}
-
-#[derive(Deserialize)]
-pub(super) struct PartSummary {
-    pub(super) of: First,
-}
-
-/// The figures of a row that go into a summary.
-#[derive(Debug, Deserialize)]
-pub(super) struct Figures {
-    #[serde(flatten)]
-    of: First,
-    truth_deg: Option<f64>,
-    error_deg: Option<f64>,
-    ms: f64,
-}
-
-impl From<&PoseRow> for Figures {
-    fn from(row: &PoseRow) -> Self {
-        let of = First { registration: row.registration.clone(), imprint: row.imprint.to_owned() };
-        Self { of, truth_deg: row.truth_deg, error_deg: row.error_deg, ms: row.ms }
-    }
-}
-
-fn metrics<'a>(cases: impl Iterator<Item = &'a Figures>) -> AngleMetrics {
-    let cases: Vec<&Figures> = cases.collect();
+fn metrics<'a>(cases: impl Iterator<Item = &'a PoseRow>) -> AngleMetrics {
+    let cases: Vec<&PoseRow> = cases.collect();
     // A case without truth has no error; one without a pose is a failure.
     let errors: Vec<f64> =
         cases.iter().filter(|c| c.truth_deg.is_some()).map(|c| c.error_deg.map_or(f64::NAN, f64::to_radians)).collect();
@@ -177,12 +147,12 @@ fn metrics<'a>(cases: impl Iterator<Item = &'a Figures>) -> AngleMetrics {
     AngleMetrics { angles: AngleSummary::from_errors(&errors), median_ms }
 }
 
-pub(super) fn summary(cases: &[Figures], first: First) -> Summary {
+pub(super) fn summary(cases: &[PoseRow], first: First) -> Summary {
     let of = |by: &str, imprint: &str| {
-        metrics(cases.iter().filter(|case| case.of.registration == by && case.of.imprint == imprint))
+        metrics(cases.iter().filter(|case| case.registration == by && case.imprint == imprint))
     };
     let mut registrations = BTreeMap::new();
-    for Figures { of: First { registration, imprint }, .. } in cases {
+    for PoseRow { registration, imprint, .. } in cases {
         let key = format!("{registration}/{imprint}");
         if !registrations.contains_key(&key) {
             let figures = of(registration, imprint);

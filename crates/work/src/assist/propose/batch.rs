@@ -55,20 +55,6 @@ pub struct Batch {
 }
 
 impl Batch {
-    /// Batches of other pairs of one setup, as one.
-    pub fn joined(batches: impl IntoIterator<Item = Self>) -> Option<Self> {
-        batches.into_iter().reduce(|mut all, one| {
-            all.changed.extend(one.changed);
-            all.left_out.extend(one.left_out);
-            all.masks += one.masks;
-            all.same += one.same;
-            all.judged += one.judged;
-            all.complete &= one.complete;
-            all.seconds += one.seconds;
-            all
-        })
-    }
-
     /// Summary in words.
     pub fn text(&self) -> String {
         let mut text = format!("{} proposed in {}", counted(self.masks, "mask"), counted(self.changed.len(), "pair"));
