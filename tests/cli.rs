@@ -314,19 +314,13 @@ fn the_results_table_is_printed_and_written() {
         for figures in row["groups"].as_array().unwrap() {
             assert_eq!((&figures["grasps"], &figures["images"]), (&Value::from(2), &Value::from(4)));
             assert_eq!(figures["psnr_db"].is_null(), upper, "the measured imprints are not compared with themselves");
-            for key in ["psnr_noise_free_db", "success_5", "tool_accuracy", "mask_iou"] {
+            for key in ["psnr_noise_free_db", "success_5", "mask_iou"] {
                 assert!(figures[key]["value"].is_number(), "{key} in {figures}");
             }
             assert_eq!(figures["frechet"].is_number(), !upper);
         }
     }
-    assert_eq!(rows[1]["groups"], {
-        let mut same = rows[2]["groups"].clone();
-        for (a, b) in same.as_array_mut().unwrap().iter_mut().zip(rows[1]["groups"].as_array().unwrap()) {
-            a["seconds"] = b["seconds"].clone();
-        }
-        same
-    });
+    assert_eq!(rows[1]["groups"], rows[2]["groups"]);
     assert_eq!(report["pairs"].as_array().unwrap().len(), 3);
 
     // By a feature extractor the distance is a FID, of the pictures that were asked for.
@@ -336,8 +330,7 @@ fn the_results_table_is_printed_and_written() {
         let notes = report["notes"].to_string();
         assert!(notes.contains("Small features (test)") && notes.contains("4 images are fewer than the 6"), "{notes}");
         let figures = &report["rows"][1]["groups"][0];
-        assert!(figures["frechet"].is_null() && figures["frechet_images"] == 4.0, "{figures}");
-        assert!(figures["psnr_each_db"]["value"].is_number() && figures["ssim_standard"]["value"].is_number());
+        assert!(figures["frechet"].is_null(), "{figures}");
         figures["fid"].as_f64().unwrap()
     };
     assert!(fid("lab") != fid("plain"));

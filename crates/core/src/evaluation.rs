@@ -23,7 +23,7 @@ use serde::{Deserialize, Serialize};
 use super::catalog;
 use super::dataset::{PairEntry, Split};
 use super::label::Doubt;
-use super::metrics::{AngleSummary, Unstretched};
+use super::metrics::AngleSummary;
 use super::sample::Scale;
 use super::verdict::Grade;
 
@@ -119,20 +119,9 @@ pub struct ImageScore {
     pub noise_free: Option<SquaredError>,
     /// With the range of the tool's predictions; of stretched pictures with 1.
     pub ssim: Option<f64>,
-    /// With the range 0.0225 m.
-    pub ssim_peak: Option<f64>,
-    /// With the range 0.0225 m, without the border: scikit-image's.
-    #[serde(default)]
-    pub ssim_standard: Option<f64>,
-    /// As `ssim`, against the simulator's imprint without camera noise.
-    pub ssim_noise_free: Option<f64>,
-    /// Figures of the pictures as they are, where the scale was assumed.
-    pub unstretched: Option<Unstretched>,
     /// Intersection over union of the contact mask with the simulator's true contact, 0..1.
     #[serde(default)]
     pub mask_iou: Option<f64>,
-    /// True where the classifier names the right tool; `None` without one, or for a tool it does not know.
-    pub tool_right: Option<bool>,
     /// Features of the imprint: the input of the classifier's last layer.
     #[serde(skip)]
     pub features: Vec<f32>,
@@ -162,8 +151,6 @@ pub struct GraspScore {
     /// Reliance that the pose deserves, without the truth; `None` without a pose.
     #[serde(default)]
     pub verdict: Option<Grade>,
-    /// Time to generate one image, seconds.
-    pub seconds: Option<f64>,
     /// Reasons to look at its masks, of the measured imprints.
     #[serde(default)]
     pub doubt: Doubt,
@@ -307,11 +294,6 @@ fn psnr(grasps: &[&GraspScore], of: impl Fn(&ImageScore) -> Option<SquaredError>
     db(PEAK_M, pooled)
 }
 
-/// PSNR of one image, peak 0.0225 m. Equal images have none.
-fn psnr_of(error: SquaredError) -> Option<f64> {
-    (error.pixels > 0 && error.sum > 0.0).then(|| 10.0 * (PEAK_M * PEAK_M * error.pixels as f64 / error.sum).log10())
-}
-
 fn angles(grasps: &[&GraspScore]) -> Option<AngleSummary> {
     let errors: Vec<f64> = grasps.iter().filter_map(|g| g.angle_error_rad).collect();
     (!errors.is_empty()).then(|| AngleSummary::from_errors(&errors))
@@ -359,13 +341,7 @@ mod tests {
 
     pub(super) fn grasp(tool: &str, group: Group, rms_m: f64, angle_deg: f64) -> GraspScore {
         let error = SquaredError { sum: rms_m * rms_m * 100.0, pixels: 100 };
-        let image = ImageScore {
-            error,
-            ssim: Some(0.5),
-            ssim_peak: Some(0.5),
-            tool_right: Some(angle_deg < 5.0),
-            ..ImageScore::default()
-        };
+        let image = ImageScore { error, ssim: Some(0.5), ..ImageScore::default() };
         GraspScore {
             pair: format!("{tool}/data_0"),
             tool: Some(tool.into()),
@@ -375,7 +351,6 @@ mod tests {
             angle_error_rad: Some(angle_deg.to_radians()),
             position_error_m: Some(1e-3),
             verdict: Some(Grade::of_angle_error(angle_deg.to_radians())),
-            seconds: Some(0.1),
             doubt: Doubt::default(),
             seed_spread_m: None,
         }
@@ -428,11 +403,9 @@ mod tests {
         // 2° in tool a, 20° in tool b (the failure is in no mean), success 100 % and 0 %.
         assert!((f.named("angle_deg").unwrap().value - 11.0).abs() < 1e-9);
         assert!((f.named("success_5").unwrap().value - 50.0).abs() < 1e-9);
-        assert!((f.named("tool_accuracy").unwrap().value - 50.0).abs() < 1e-9);
         let [low, high] = f.named("psnr_db").unwrap().interval.unwrap();
         assert!(low <= f.named("psnr_db").unwrap().value && f.named("psnr_db").unwrap().value <= high && low < high);
         assert_eq!(f.named("frechet"), None);
-        assert_eq!(f.named("seconds").map(|e| e.value), Some(0.1));
     }
 
     #[test]

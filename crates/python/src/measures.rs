@@ -1,4 +1,4 @@
-//! Measures of images under the lab's and the standard conventions.
+//! Measures of images under the lab's conventions.
 
 use numpy::{PyReadonlyArray2, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
@@ -22,31 +22,18 @@ pub(crate) fn psnr(
     Ok(found.db().unwrap_or(f64::INFINITY))
 }
 
-/// Structural similarity of two images (height, width), float32: 11 x 11 Gaussian window.
-///
-/// `convention`: "standard" (scikit-image's with Gaussian weights: without the border, `data_range` 0.0225 unless named) or
-/// "lab" (the whole map with zero padding; `data_range` is the prediction's own range unless named).
+/// Structural similarity of two images (height, width), float32, as the lab has it: 11 x 11 Gaussian window, zero padding,
+/// the mean of the whole map. `data_range`: the prediction's own range unless named.
 #[pyfunction]
-#[pyo3(signature = (prediction, truth, *, convention="standard", data_range=None))]
+#[pyo3(signature = (prediction, truth, *, data_range=None))]
 pub(crate) fn ssim(
     prediction: PyReadonlyArray2<'_, f32>,
     truth: PyReadonlyArray2<'_, f32>,
-    convention: &str,
     data_range: Option<f64>,
 ) -> PyResult<f64> {
     let (prediction, truth) = (image_of(&prediction, "prediction")?, image_of(&truth, "truth")?);
-    let named = data_range.map(SsimRange::Explicit);
-    match convention {
-        "standard" => {
-            let range = named.unwrap_or(SsimRange::Explicit(PEAK_M));
-            Ok(metrics::ssim(&prediction, &truth, range).map_err(refused)?.interior)
-        }
-        "lab" => {
-            let range = named.unwrap_or(SsimRange::OfPrediction);
-            Ok(metrics::ssim(&prediction, &truth, range).map_err(refused)?.mean)
-        }
-        other => Err(refused(format!("convention: there is no {other:?}; there are standard, lab"))),
-    }
+    let range = data_range.map_or(SsimRange::OfPrediction, SsimRange::Explicit);
+    Ok(metrics::ssim(&prediction, &truth, range).map_err(refused)?.mean)
 }
 
 /// Fréchet distance of two sets of features (N, D), float32: pytorch-fid's on the same features. With few vectors it is

@@ -96,8 +96,8 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         }
         let tip = "Words of the name, the tool or the note. tool:rod narrows to tools, note:edge to notes, has:note to pairs \
              with one; is:todo, is:in-progress, is:flagged, is:done and \
-             is:skip to review states; angle>5, verdict=wrong, psnr<20, ssim<0.8, rms>1, named<100 to scores (of the source chosen, \
-             or measured:angle>2) in °, dB, mm and %";
+             is:skip to review states; angle>5, verdict=wrong, psnr<20, ssim<0.8 to scores (of the source chosen, \
+             or measured:angle>2) in °, dB and %";
         response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
         let sort = cx.state.library.sort;
         let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());

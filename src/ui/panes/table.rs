@@ -78,8 +78,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 /// The columns that there is room for, each source's together: the most telling metrics of all sources first.
 fn columns(sources: &[SourceScores], width: f32) -> Vec<ScoreColumn<'_>> {
     let room = ((width - NAMES.iter().sum::<f32>() - 20.0) / NUMBER).max(1.0) as usize;
-    let metrics = Metric::iter().filter(|metric| *metric != Metric::Seconds);
-    let telling = metrics.flat_map(|metric| sources.iter().map(move |source| (source, metric)));
+    let telling = Metric::iter().flat_map(|metric| sources.iter().map(move |source| (source, metric)));
     let taken: Vec<ScoreColumn<'_>> = telling.filter(|(source, metric)| source.has(*metric)).take(room).collect();
     let of = |source: &SourceScores| {
         let name = source.name.clone();

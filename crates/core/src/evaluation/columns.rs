@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use serde::ser::{SerializeMap as _, Serializer};
 
-use super::{Estimate, GraspScore, Group, ImageScore, Row, angles, images, mean, psnr, psnr_of};
-use crate::metrics::{frechet_distance, frechet_extrapolated};
+use super::{Estimate, GraspScore, Group, Row, angles, images, mean, psnr};
+use crate::metrics::frechet_distance;
 use crate::sample::Scale;
 use crate::verdict::Grade;
 
@@ -51,12 +51,6 @@ pub(super) static COLUMNS: &[Column] = &[
         })
     },
     db(
-        "each dB",
-        "psnr_each_db",
-        "PSNR of each image, then the mean, as scikit-image has it with the data range 22.5 mm, decibels",
-        |tool| mean(measured(tool).filter_map(|i| psnr_of(i.error))),
-    ),
-    db(
         "clean dB",
         "psnr_noise_free_db",
         "PSNR against the simulator's imprint before camera noise, decibels",
@@ -68,36 +62,6 @@ pub(super) static COLUMNS: &[Column] = &[
             mean(images(tool).filter_map(|i| i.ssim))
         })
     },
-    db(
-        "raw dB",
-        "psnr_raw_db",
-        "PSNR of pictures as they are, in the assumed meters and not stretched to 0..1, decibels",
-        |tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_raw_db)),
-    ),
-    ssim("raw SSIM", "ssim_raw", "Structural similarity of pictures as they are", |tool| {
-        mean(images(tool).filter_map(|i| i.unstretched?.ssim_raw))
-    }),
-    db(
-        "line dB",
-        "psnr_line_db",
-        "PSNR of pictures after the straight line that fits best: the worth of the shape alone, decibels",
-        |tool| mean(images(tool).filter_map(|i| i.unstretched?.psnr_line_db)),
-    ),
-    ssim("SSIM 22.5", "ssim_peak", "Structural similarity with the range 22.5 mm", |tool| {
-        mean(images(tool).filter_map(|i| i.ssim_peak))
-    }),
-    ssim(
-        "SSIM std",
-        "ssim_standard",
-        "Structural similarity without the border, as scikit-image has it with Gaussian weights and the data range 22.5 mm",
-        |tool| mean(images(tool).filter_map(|i| i.ssim_standard)),
-    ),
-    ssim(
-        "clean SSIM",
-        "ssim_noise_free",
-        "SSIM against the simulator's imprint before camera noise, range of the tool's predictions",
-        |tool| mean(images(tool).filter_map(|i| i.ssim_noise_free)),
-    ),
     Column {
         heading: "FD",
         key: FRECHET,
@@ -106,27 +70,6 @@ pub(super) static COLUMNS: &[Column] = &[
         larger_is_better: false,
         in_paper: true,
         of: Of::Group(|grasps, measured| frechet_distance(&features(grasps), measured)),
-    },
-    Column {
-        heading: "FD ∞",
-        key: "frechet_extrapolated",
-        tip: "The same for infinitely many images: a straight line in one over their number, followed to 0",
-        decimals: 2,
-        larger_is_better: false,
-        in_paper: false,
-        of: Of::Group(|grasps, measured| frechet_extrapolated(&features(grasps), measured)),
-    },
-    Column {
-        heading: "FD N",
-        key: "frechet_images",
-        tip: "Number of images that the Fréchet distance is of, on each side",
-        decimals: 0,
-        larger_is_better: true,
-        in_paper: false,
-        of: Of::Group(|grasps, measured| {
-            let count = features(grasps).len().min(measured.len());
-            (count > 0).then_some(count as f64)
-        }),
     },
     Column {
         heading: "FID",
@@ -176,33 +119,11 @@ pub(super) static COLUMNS: &[Column] = &[
         "Share of grasps whose pose the verdict calls good, without the truth, percent",
         |tool| mean(tool.iter().filter_map(|g| g.verdict).map(|grade| if grade == Grade::Good { 100.0 } else { 0.0 })),
     ),
-    percent("tool %", "tool_accuracy", "Share of imprints whose tool the classifier names, percent", |tool| {
-        mean(images(tool).filter_map(|i| i.tool_right).map(|right| if right { 100.0 } else { 0.0 }))
-    }),
-    Column {
-        heading: "s/image",
-        key: "seconds",
-        tip: "Median time to generate an image, seconds",
-        decimals: 3,
-        larger_is_better: false,
-        in_paper: false,
-        of: Of::Group(|grasps, _| {
-            let mut seconds: Vec<f64> = grasps.iter().filter_map(|g| g.seconds).collect();
-            seconds.sort_by(f64::total_cmp);
-            let n = seconds.len();
-            (n > 0).then(|| 0.5 * (seconds[(n - 1) / 2] + seconds[n / 2]))
-        }),
-    },
 ];
 
 /// The features of the images that have some.
 fn features<'a>(grasps: &'a [&GraspScore]) -> Vec<&'a [f32]> {
     images(grasps).map(|i| i.features.as_slice()).filter(|f| !f.is_empty()).collect()
-}
-
-/// The images whose scale was measured.
-fn measured<'a>(tool: &'a [&GraspScore]) -> impl Iterator<Item = &'a ImageScore> {
-    tool.iter().filter(|grasp| grasp.scale == Scale::Measured).flat_map(|grasp| &grasp.images)
 }
 
 type OfTool = fn(&[&GraspScore]) -> Option<f64>;
@@ -268,20 +189,15 @@ pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
 }
 
 /// Notes on the meaning of the columns, a line each.
-pub const NOTES: [&str; 9] = [
+pub const NOTES: [&str; 6] = [
     "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
-    "each, SSIM std: the standard conventions, those of scikit-image with the data range 22.5 mm: PSNR of each image and \
-     then the mean, SSIM without the border; beside them the lab's",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
      imprints says how much that noise costs",
-    "raw, line: of pictures whose scale was assumed, as they are and after the straight line that fits best; PSNR itself \
-     stretches both pictures to 0..1, where no noise-free picture passes 20 dB",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
      cannot be compared with a published FID, nor between groups of different size",
     "FID: Fréchet distance in the features of an image network: published ones are of Inception",
     "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
     "place: of the grasps that have a pose; IoU: of the contact masks of both fingers, against the simulator's true contact",
-    "tool: share of imprints whose tool the classifier names",
 ];
 
 /// Conventions of PSNR and SSIM.
@@ -289,7 +205,7 @@ pub fn conventions(scale: Scale) -> &'static str {
     match scale {
         Scale::Measured => {
             "PSNR: squared error pooled over a tool's images, peak 22.5 mm; SSIM: 11 x 11 window, zero padding, range of \
-             the tool's predictions (the lab's conventions), and with the range 22.5 mm; against the measured imprint"
+             the tool's predictions (the lab's conventions); against the measured imprint"
         }
         Scale::Assumed => {
             "PSNR and SSIM: each image stretched to 0..1 on its own, peak and range 1, then the mean (the source lost \

@@ -7,7 +7,6 @@ use serde::{Deserialize, Serialize};
 use strum::IntoEnumIterator as _;
 
 use super::{GraspScore, mean, psnr};
-use crate::sample::Scale;
 use crate::verdict::Grade;
 
 /// A metric of a grasp: a row of [`ROWS`]. Lists, filters and pictures follow; the most telling first.
@@ -23,26 +22,16 @@ pub enum Metric {
     Verdict,
     /// Of the imprints against the measured ones, pooled over the fingers, dB.
     Psnr,
-    /// Mean over the fingers, range 0.0225 m (pictures without scale: both stretched to 0..1).
+    /// Mean over the fingers, range of the tool's predictions (pictures without scale: both stretched to 0..1).
     Ssim,
-    /// Root of the mean squared error, pooled over the fingers, meters.
-    Rms,
-    /// Share of the imprints whose tool the classifier names, 0..1.
-    Tool,
     /// As [`Metric::Psnr`] against the simulator's imprints without camera noise.
     PsnrNoiseFree,
-    /// SSIM with the lab's range: that of the tool's predictions.
-    SsimTool,
-    /// SSIM against these, range of the tool's predictions.
-    SsimNoiseFree,
     /// One minus the Dice of the mask drawn by hand and the mask model's, of the worse finger, 0..1.
     Disagreement,
     /// Share of the pixels whose probability of contact is near one half, of the worse finger, 0..1.
     Unsure,
     /// Distance between predictions with different seeds, meters.
     SeedSpread,
-    /// Time to generate one image, seconds.
-    Seconds,
 }
 
 /// A row of the table of metrics.
@@ -115,36 +104,9 @@ static ROWS: &[Row] = &[
         name: "SSIM",
         short: "SSIM",
         key: "ssim",
-        tip: "Structural similarity; range 22.5 mm, or both scaled to 0..1 where the scale is assumed",
-        // Stretched pictures have one range only.
-        of: |grasp| match grasp.scale {
-            Scale::Assumed => mean(grasp.images.iter().filter_map(|image| image.ssim)),
-            Scale::Measured => mean(grasp.images.iter().filter_map(|image| image.ssim_peak)),
-        },
+        tip: "Structural similarity; range of the tool's predictions (the lab's), or both scaled to 0..1 where the scale is assumed",
+        of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim)),
         ..PLAIN
-    },
-    Row {
-        metric: Metric::Rms,
-        name: "RMS error",
-        short: "RMS",
-        key: "rms",
-        tip: "Root mean square error of all fingers against the measured imprints, mm",
-        of: |grasp| {
-            let errors = grasp.images.iter().map(|image| image.error);
-            let (sum, pixels) = errors.fold((0.0, 0), |(sum, n), e| (sum + e.sum, n + e.pixels));
-            (grasp.scale == Scale::Measured && pixels > 0).then(|| (sum / pixels as f64).sqrt())
-        },
-        ..MM
-    },
-    Row {
-        metric: Metric::Tool,
-        name: "Tool named",
-        short: "tool",
-        key: "named",
-        tip: "Share of the imprints whose tool the classifier names, percent",
-        decimals: 0,
-        of: |grasp| mean(grasp.images.iter().filter_map(|i| i.tool_right).map(|right| f64::from(u8::from(right)))),
-        ..PERCENT
     },
     Row {
         metric: Metric::PsnrNoiseFree,
@@ -154,27 +116,6 @@ static ROWS: &[Row] = &[
         tip: "Against the simulator's imprint without camera noise, dB",
         of: |grasp| psnr(&[grasp], |image| image.noise_free),
         ..DB
-    },
-    Row {
-        metric: Metric::SsimTool,
-        name: "SSIM tool's range",
-        short: "SSIM t.",
-        key: "ssim-tool",
-        tip: "Structural similarity with the lab's range: that of the tool's predictions",
-        of: |grasp| {
-            let measured = grasp.scale == Scale::Measured;
-            mean(grasp.images.iter().filter_map(|image| image.ssim)).filter(|_| measured)
-        },
-        ..PLAIN
-    },
-    Row {
-        metric: Metric::SsimNoiseFree,
-        name: "SSIM noise-free",
-        short: "SSIM cl.",
-        key: "ssim-clean",
-        tip: "Against the simulator's imprint without camera noise; range of the tool's predictions",
-        of: |grasp| mean(grasp.images.iter().filter_map(|image| image.ssim_noise_free)),
-        ..PLAIN
     },
     Row {
         metric: Metric::Disagreement,
@@ -204,17 +145,6 @@ static ROWS: &[Row] = &[
         tip: "Standard deviation between kept predictions with different seeds, mean over the pixels, mm",
         of: |grasp| grasp.seed_spread_m,
         ..MM
-    },
-    Row {
-        metric: Metric::Seconds,
-        name: "Time",
-        short: "Time",
-        key: "time",
-        tip: "Time to generate one image, seconds",
-        unit: "s",
-        larger_is_better: false,
-        of: |grasp| grasp.seconds,
-        ..PLAIN
     },
 ];
 
@@ -353,7 +283,7 @@ mod tests {
         let passes = |word: &str, value: f64| Condition::parse(word).unwrap().passes(value);
         assert!(passes("angle>5", 0.1) && !passes("angle>5", 0.05) && passes("angle>5", f64::NAN));
         assert!(passes("psnr<20", 19.9) && !passes("psnr<20", 20.0) && passes("psnr<=20", 20.0));
-        assert!(passes("rms>0.5", 0.000_6) && passes("named<100%", 0.5) && !passes("angle<5", f64::NAN));
+        assert!(passes("spread>0.5", 0.000_6) && passes("unsure<100%", 0.5) && !passes("angle<5", f64::NAN));
         let [good, check, wrong] = Grade::iter().map(|grade| f64::from(grade as u8)).collect::<Vec<_>>()[..] else {
             panic!("three grades")
         };
@@ -380,6 +310,6 @@ mod tests {
         };
         assert_eq!(order(Metric::Angle, vec![0.0, 1.0, f64::NAN]), ["no pose", "57.3°", "0.0°"]);
         assert_eq!(order(Metric::Psnr, vec![30.0, 12.0]), ["12.0 dB", "30.0 dB"]);
-        assert_eq!(order(Metric::Rms, vec![0.001, 0.002]), ["2.00 mm", "1.00 mm"]);
+        assert_eq!(order(Metric::SeedSpread, vec![0.001, 0.002]), ["2.00 mm", "1.00 mm"]);
     }
 }

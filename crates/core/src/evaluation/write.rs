@@ -227,7 +227,7 @@ mod tests {
         let mut rows = paper_rows();
         rows[0].method = "odd \"name\" | with, signs".into();
         let text = text(&rows);
-        assert!(text.contains("Unseen tools") && text.contains("20.4") && !text.contains("tool %"), "{text}");
+        assert!(text.contains("Unseen tools") && text.contains("20.4") && !text.contains("IoU"), "{text}");
         let markdown = markdown(&rows);
         let lines: Vec<&str> = markdown.lines().collect();
         assert_eq!(lines.len(), 2 + rows.len());

@@ -1,23 +1,12 @@
 //! Distance of two sets of feature vectors, each taken for a sample of a normal distribution.
 
 use nalgebra::{DMatrix, DVector};
-use rand::SeedableRng as _;
-use rand::seq::index::sample;
-use rand_chacha::ChaCha8Rng;
 
 use crate::linear::eigen_symmetric;
 
-/// Fewest vectors of an extrapolation.
-pub(crate) const LEAST: usize = 16;
-/// Parts that are drawn of each size.
-const DRAWS: usize = 3;
-/// Seed of the parts.
-const PARTS_SEED: u64 = 1;
-
 /// The Fréchet distance of two sets of vectors: `|m1 - m2|² + tr(C1 + C2 - 2 (C1 C2)^½)`, with means `m` and unbiased
 /// covariances `C`. Behind published "FID" figures stand the features of an Inception network; with other features the
-/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only, or follow it to
-/// infinitely many, as the results table does.
+/// numbers are of another size. With few vectors it is biased upwards: compare sets of equal size only.
 ///
 /// `None` with fewer than two vectors on a side, vectors of different lengths or of none, or values that are not finite.
 ///
@@ -48,35 +37,6 @@ fn of_products(first: &[&[f32]], second: &[&[f32]], d: usize) -> f64 {
     ((m1 - m2).norm_squared() + traces - 2.0 * shared).max(0.0)
 }
 
-/// [`frechet_distance`] for infinitely many vectors: its bias falls with one over their number, so a straight line through
-/// the distances of parts of the sets is followed to where that is 0. Parts are drawn from a fixed seed. It may be below 0 by
-/// chance; `None` where the distance is, and below [`LEAST`] vectors.
-///
-/// # Source
-/// Chong and Forsyth, Effectively unbiased FID and Inception Score, 2020.
-pub(crate) fn frechet_extrapolated(first: &[&[f32]], second: &[&[f32]]) -> Option<f64> {
-    let most = first.len().min(second.len());
-    if most < LEAST {
-        return None;
-    }
-    let mut rng = ChaCha8Rng::seed_from_u64(PARTS_SEED);
-    let mut places = Vec::new();
-    for (quarters, draws) in [(1, DRAWS), (2, DRAWS), (3, DRAWS), (4, 1)] {
-        let count = most * quarters / 4;
-        for _ in 0..draws {
-            let mut part = |set: &[&[f32]]| -> Vec<usize> { sample(&mut rng, set.len(), count).into_vec() };
-            let (a, b) = (part(first), part(second));
-            let [a, b] = [(a, first), (b, second)].map(|(at, set)| at.into_iter().map(|i| set[i]).collect::<Vec<_>>());
-            places.push([1.0 / count as f64, frechet_distance(&a, &b)?]);
-        }
-    }
-    let mean = |at: usize| places.iter().map(|place| place[at]).sum::<f64>() / places.len() as f64;
-    let (x, y) = (mean(0), mean(1));
-    let (up, along) =
-        places.iter().fold((0.0, 0.0), |(up, along), [px, py]| (up + (px - x) * (py - y), along + (px - x).powi(2)));
-    Some(y - up / along * x)
-}
-
 /// Mean, and the vectors without it as columns.
 fn centered(set: &[&[f32]], d: usize) -> (DVector<f64>, DMatrix<f64>) {
     let mut vectors = DMatrix::from_fn(d, set.len(), |i, k| f64::from(set[k][i]));
@@ -103,7 +63,8 @@ fn root(c: DMatrix<f64>) -> Option<DMatrix<f64>> {
 
 #[cfg(test)]
 mod tests {
-    use rand::Rng as _;
+    use rand::{Rng as _, SeedableRng as _};
+    use rand_chacha::ChaCha8Rng;
 
     use super::*;
 
@@ -184,18 +145,6 @@ mod tests {
         let by_covariances = (m1 - m2).norm_squared() + c1.trace() + c2.trace() - 2.0 * shared;
         let found = frechet_distance(&a, &b).unwrap();
         assert!((found / by_covariances - 1.0).abs() < 1e-6, "{found} {by_covariances}");
-    }
-
-    #[test]
-    fn the_extrapolation_takes_the_bias_out() {
-        // Two samples of one distribution: the distance is 0.
-        let (a, b) = (set(400, 12, 7, 1.0, 0.0), set(400, 12, 8, 1.0, 0.0));
-        let [a, b] = [&a, &b].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let (few, all) = (frechet_distance(&a[..60], &b[..60]).unwrap(), frechet_distance(&a, &b).unwrap());
-        let beyond = frechet_extrapolated(&a, &b).unwrap();
-        assert!(few > 3.0 * all && beyond.abs() < 0.5 * all, "{few} {all} {beyond}");
-        assert_eq!(frechet_extrapolated(&a, &b), Some(beyond));
-        assert_eq!(frechet_extrapolated(&a[..LEAST - 1], &b), None);
     }
 
     #[test]

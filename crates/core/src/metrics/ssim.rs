@@ -1,4 +1,4 @@
-//! Structural similarity with a stated range, as the lab averages it and as the literature does.
+//! Structural similarity with a stated range, as the lab averages it.
 
 use crate::grid::Grid;
 
@@ -26,9 +26,6 @@ pub enum SsimRange {
 pub struct Ssim {
     /// The mean of the map, borders included: the lab's convention.
     pub mean: f64,
-    /// The mean of the map without the pixels whose window reaches over the border, as Wang et al. and scikit-image have
-    /// it; NaN for an image that is all border.
-    pub interior: f64,
     /// The score of each pixel, -1 to 1.
     pub map: Grid<f32>,
     /// Pixels that were not finite in one of the images and were counted as equal.
@@ -44,18 +41,9 @@ pub struct Ssim {
 /// (a flat prediction with [`SsimRange::OfPrediction`]).
 ///
 /// # Source
-/// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against independent
-/// implementations: `tests/data/ssim.json` for the whole map, `tests/data/scikit_image.json` for its interior.
+/// Wang et al. 2004; window, padding and borders as in the lab's `ssim.py` lines 9-210. Checked against an independent
+/// implementation: `tests/data/ssim.json`.
 pub fn ssim(prediction: &Grid<f32>, truth: &Grid<f32>, range: SsimRange) -> Result<Ssim, MetricError> {
-    let mut one = ssim_ranges(prediction, truth, &[range])?;
-    Ok(one.remove(0))
-}
-
-/// [`ssim`] for several ranges at hardly more than the cost of one.
-///
-/// # Errors
-/// As [`ssim`], if any of the ranges cannot be used.
-pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRange]) -> Result<Vec<Ssim>, MetricError> {
     check_size(prediction, truth)?;
     let valid = |p: f32, t: f32| p.is_finite() && t.is_finite();
     let pairs = || prediction.as_slice().iter().zip(truth.as_slice()).map(|(&p, &t)| (p, t));
@@ -64,17 +52,14 @@ pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRang
         return Err(MetricError::Nothing);
     }
     let offset = pairs().filter(|&(p, t)| valid(p, t)).map(|(_, t)| f64::from(t)).sum::<f64>() / used as f64;
-    let ranges: Vec<f64> = ranges
-        .iter()
-        .map(|range| match *range {
-            SsimRange::Explicit(range) => range,
-            SsimRange::OfPrediction => {
-                let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
-                values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
-            }
-        })
-        .collect();
-    if let Some(&range) = ranges.iter().find(|&&range| !(range > 0.0 && range.is_finite())) {
+    let range = match range {
+        SsimRange::Explicit(range) => range,
+        SsimRange::OfPrediction => {
+            let values = || pairs().filter(|&(p, t)| valid(p, t)).map(|(p, _)| f64::from(p));
+            values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+        }
+    };
+    if !(range > 0.0 && range.is_finite()) {
         return Err(MetricError::Range(range));
     }
 
@@ -92,26 +77,18 @@ pub fn ssim_ranges(prediction: &Grid<f32>, truth: &Grid<f32>, ranges: &[SsimRang
     let (pp, tt, pt) =
         (blur(&product(&p, &p), squared), blur(&product(&t, &t), squared), blur(&product(&p, &t), squared));
 
-    let of_range = |&range: &f64| {
-        let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
-        let scores: Vec<f64> = (0..p.len())
-            .map(|i| {
-                let (mp, mt) = (mean_p[i], mean_t[i]);
-                let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
-                let (mp, mt) = (mp + offset, mt + offset);
-                (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
-            })
-            .collect();
-        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
-        let border = WINDOW / 2;
-        let inner = |from: usize, length: usize| from >= border && from + border < length;
-        let kept = scores.iter().enumerate().filter(|(i, _)| inner(i % width, width) && inner(i / width, height));
-        let (sum, count) = kept.fold((0.0, 0), |(sum, count), (_, score)| (sum + score, count + 1));
-        let interior = if count == 0 { f64::NAN } else { sum / f64::from(count) };
-        let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
-        Ssim { mean, interior, map, ignored: p.len() - used }
-    };
-    Ok(ranges.iter().map(of_range).collect())
+    let (c1, c2) = ((K1 * range).powi(2), (K2 * range).powi(2));
+    let scores: Vec<f64> = (0..p.len())
+        .map(|i| {
+            let (mp, mt) = (mean_p[i], mean_t[i]);
+            let (vp, vt, cov) = ((pp[i] - mp * mp).max(0.0), (tt[i] - mt * mt).max(0.0), pt[i] - mp * mt);
+            let (mp, mt) = (mp + offset, mt + offset);
+            (2.0 * mp * mt + c1) * (2.0 * cov + c2) / ((mp * mp + mt * mt + c1) * (vp + vt + c2))
+        })
+        .collect();
+    let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+    let map = Grid::from_fn(width, height, |x, y| scores[y * width + x] as f32);
+    Ok(Ssim { mean, map, ignored: p.len() - used })
 }
 
 /// The normalized Gaussian of the window, one axis.
@@ -183,7 +160,7 @@ mod tests {
     }
 
     #[test]
-    fn the_interior_and_the_psnr_are_those_of_scikit_image() {
+    fn the_psnr_is_that_of_scikit_image() {
         let reference: Value = serde_json::from_str(include_str!("../../tests/data/scikit_image.json")).unwrap();
         for case in reference["images"].as_array().unwrap() {
             let grid = |key: &str| {
@@ -193,14 +170,9 @@ mod tests {
             };
             let value = |key: &str| case[key].as_f64().unwrap();
             let (prediction, truth, range) = (grid("prediction"), grid("truth"), value("range"));
-            let found = ssim(&prediction, &truth, SsimRange::Explicit(range)).unwrap();
-            assert!((found.interior - value("ssim")).abs() < 1e-6, "{} for {}", found.interior, value("ssim"));
             let db = super::super::psnr(&prediction, &truth, range).unwrap().db().unwrap();
             assert!((db - value("psnr")).abs() < 1e-6, "{db} for {}", value("psnr"));
         }
-        let (small, _) = textured(0.0);
-        let border = Grid::from_fn(10, 10, |x, y| small[(x, y)]);
-        assert!(ssim(&border, &border, SsimRange::Explicit(1.0)).unwrap().interior.is_nan());
     }
 
     #[test]

@@ -260,7 +260,6 @@ mod tests {
             position_error_m: None,
             angle_error_rad: angle_deg.map(f64::to_radians),
             verdict: None,
-            seconds: None,
             doubt: Doubt { unsure, disagreement },
             seed_spread_m: None,
         }

@@ -71,11 +71,6 @@ impl ToolClassifier {
         self.engine
     }
 
-    /// The place of a tool in the list of classes; `None` for one that was not among those trained on.
-    pub fn class_of(&self, tool: &str) -> Option<usize> {
-        self.spec.output.classes.iter().position(|name| name == tool)
-    }
-
     /// Says of each imprint (meters, raw orientation, any size) which tool made it.
     ///
     /// Pixels without measurement (NaN) are given to the graph as 0 m.

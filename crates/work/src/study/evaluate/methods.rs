@@ -60,8 +60,6 @@ pub(super) struct Made {
     pub(super) pictures: PerPad<DepthMap>,
     /// A picture in the orientation and size of its file, where that is all there is.
     pub(super) tile: Option<Grid<f32>>,
-    /// Time per image, seconds.
-    pub(super) seconds: Option<f64>,
 }
 
 /// Everything that runs.
@@ -227,7 +225,7 @@ impl Models {
             {
                 notes.push(format!(
                     "{}: predicts a color picture; PSNR and SSIM are of the difference image on the 0..255 scale, peak \
-                     and range 255; no angle, tool or Fréchet distance, which need depth",
+                     and range 255; no angle or Fréchet distance, which need depth",
                     method.name
                 ));
             }
@@ -305,14 +303,14 @@ impl Method {
 
 fn measured(case: &LoadedPair) -> Made {
     let imprints = imprint::measured(&case.sample);
-    Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None, seconds: None }
+    Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: None }
 }
 
 fn stored(case: &LoadedPair) -> Result<Made, String> {
     let tile = case.lab.clone().ok_or("no stored prediction (NAME_vqvae.png) lies by this picture")?;
     let mut imprints = PerPad::default();
     imprints[PadId::new(0)] = Some(imprint_from_tile(&tile, &case.sample.rig));
-    Ok(Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: Some(tile), seconds: None })
+    Ok(Made { imprints, colors: PerPad::default(), pictures: PerPad::default(), tile: Some(tile) })
 }
 
 impl GeneratorMethod {
@@ -331,7 +329,6 @@ impl GeneratorMethod {
                     colors: PerPad::default(),
                     pictures: PerPad::default(),
                     tile: None,
-                    seconds: None,
                 })
             })
             .collect();
@@ -342,20 +339,17 @@ impl GeneratorMethod {
         for (at, finger, prediction) in each {
             let sample = &cases[at].sample;
             let picture = prediction.and_then(|prediction| {
-                let seconds = prediction.seconds;
                 let measured = sample.pad(finger).and_then(|t| t.color()).map_or([0, 0], |c| c.difference.size());
                 if let Some(color) = imprint::color(&prediction, measured)? {
-                    return Ok((seconds, None, Some(color), None));
+                    return Ok((None, Some(color), None));
                 }
                 let tile = cases[at].tile.as_ref().map(Grid::size);
                 let picture = tile.map(|size| imprint::picture_of(&prediction, shift, sample, finger, size));
                 let depth = imprint::imprint_of(&prediction, shift, sample, finger)?;
-                Ok((seconds, Some(depth), None, picture.transpose()?))
+                Ok((Some(depth), None, picture.transpose()?))
             });
             match (picture, &mut made[at]) {
-                (Ok((seconds, depth, color, picture)), Ok(made)) => {
-                    // The images of one call took as long each; kept ones took what they took when they were made.
-                    made.seconds = Some(made.seconds.map_or(seconds, |first| 0.5 * (first + seconds)));
+                (Ok((depth, color, picture)), Ok(made)) => {
                     (made.imprints[finger], made.colors[finger], made.pictures[finger]) = (depth, color, picture);
                 }
                 (Err(err), slot) => *slot = Err(err.why),

@@ -13,10 +13,10 @@ use super::{Setup, Skipped, ToolWork, apart};
 use crate::compare::as_tile;
 use crate::error::TaskError;
 use crate::feel::{Felt, Touch};
-use crate::infer::classifier::{ToolClassifier, Verdict};
+use crate::infer::classifier::ToolClassifier;
 use crate::infer::features::FeatureExtractor;
 use crate::io::caught::caught;
-use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, assumed_meters};
+use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::PairLabels;
 use crate::models;
@@ -29,7 +29,7 @@ use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squar
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::label::{Doubt, iou};
 use touch2touch_core::manual::PoseDifference;
-use touch2touch_core::metrics::{self, LEVELS, SsimRange, Unstretched, planes, ssim_ranges, unit_range};
+use touch2touch_core::metrics::{LEVELS, SsimRange, planes, ssim, unit_range};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::{Sample, Scale};
@@ -43,11 +43,9 @@ struct Image {
     /// `None` for the measured imprint itself, which is not compared with itself.
     truth: Option<Grid<f32>>,
     noise_free: Option<Grid<f32>>,
-    unstretched: Option<Unstretched>,
     mask_iou: Option<f64>,
-    verdict: Option<Verdict>,
-    /// Features by an extractor, where one was named.
-    features: Option<Vec<f32>>,
+    /// Features, by the extractor where one was named, else by the tool classifier.
+    features: Vec<f32>,
 }
 
 /// A grasp that waits for its image figures.
@@ -78,23 +76,24 @@ fn otherwise(felt: &Felt) -> Vec<(String, usize)> {
     otherwise
 }
 
-/// Has the classifier name the tool of each image.
-fn name_tools(classifier: Option<&mut ToolClassifier>, images: &mut [Image]) -> Result<(), String> {
-    let Some(classifier) = classifier else { return Ok(()) };
+/// Has the extractor describe each image, where one was named, else the tool classifier.
+fn describe(
+    extractor: Option<&mut FeatureExtractor>,
+    classifier: Option<&mut ToolClassifier>,
+    images: &mut [Image],
+) -> Result<(), String> {
     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-    let verdicts = guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string()));
-    let verdicts = verdicts.map_err(|why| format!("tool classifier: {why}"))?;
-    images.iter_mut().zip(verdicts).for_each(|(image, verdict)| image.verdict = Some(verdict));
-    Ok(())
-}
-
-/// Has the extractor describe each image, where one was named.
-fn describe(extractor: Option<&mut FeatureExtractor>, images: &mut [Image]) -> Result<(), String> {
-    let Some(extractor) = extractor else { return Ok(()) };
-    let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-    let found = guarded(|| extractor.features(&pictures).map_err(|err| err.to_string()));
-    let found = found.map_err(|why| format!("feature extractor: {why}"))?;
-    images.iter_mut().zip(found).for_each(|(image, features)| image.features = Some(features));
+    let found = match (extractor, classifier) {
+        (Some(extractor), _) => guarded(|| extractor.features(&pictures).map_err(|err| err.to_string()))
+            .map_err(|why| format!("feature extractor: {why}"))?,
+        (None, Some(classifier)) => guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string()))
+            .map_err(|why| format!("tool classifier: {why}"))?
+            .into_iter()
+            .map(|verdict| verdict.features)
+            .collect(),
+        (None, None) => return Ok(()),
+    };
+    images.iter_mut().zip(found).for_each(|(image, features)| image.features = features);
     Ok(())
 }
 
@@ -128,7 +127,6 @@ pub(super) struct Tool<'a> {
     /// True where its CAD model could not be used: figures that are had without it are not kept.
     broken: bool,
     model: Option<ToolModel>,
-    class: Option<usize>,
     pending: BTreeMap<usize, Vec<Pending>>,
 }
 
@@ -145,7 +143,7 @@ impl<'a> Tool<'a> {
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
         let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
-        Self { dataset, book, pattern, broken, model, class: None, pending: BTreeMap::new() }
+        Self { dataset, book, pattern, broken, model, pending: BTreeMap::new() }
     }
 
     /// Takes some of its grasps through every method that they are not known by. `say` is told which.
@@ -160,7 +158,6 @@ impl<'a> Tool<'a> {
     ) {
         let common = models.common().clone();
         let Models { methods, masks: by_models, classifier, extractor, .. } = models;
-        self.class = classifier.as_ref().and_then(|c| c.class_of(self.pattern.as_deref()?));
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
@@ -227,12 +224,10 @@ impl<'a> Tool<'a> {
                 for image in &mut images {
                     image.mask_iou = iou.get(PadId::new(image.finger)).copied();
                 }
-                let classifier = classifier.as_mut().filter(|_| case.sample.scale == Scale::Measured);
-                if let Err(why) = name_tools(classifier.filter(|_| made.colors.is_empty()), &mut images) {
-                    skip(case, why);
-                }
-                let extractor = extractor.as_mut().filter(|_| case.sample.scale == Scale::Measured);
-                if let Err(why) = describe(extractor.filter(|_| made.colors.is_empty()), &mut images) {
+                if case.sample.scale == Scale::Measured
+                    && made.colors.is_empty()
+                    && let Err(why) = describe(extractor.as_mut(), classifier.as_mut(), &mut images)
+                {
                     skip(case, why);
                 }
                 let score = GraspScore {
@@ -245,7 +240,6 @@ impl<'a> Tool<'a> {
                     angle_error_rad: judged.angle_error_rad,
                     position_error_m: judged.position_error_m,
                     verdict: judged.verdict,
-                    seconds: made.seconds,
                     doubt,
                     seed_spread_m: None,
                 };
@@ -310,8 +304,7 @@ impl<'a> Tool<'a> {
                 known.into_iter().partition(|(_, entry)| again.is_none() || entry.is_of_range(range));
             // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
             let mut fresh = again.as_mut().map_or_else(Vec::new, |again| redone(stale, range, at, again));
-            let class = self.class;
-            let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, class, range)).collect();
+            let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, range)).collect();
             for one in done {
                 match one {
                     Ok((one, true)) => kept.push(one),
@@ -410,11 +403,10 @@ fn redone(stale: Vec<(PairId, Entry)>, range: f64, at: usize, again: MakeAgain<'
         .filter(|(_, entry, images)| entry.score.images.len() == images.len())
         .collect();
     let anew = |(id, mut entry, images): (PairId, Entry, Vec<Image>)| {
-        let found =
-            guarded(|| Ok(images.into_iter().map(|i| finished(i, None, ranges(range, false), false)).collect()));
+        let found = guarded(|| Ok(images.into_iter().map(|i| finished(i, range)).collect()));
         let found: Vec<ImageScore> = found.ok()?;
         for (known, new) in entry.score.images.iter_mut().zip(found) {
-            (known.ssim, known.ssim_noise_free) = (new.ssim, new.ssim_noise_free);
+            known.ssim = new.ssim;
         }
         entry.range = range;
         Some((id, entry))
@@ -422,18 +414,15 @@ fn redone(stale: Vec<(PairId, Entry)>, range: f64, at: usize, again: MakeAgain<'
     matched.into_par_iter().filter_map(anew).collect()
 }
 
-/// The ranges of the SSIM: the lab's, and the fixed one.
-fn ranges(range: f64, assumed: bool) -> [SsimRange; 2] {
-    if assumed { [SsimRange::Explicit(1.0); 2] } else { [SsimRange::Explicit(range), SsimRange::Explicit(PEAK_M)] }
-}
-
 /// A grasp with its image figures, and whether it is only for this table; else its pair and what failed.
-fn ended(pending: Pending, class: Option<usize>, range: f64) -> Result<((PairId, Entry), bool), (String, String)> {
+fn ended(pending: Pending, range: f64) -> Result<((PairId, Entry), bool), (String, String)> {
     let Pending { id, mut entry, images, failed } = pending;
     let assumed = entry.score.scale == Scale::Assumed;
     entry.spans = images.iter().map(|image| span(&image.prediction)).collect();
     entry.range = range;
-    let scored = || Ok(images.into_iter().map(|i| finished(i, class, ranges(range, assumed), assumed)).collect());
+    // Stretched pictures have one range only.
+    let range = if assumed { 1.0 } else { range };
+    let scored = || Ok(images.into_iter().map(|i| finished(i, range)).collect());
     match guarded(scored) {
         Ok(images) => {
             entry.score.images = images;
@@ -452,16 +441,7 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
             let truth = Some(levels(&case.sample.pad(finger)?.color()?.difference));
             let prediction = levels(color);
             let finger = finger.index();
-            return Some(Image {
-                finger,
-                prediction,
-                truth,
-                noise_free: None,
-                unstretched: None,
-                mask_iou: None,
-                verdict: None,
-                features: None,
-            });
+            return Some(Image { finger, prediction, truth, noise_free: None, mask_iou: None, features: Vec::new() });
         }
         let bubble = case.sample.pad(finger)?.depth()?;
         if case.sample.scale == Scale::Assumed {
@@ -474,34 +454,20 @@ fn images(case: &LoadedPair, made: &Made, setup: &Setup, upper: bool) -> Vec<Ima
                 }
                 (None, None) => return None,
             };
-            let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
-            let raw = (in_assumed_meters(&prediction, made), assumed_meters(tile));
-            let unstretched = metrics::unstretched(&raw.0, &raw.1, hi - lo).ok();
             let (prediction, truth) = (unit_range(&prediction), unit_range(tile));
             return Some(Image {
                 finger: finger.index(),
                 prediction,
                 truth: Some(truth),
                 noise_free: None,
-                unstretched,
                 mask_iou: None,
-                verdict: None,
-                features: None,
+                features: Vec::new(),
             });
         }
         let prediction = made.imprints[finger].clone()?;
         let truth = (!upper).then(|| bubble.imprint.clone());
         let noise_free = bubble.truth.as_ref().map(|t| t.imprint.clone());
-        Some(Image {
-            finger: finger.index(),
-            prediction,
-            truth,
-            noise_free,
-            unstretched: None,
-            mask_iou: None,
-            verdict: None,
-            features: None,
-        })
+        Some(Image { finger: finger.index(), prediction, truth, noise_free, mask_iou: None, features: Vec::new() })
     };
     let meant = |pad: &PadId| setup.finger.is_none_or(|only| only == *pad) && case.sample.pad(*pad).is_some();
     case.sample.rig.pads().filter(meant).filter_map(image).collect()
@@ -512,11 +478,6 @@ fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     caught(work).unwrap_or_else(|message| {
         Err(format!("an internal error, which is a bug: {message}; please report it with this pair"))
     })
-}
-
-/// Prediction of a method in the assumed meters: stored predictions are gray levels.
-fn in_assumed_meters(prediction: &Grid<f32>, made: &Made) -> Grid<f32> {
-    if made.tile.is_some() { assumed_meters(prediction) } else { prediction.clone() }
 }
 
 /// Least and largest value of an image; `None` without one that is finite.
@@ -539,22 +500,15 @@ fn width(spans: impl Iterator<Item = [f32; 2]>) -> f64 {
     f64::from(high) - f64::from(low)
 }
 
-fn finished(image: Image, class: Option<usize>, ranges: [SsimRange; 2], assumed: bool) -> ImageScore {
-    let Image { finger, prediction, truth, noise_free, unstretched, mask_iou, verdict, features } = image;
-    let ssim = truth.as_ref().and_then(|truth| ssim_ranges(&prediction, truth, &ranges).ok());
-    let of = |at: usize| ssim.as_ref().map(|found| found[at].mean);
-    let clean = noise_free.as_ref().and_then(|clean| ssim_ranges(&prediction, clean, &ranges[..1]).ok());
+fn finished(image: Image, range: f64) -> ImageScore {
+    let Image { finger, prediction, truth, noise_free, mask_iou, features } = image;
+    let similar = |truth| ssim(&prediction, truth, SsimRange::Explicit(range)).ok().map(|found| found.mean);
     ImageScore {
         finger,
+        ssim: truth.as_ref().and_then(similar),
         error: truth.and_then(|truth| squared_error(&prediction, &truth)).unwrap_or_default(),
         noise_free: noise_free.and_then(|clean| squared_error(&prediction, &clean)),
-        ssim: of(0),
-        ssim_noise_free: clean.map(|found| found[0].mean),
-        ssim_peak: of(1).filter(|_| !assumed),
-        ssim_standard: ssim.as_ref().map(|found| found[1].interior).filter(|v| !assumed && v.is_finite()),
         mask_iou,
-        unstretched,
-        tool_right: verdict.as_ref().zip(class).map(|(v, class)| v.class == class),
-        features: features.or(verdict.map(|v| v.features)).unwrap_or_default(),
+        features,
     }
 }
