@@ -279,7 +279,7 @@ def conditions_table(found):
         rows = []
         for condition, label in CONDITION_WORDS.items():
             figures = group_of(next(r for r in found[condition]["rows"] if not r["upper_bound"]), group)
-            rows.append([label, *(number(figures.get(c[1]), c[2]) for c in columns)])
+            rows.append([label, *(number(figures.get(c[1]), c[2], False) for c in columns)])
         text += [f"**{words}**", markdown(["fault of the pairs", *(c[0] for c in columns)], rows)]
     return "\n\n".join(text)
 
