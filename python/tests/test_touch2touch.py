@@ -354,7 +354,7 @@ def test_the_numbers_are_the_verbs(demo):
     for words, recipe in [
         (("--imprint", "measured"), t2t.Recipe()),
         (("--imprint", "predicted", "--seed", "11"), t2t.Recipe("predicted", seed=11)),
-        (("--imprint", "measured", "--mask", "threshold", "--engine", "gicp:gate=1.5"), t2t.Recipe(mask="threshold", engine="gicp:gate=1.5")),
+        (("--imprint", "measured", "--mask", "threshold", "--engine", "distance_field:gate=1.5"), t2t.Recipe(mask="threshold", engine="distance_field:gate=1.5")),
     ]:
         said = verb("pose", "demo", "--limit", "4", "--no-cache", *words)
         for case in said["cases"]:

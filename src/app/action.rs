@@ -270,7 +270,7 @@ macro_rules! actions {
         Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [],
             state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
         NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [],
-            _ => does(prefer(|s| s.registration = next_of(&s.registration.by).into()));
+            _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
         LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)],
             _ => does(prefer(|s| s.range.locked ^= true));
@@ -445,7 +445,7 @@ impl Action {
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",
             Self::TryTools => "which tool wrong cad model identify rank recognize",
-            Self::NextPoseEngine => "icp gicp register method algorithm",
+            Self::NextPoseEngine => "icp register method algorithm",
             Self::PoseTool => "hand gizmo drag manual move",
             Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",

@@ -15,7 +15,7 @@ pub mod versus;
 
 pub use touch2touch_core::bits::Bits;
 pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
-pub use touch2touch_core::pose::{Registration, RegistrationChoice};
+pub use touch2touch_core::pose::Registration;
 pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_work::labels::{ImprintSource, Revision};
 pub use touch2touch_work::mask::MaskRecipe;

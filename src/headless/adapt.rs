@@ -11,7 +11,7 @@ use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 use touch2touch_work::labels::ImprintSource;
 
@@ -49,8 +49,8 @@ pub(super) struct AdaptArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles, where tools and cameras are known.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]

@@ -12,7 +12,7 @@ use serde::Serialize;
 use strum::IntoEnumIterator;
 
 use super::Common;
-use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::pose::Registration;
 use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_work::io::atomic;
@@ -136,15 +136,15 @@ where
 pub(super) struct RegistrationParser;
 
 impl TypedValueParser for RegistrationParser {
-    type Value = RegistrationChoice;
+    type Value = Registration;
 
     fn parse_ref(
         &self,
         cmd: &clap::Command,
         arg: Option<&clap::Arg>,
         value: &std::ffi::OsStr,
-    ) -> Result<RegistrationChoice, clap::Error> {
-        let read: fn(&str) -> Result<RegistrationChoice, String> = str::parse;
+    ) -> Result<Registration, clap::Error> {
+        let read: fn(&str) -> Result<Registration, String> = str::parse;
         read.parse_ref(cmd, arg, value)
     }
 

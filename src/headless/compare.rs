@@ -15,7 +15,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::manual::PoseDifference;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Text;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_work::compare::{Comparison, Depicted, between};
@@ -58,8 +58,8 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     tool: ToolArgs,
     /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]

@@ -11,7 +11,7 @@ use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::evaluate::{self, Evaluation, Report, Setup, evaluate, export, rows};
 use touch2touch_work::infer::bundle::{Bundle, Found, Origin, find_all};
 use touch2touch_work::infer::features::Preparation;
@@ -42,8 +42,8 @@ pub(super) struct EvaluateArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]

@@ -13,7 +13,7 @@ use super::notes::Notes;
 use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::findings::Finding;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::{Touch, feel};
 use touch2touch_work::figure::note;
@@ -42,8 +42,8 @@ pub(super) struct ExportArgs {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]

@@ -16,7 +16,7 @@ use super::{Common, Output, VerbResult};
 use crate::spatial;
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
 use touch2touch_work::depict::{Compared, apart};
@@ -71,8 +71,8 @@ pub(super) struct FigureArgs {
     #[arg(long, default_value = "measured")]
     b: Subject,
     /// The registration of poses in 3D.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]

@@ -16,7 +16,7 @@ use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::export::{Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
 use touch2touch_work::io::exchange::{ExportReport, Format};
 use touch2touch_work::labels::{ImprintSource, Labels};
@@ -127,7 +127,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     };
     let models = args.model.models();
     let automatic_too = args.pairs == Which::All && !args.dry_run;
-    let registration = RegistrationChoice::default();
+    let registration = Registration::default();
     let recipe = args.model.posed(ImprintSource::Measured, &dataset.rig, &args.mask, registration);
     let recipe = if automatic_too { recipe? } else { Recipe::default() };
     let labels = Labels::of(&dataset);

@@ -15,7 +15,7 @@ use touch2touch_core::align::{AlignReport, Ask};
 use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::pose::{Registration, ToolModel};
 use touch2touch_work::doubts;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::{Touch, feel};
@@ -159,7 +159,7 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
         let left_open = |f| ambiguity(&sample.pad(f)?.color()?.difference);
         sample.rig.pads().map(left_open).collect()
     });
-    let one = |&by: &RegistrationChoice| {
+    let one = |&by: &Registration| {
         let ranked = match touch.tool {
             Ok(_) => None,
             Err(_) => Some(felt.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::contact_mask::MaskArgs;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::Spacing;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
@@ -86,7 +86,7 @@ impl ModelArgs {
         imprint: ImprintSource,
         rig: &Rig,
         mask: &MaskArgs,
-        registration: RegistrationChoice,
+        registration: Registration,
     ) -> anyhow::Result<Recipe> {
         let choice = mask.choice();
         let mask_model = self.mask_model(choice.source, rig)?;
@@ -105,7 +105,7 @@ pub(super) fn common(
     shift: ShiftMode,
     mask: &MaskArgs,
     mask_model: Option<Model>,
-    registration: RegistrationChoice,
+    registration: Registration,
     engine: RuntimeArg,
 ) -> Recipe {
     let (mask, hand) = (mask.choice(), !mask.no_hand);

@@ -11,7 +11,7 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use crate::spatial;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::error::TaskError;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
@@ -50,8 +50,8 @@ pub(super) struct StillArgs {
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
     /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]

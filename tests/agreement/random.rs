@@ -24,7 +24,7 @@ use touch2touch::app::library::Place;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::pose::Registration;
 use touch2touch_work::io::npz;
 use touch2touch_work::io::pt::Values;
 use touch2touch_work::labels::ImprintSource;
@@ -68,12 +68,8 @@ impl Draws {
         let recipe = self.recipe();
         let mut mask = recipe.mask;
         (mask.threshold_m, mask.top_percent) = (self.one(0.002..0.007f32), self.one(4.0..20.0f32));
-        let by = recipe.registration.by;
-        let slow = matches!(
-            by,
-            Registration::Certified | Registration::JointCertified | Registration::LabIcp | Registration::Gicp
-        );
-        let registration = if slow { RegistrationChoice::default() } else { recipe.registration };
+        let slow = recipe.registration == Registration::LabIcp;
+        let registration = if slow { Registration::default() } else { recipe.registration };
         Recipe { mask, registration, ..recipe }
     }
 }

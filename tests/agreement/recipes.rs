@@ -17,7 +17,7 @@ use touch2touch::app::state::Lookup;
 use touch2touch::app::{export, results};
 use touch2touch::headless::recipe_of;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
-use touch2touch_core::pose::{Registration, RegistrationChoice, Rejection};
+use touch2touch_core::pose::{Gate, Registration};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_core::rig::Rig;
 use touch2touch_work::bundles;
@@ -64,14 +64,11 @@ fn mask() -> impl Strategy<Value = MaskChoice> {
     )
 }
 
-fn registration() -> impl Strategy<Value = RegistrationChoice> {
-    let rejection = prop_oneof![
-        Just(Rejection::Own),
-        (0.01..50.0f64).prop_map(|mm| Rejection::gate(mm / 1e3).unwrap()),
-        (0.0..0.9f64).prop_map(|share| Rejection::trim(share).unwrap()),
-    ];
-    let by = proptest::sample::select(Registration::iter().collect::<Vec<_>>());
-    (by, rejection).prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or(by.into()))
+fn registration() -> impl Strategy<Value = Registration> {
+    prop_oneof![
+        proptest::sample::select(Registration::iter().collect::<Vec<_>>()),
+        (0.01..50.0f64).prop_map(|mm| Registration::DistanceField(Some(Gate::new(mm / 1e3).unwrap()))),
+    ]
 }
 
 pub(super) fn recipe() -> impl Strategy<Value = Recipe> {
@@ -238,9 +235,9 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
 #[test]
 fn ids_stay_what_they_are() {
     let ids = |recipe: &Recipe| Stage::iter().map(|stage| recipe.id(stage).to_string()).collect::<Vec<_>>();
-    let by_mask = Recipe { registration: Registration::DistanceField.into(), ..Recipe::default() };
+    let by_mask = Recipe { registration: Registration::DistanceField(None), ..Recipe::default() };
     assert_eq!(ids(&by_mask), vec!["r1-44136fa355b3678a"; 5], "nothing is named");
-    let joint = Recipe { registration: Registration::Joint.into(), ..Recipe::default() };
+    let joint = Recipe { registration: Registration::Joint, ..Recipe::default() };
     assert_eq!(ids(&joint)[..4], ids(&by_mask)[..4]);
     assert_eq!(ids(&joint)[4], "r1-b35d14d5984e1aad");
     let hand = Recipe { hand: false, ..by_mask.clone() };

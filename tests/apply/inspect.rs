@@ -140,7 +140,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let mut bench = bench(&[Pane::TimeMachine]);
     send(&mut bench, InspectCommand::Begin);
     send(&mut bench, InspectCommand::Pin);
-    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp));
     bench.settle();
     assert_eq!(results::inspection(&bench.state).ready().unwrap().num_runs(), 1);
     send(&mut bench, InspectCommand::End);
@@ -148,7 +148,7 @@ fn pins_keep_two_steps_also_of_different_registrations() {
     let [Some(a), Some(b)] = bench.state.inspect.pins_of(bench.state.pair_key()) else {
         panic!("{:?}", bench.state.inspect.pins_of(bench.state.pair_key()))
     };
-    assert_eq!((a.registration, b.registration), (Registration::default().into(), Registration::LabIcp.into()));
+    assert_eq!((a.registration, b.registration), (Registration::default(), Registration::LabIcp));
     assert_ne!(a.grasp_from_object, b.grasp_from_object);
     // A third takes the place of the older one.
     send(&mut bench, InspectCommand::Begin);

@@ -54,11 +54,11 @@ fn the_pose_follows_the_mask() {
     let after = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(after.num_points < pose.num_points);
     // The other registration is another result; the first one is still there.
-    bench.send(prefer(|s| s.registration = Registration::LabIcp.into()));
+    bench.send(prefer(|s| s.registration = Registration::LabIcp));
     bench.settle();
     let lab = results::pose(&bench.state, MEASURED).ready().unwrap();
     assert!(lab.error_rad.is_some() && lab.report.iterations > 1);
-    bench.send(prefer(|s| s.registration = Registration::default().into()));
+    bench.send(prefer(|s| s.registration = Registration::default()));
     assert!(results::pose(&bench.state, MEASURED).ready().is_some());
     // Accepting it is a change of the document like any other.
     let accept = Action::AcceptMeasuredPose.command(&bench.state).unwrap();
@@ -72,7 +72,7 @@ fn the_pose_follows_the_mask() {
 fn a_pose_that_takes_a_proof_is_shown_without_it_first() {
     let mut bench = Bench::open_simulated();
     bench.send(panes(&[Pane::Scene, Pane::Measured]));
-    bench.send(prefer(|s| s.registration = Registration::DistanceField.into()));
+    bench.send(prefer(|s| s.registration = Registration::DistanceField(None)));
     bench.send(prefer(|s| s.mask.choice.source = MaskSource::Cad));
     bench.send(LibraryCommand::Select(SIMULATED));
     bench.settle();

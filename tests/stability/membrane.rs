@@ -74,7 +74,7 @@ fn m03_without_a_membrane_to_see_the_mask_answers_bit_for_bit() {
     };
     let flat = changed(case, |_, _| 0.0);
     let points = points(&case.imprints, &case.masks);
-    let by_mask = register(&points, model, Registration::DistanceField, false).unwrap().grasp_from_object;
+    let by_mask = register(&points, model, Registration::DistanceField(None), false).unwrap().grasp_from_object;
     for (name, imprints) in [("no pixel", nothing), ("one pixel", one_pixel), ("flat", flat)] {
         let report = registered(&points, &imprints, false);
         let basis = report.joint.unwrap().basis;
@@ -113,7 +113,7 @@ fn m05_any_number_of_threads_gives_the_same_bits() {
 fn m06_a_prediction_that_is_no_membrane_of_the_tool_is_left_to_the_mask() {
     let (case, model) = case();
     let points = points(&case.imprints, &case.masks);
-    let by_mask = register(&points, model, Registration::DistanceField, false).unwrap().grasp_from_object;
+    let by_mask = register(&points, model, Registration::DistanceField(None), false).unwrap().grasp_from_object;
     let basis = |imprints: &[DepthMap; 2]| {
         let report = registered(&points, imprints, true);
         (report.joint.unwrap().basis, report.grasp_from_object)

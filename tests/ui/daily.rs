@@ -87,7 +87,7 @@ fn a_mask_without_contact_offers_the_threshold() {
     mask.choice.top_percent = 0.0;
     rig.send(prefer(move |s| s.mask = mask.clone()));
     // Membranes need no mask.
-    rig.send(prefer(|s| s.registration = Registration::DistanceField.into()));
+    rig.send(prefer(|s| s.registration = Registration::DistanceField(None)));
     rig.send(prefer(|s| s.workspace = Workspace::Align));
     assert!(
         matches!(results::pose(state(&rig), MEASURED), Lookup::Failed(_)),

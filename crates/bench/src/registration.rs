@@ -18,12 +18,12 @@ use super::{Machine, contact_points, peers};
 use touch2touch::headless::says;
 use touch2touch::headless::{JsonArgs, LimitArgs, ModelArgs, at_least_one};
 use touch2touch::headless::{Output, VerbResult};
-use touch2touch_core::align::{AlignError, AlignReport, Ask, Contacts, PadImage, icp};
+use touch2touch_core::align::{AlignError, AlignReport, Ask, Contacts, LabModel, PadImage};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register, register_with};
+use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
 use touch2touch_work::canvas;
@@ -362,7 +362,7 @@ fn measure(
             build_ms: fastest(&|| ToolModel::new(mesh.clone()).is_ok()),
         });
         // Built when first asked for; asked for here, so that the first case of a tool is not charged for it.
-        std::hint::black_box((icp::in_space(&model), icp::silhouette(&model)));
+        std::hint::black_box(LabModel::of(&model));
         models.insert(number, model);
     }
     let prepared = prepare(set, masks)?;
@@ -384,7 +384,7 @@ fn measure(
     for &engine in engines {
         let (mut outcomes, mut offset_mm, mut calls) = (Vec::new(), Vec::new(), 0);
         let mut scored = Vec::new();
-        let method = RegistrationChoice::from(engine).method();
+        let method = engine.method();
         let mut cpu_ms = Some(0.0);
         for (case, (_, whole)) in prepared.iter().zip(&set.cases) {
             output.step(&engine.to_string());
@@ -407,7 +407,7 @@ fn measure(
         }
         rows.push(EngineRow {
             name: engine.to_string(),
-            label: engine.label().to_owned(),
+            label: engine.label(),
             peer: false,
             error_deg: outcomes.iter().map(|o| Some(o.error_deg).filter(|e| e.is_finite())).collect(),
             ms: outcomes.iter().map(|o| Some(o.ms)).collect(),

@@ -19,7 +19,7 @@ use touch2touch::headless::{JsonArgs, ModelArgs, Output, VerbResult};
 use touch2touch_core::align::{Ask, Contacts, Evidence};
 use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::pose::{Registration, RegistrationChoice, ToolModel, register_with};
+use touch2touch_core::pose::{Registration, ToolModel, register_with};
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::which_tool;
@@ -398,7 +398,7 @@ fn is_named(case: &Case, models: &[ToolModel], engine: Registration) -> bool {
     let images = images(case);
     let points = points(case, &case.masks).unwrap_or_default();
     let contacts = Contacts { points: &points, images: &images };
-    let method = RegistrationChoice::from(engine).method();
+    let method = engine.method();
     let ranked = which_tool(contacts, names.iter().map(String::as_str).zip(models), &*method);
     ranked.first().is_some_and(|first| first.tool == names[case.tool])
 }
@@ -416,7 +416,7 @@ fn row(i: usize, fault: Fault, trial: &Trial, models: &[ToolModel], engine: Regi
     let images = images(case);
     let points = points(case, &case.masks).unwrap_or_default();
     let contacts = Contacts { points: &points, images: &images };
-    let method = RegistrationChoice::from(engine).method();
+    let method = engine.method();
     let ask = Ask { evidence: true, ..Ask::default() };
     let found = tool.and_then(|tool| register_with(&*method, contacts, tool, ask).map_err(|err| err.to_string()));
     let mut row = Row {

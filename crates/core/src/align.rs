@@ -4,8 +4,6 @@
 //! * [`align`]: robust Levenberg-Marquardt on a [`DistanceField`](super::field::DistanceField) of the tool's silhouette, from a few starts. The
 //!   default. Points outside the outline pay their distance, points on the silhouette pay nothing.
 //! * [`lab_icp()`]: the lab's planar point-to-point loop, reproduced for comparison.
-//! * [`icp`]: planar and spatial ICP put together from small values, the peers of the default.
-//! * [`refine`]: from the planar pose to all six degrees of freedom.
 //!
 //! A result is a value ([`AlignReport`]): the pose with everything that says whether to believe it. What is only
 //! needed to look inside a run (per-iteration states, per-point residuals) is recorded on request.
@@ -14,37 +12,34 @@
 
 mod batch;
 mod certify;
-pub mod closed_form;
 pub mod correspond;
-pub mod icp;
 mod joint;
 pub mod lab_icp;
 mod lanes;
 mod observability;
 mod planar;
 pub mod reason;
-pub mod refine;
 mod register;
+mod samples;
 mod search;
 #[cfg(test)]
 pub(crate) mod testing;
+mod tree;
 mod uncertainty;
 mod windows;
 
 use std::borrow::Cow;
 
-use glam::{DAffine3, DVec2};
+use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
 use super::frames::PlanarPose;
 
-pub(crate) use icp::IcpConfig;
 pub use joint::{Basis, Elsewhere, Evidence, JointConfig, JointFit, MaskWeight, MembraneEvidence};
 pub use lab_icp::{LabIcpConfig, LabModel, PaperTrap, lab_icp, lab_starts};
 pub(crate) use observability::DEGENERATE_BELOW;
 pub use observability::{Observability, observability};
 pub use planar::align;
-pub(crate) use refine::RefineConfig;
 pub use register::{Ask, Contacts, PadImage, Register, Scene};
 pub(crate) use uncertainty::PLACE_OPEN_M;
 pub use uncertainty::Uncertainty;
@@ -91,12 +86,6 @@ pub struct AlignConfig {
 }
 
 impl AlignConfig {
-    /// The answer with a proof: branch and bound over the prior, whatever a cheaper search would say. Some ten to
-    /// a hundred milliseconds.
-    pub fn certified() -> Self {
-        Self { rungs: vec![Rung::Certified], ..Self::default() }
-    }
-
     /// Width of the kernel that decides, meters; NaN without any, which [`align`] refuses.
     pub fn final_kernel_m(&self) -> f64 {
         self.kernels_m.last().copied().unwrap_or(f64::NAN)
@@ -356,9 +345,6 @@ pub struct Run {
 pub struct AlignReport {
     /// The tool's pose in the hand.
     pub grasp_from_object: PlanarPose,
-    /// Pose with all six degrees of freedom, from the registrations that find them. The planar pose is then the nearest
-    /// to it.
-    pub grasp_from_object_6dof: Option<DAffine3>,
     /// True where the winning run reached an end point.
     pub converged: bool,
     /// Why the winning run ended.
@@ -439,8 +425,6 @@ pub struct TraceStep {
     pub iteration: usize,
     /// The pose, `grasp_from_object`.
     pub grasp_from_object: PlanarPose,
-    /// Pose with all six degrees of freedom where the registration has them.
-    pub grasp_from_object_6dof: Option<DAffine3>,
     /// Cost per point, square meters; comparable only at the same kernel width and number of points.
     pub cost_m2: f64,
     /// Part of it that is the mask's, where the rest is the membranes'; square meters.
@@ -463,8 +447,6 @@ pub enum Fate {
     Inside,
     /// Beyond three kernel widths; its pull is negligible.
     BeyondGate,
-    /// Left out by a rejector (farthest pairs, pairs that are not mutual); it does not pull.
-    Trimmed,
     /// Outside the stored field.
     OutOfField,
     /// A coordinate is NaN or infinite.

@@ -50,7 +50,7 @@ mod tests {
     use super::*;
     use crate::align::Ask;
     use crate::align::testing::{cross, cross_contacts};
-    use crate::pose::{RegistrationChoice, register, register_with};
+    use crate::pose::{Registration, register, register_with};
     use strum::IntoEnumIterator as _;
 
     const POSE: PlanarPose = PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 };
@@ -71,7 +71,7 @@ mod tests {
             assert_eq!(own.grasp_from_object, plain.grasp_from_object, "{engine}: looking changes nothing");
             assert!(!own.trace.is_empty() && plain.trace.is_empty(), "{engine}");
             let told = register_with(
-                &*RegistrationChoice::from(engine).method(),
+                &*engine.method(),
                 &points,
                 &tool,
                 Ask { starts: Some(&[start]), record: true, ..Ask::default() },

@@ -1,7 +1,7 @@
 //! Linear algebra that the science asks of nalgebra, with its refusals: nothing is decomposed that is not finite.
 
 use nalgebra::allocator::Allocator;
-use nalgebra::{DefaultAllocator, DimDiff, DimSub, Matrix6, OMatrix, OVector, U1, Vector6};
+use nalgebra::{DefaultAllocator, DimDiff, DimSub, OMatrix, OVector, U1};
 
 /// Rounds after which a decomposition gives up; it takes a few per row.
 const MOST_ROUNDS: usize = 10_000;
@@ -28,19 +28,6 @@ where
     Some((values, vectors))
 }
 
-/// Solves `h x = b` for the unknowns in `free` by Cholesky; the others are zero. Only the lower triangle is read.
-/// `None` if that part is not positive definite or not finite.
-pub(super) fn solve_symmetric(mut h: Matrix6<f64>, mut b: Vector6<f64>, free: &[usize]) -> Option<Vector6<f64>> {
-    for i in (0..6).filter(|i| !free.contains(i)) {
-        h.row_mut(i).fill(0.0);
-        h.column_mut(i).fill(0.0);
-        h[(i, i)] = 1.0;
-        b[i] = 0.0;
-    }
-    let x = h.cholesky()?.solve(&b);
-    x.iter().all(|x| x.is_finite()).then_some(x)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -58,32 +45,12 @@ mod tests {
             prop_assert!((v * v.transpose() - Matrix4::identity()).amax() < 1e-12);
         }
 
-        #[test]
-        fn solving_undoes_multiplying(m in proptest::array::uniform32(-1.0..1.0f64), x in proptest::array::uniform6(-1.0..1.0f64)) {
-            // A sum of outer products and a little of the identity: positive definite.
-            let j = nalgebra::SMatrix::<f64, 6, 5>::from_column_slice(&m[..30]);
-            let h: Matrix6<f64> = j * j.transpose() + 0.1 * Matrix6::identity();
-            for free in [&[0, 1, 2, 3, 4, 5][..], &[0, 4, 5], &[3]] {
-                let kept = Vector6::from_fn(|i, _| if free.contains(&i) { x[i] } else { 0.0 });
-                let solution = solve_symmetric(h.lower_triangle(), h * kept, free).unwrap();
-                prop_assert!((solution - kept).amax() < 1e-9);
-            }
-        }
     }
 
     #[test]
-    fn what_is_not_finite_or_not_definite_is_refused_at_once() {
-        let all = [0, 1, 2, 3, 4, 5];
+    fn what_is_not_finite_is_refused_at_once() {
         for bad in [f64::NAN, f64::INFINITY] {
             assert!(eigen_symmetric(Matrix2::new(1.0, bad, bad, 1.0)).is_none());
-            let mut h = Matrix6::identity();
-            h[(0, 0)] = bad;
-            h[(1, 0)] = bad;
-            assert!(solve_symmetric(h, Vector6::repeat(1.0), &all).is_none());
         }
-        let mut h = Matrix6::identity();
-        h[(1, 0)] = 2.0;
-        assert!(solve_symmetric(h, Vector6::repeat(1.0), &all).is_none());
-        assert!(solve_symmetric(h, Vector6::repeat(1.0), &[0, 2]).is_some());
     }
 }

@@ -8,7 +8,7 @@ use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use touch2touch_core::align::{Ask, Contacts};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::verdict::Grade;
 use touch2touch_work::error::TaskError;
@@ -284,12 +284,12 @@ pub(crate) fn feel_many(
     Ok(results.into_iter().zip(pairs).map(|(results, pair)| Felt::of(results, pair)).collect())
 }
 
-fn registered(points: &[DVec3], tool: &Tool, by: RegistrationChoice, evidence: bool) -> Result<PoseResult, TaskError> {
+fn registered(points: &[DVec3], tool: &Tool, by: Registration, evidence: bool) -> Result<PoseResult, TaskError> {
     let contacts = Contacts::from(points);
     pose(contacts, &tool.model, &*by.method(), Ask { evidence, ..Ask::default() }, None)
 }
 
-fn choice(engine: &str) -> PyResult<RegistrationChoice> {
+fn choice(engine: &str) -> PyResult<Registration> {
     engine.parse().map_err(refused)
 }
 

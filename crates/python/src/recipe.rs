@@ -23,7 +23,7 @@ use crate::process::{failed, refused};
 /// `spacing`, `guidance` change single numbers. `shift`: the mapping to meters, "exact" with `fit_parts` (a list of "offset",
 /// "field", "gain", "response"), "paper", "raw", or "refit" with `stats`, a file of `touch2touch stats`. `mask`: "auto", "unet",
 /// "threshold", "top_percent", "cad" or "truth", with `threshold_mm`, `probability`, `top_percent`, `cad_mm`. `engine`: the
-/// registration, such as "joint" or "gicp:gate=1.5". `hand`: masks drawn by hand win.
+/// registration, such as "joint" or "distance_field:gate=1.5". `hand`: masks drawn by hand win.
 /// `runtime`: "auto", "rten", "ort" or a provider of ONNX Runtime, such as "cuda" (`touch2touch runtime` lists them).
 #[pyclass(module = "touch2touch", frozen)]
 pub(crate) struct Recipe {

@@ -10,7 +10,7 @@ use super::super::{adapt, recipe, results};
 use super::column::in_figure;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::bundles::BundleKind;
 use touch2touch_work::figure::FigurePane;
 use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
@@ -131,7 +131,7 @@ fn train_words(state: &State, words: Words) -> Words {
         .option("--seed", form.choice.seed)
         .word_if(form.choice.test_in_train, "--test-in-train")
         .option_if("--from", (form.choice.from != MasksFrom::default()).then(|| form.choice.from.key()))
-        .option_if("--engine", (by != RegistrationChoice::default()).then_some(by));
+        .option_if("--engine", (by != Registration::default()).then_some(by));
     let words = words.runtime(state.settings.runtime);
     match (&state.settings.mask.bundle, recipe::bundle(state, BundleKind::Mask)) {
         (Some(_), Ok(bundle)) => words.option("--start", bundle.origin.path().display()),

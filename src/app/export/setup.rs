@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use strum::IntoEnumIterator as _;
 
-use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, RegistrationChoice};
+use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, PredictionKey, Registration};
 use super::super::pane::Pane;
 use super::super::state::State;
 use super::super::state::export::{FigureRows, StillAsked};
@@ -40,7 +40,7 @@ pub struct PairExport {
     rig: Arc<Rig>,
     clouds: Arc<Clouds>,
     mask: String,
-    registration: RegistrationChoice,
+    registration: Registration,
     pose: Option<Arc<PoseResult>>,
     truth: Option<PlanarPose>,
     tool: Option<Arc<NamedTool>>,

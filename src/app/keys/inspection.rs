@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::keys::{Key, RegistrationChoice, RunKey};
+use super::super::keys::{Key, Registration, RunKey};
 use touch2touch_core::align::{AlignReport, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::Counterparts;
@@ -38,12 +38,7 @@ pub struct Inspection {
 
 impl Inspection {
     /// From a recorded registration, the contact points it was offered, and what they were compared with.
-    pub fn new(
-        result: Arc<PoseResult>,
-        points: Vec<DVec3>,
-        tool: &ToolModel,
-        registration: RegistrationChoice,
-    ) -> Self {
+    pub fn new(result: Arc<PoseResult>, points: Vec<DVec3>, tool: &ToolModel, registration: Registration) -> Self {
         let report = &result.report;
         let mut runs: Vec<Vec<usize>> = vec![Vec::new(); report.runs.len()];
         for (i, step) in report.trace.iter().enumerate() {
@@ -52,7 +47,7 @@ impl Inspection {
             }
             runs[step.run].push(i);
         }
-        Self { result, points, counterparts: Counterparts::new(tool, registration.by), runs }
+        Self { result, points, counterparts: Counterparts::new(tool, registration), runs }
     }
 
     /// The registration's report with its trace.

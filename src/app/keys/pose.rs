@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, RegistrationChoice};
+use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, Registration};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::which_tool::Candidate;
@@ -43,7 +43,7 @@ pub struct PoseKey {
     /// The tool.
     pub tool: Arc<str>,
     /// The registration.
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
 }
 
 impl PoseKey {

@@ -12,7 +12,7 @@ use super::super::{recipe, results};
 use super::imprint::{Imprint, imprint_input};
 use touch2touch_core::align::{Ask, Contacts};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::{Candidate, which_tool};
@@ -38,12 +38,12 @@ impl Registered {
     ///
     /// # Errors
     /// As [`pose::pose`].
-    pub(crate) fn pose(&self, registration: RegistrationChoice, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
+    pub(crate) fn pose(&self, registration: Registration, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
         self.with_contacts(|contacts| pose::pose(contacts, &self.tool.model, &*registration.method(), ask, self.truth))
     }
 
     /// Tools as candidates for what was touched, the likeliest first.
-    pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: RegistrationChoice) -> Vec<Candidate> {
+    pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: Registration) -> Vec<Candidate> {
         let tools = tools.iter().map(|tool| (tool.name.as_str(), &tool.model));
         self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
     }
@@ -161,7 +161,7 @@ pub(crate) fn want_pose(wants: &mut Demands<'_>, source: ImprintSource) {
     let results = &wants.state.results;
     let provisional = ProvisionalPoseKey(key.clone());
     let tried = results.provisional_poses.contains(&provisional) || wants.state.failure(provisional.clone()).is_some();
-    if key.registration.by.may_prove() && !tried && !results.poses.contains(&key) {
+    if key.registration.may_prove() && !tried && !results.poses.contains(&key) {
         wants.ask(provisional);
     } else {
         wants.ask(key);

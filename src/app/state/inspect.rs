@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintSource, Inspection, PairKey, PoseBits, RegistrationChoice};
+use super::super::keys::{ImprintSource, Inspection, PairKey, PoseBits, Registration};
 use touch2touch_core::align::TraceStep;
 use touch2touch_core::frames::PlanarPose;
 
@@ -47,7 +47,7 @@ pub struct Pin {
     /// The imprint.
     pub source: ImprintSource,
     /// The registration.
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
     /// The start it belongs to.
     pub run: usize,
     /// The position in the run.

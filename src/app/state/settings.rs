@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use super::super::action::{Action, Bindings};
-use super::super::keys::{Preset, RegistrationChoice, Sampler, ShiftMode, Spacing};
+use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
 use scene::SceneLook;
@@ -66,7 +66,7 @@ pub struct Settings {
     pub mask: MaskSettings,
     /// The registration.
     #[serde(rename = "pose_engine")]
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
     /// The runtime that runs models.
     pub runtime: EngineChoice,
     /// The budget of the predictions kept on the disk, MiB; 0 keeps none.
@@ -141,7 +141,7 @@ impl Default for Settings {
             refit: None,
             generate: GenerateSettings::default(),
             mask: MaskSettings::default(),
-            registration: RegistrationChoice::default(),
+            registration: Registration::default(),
             runtime: EngineChoice::default(),
             cache_mib: 512,
             person: String::new(),

@@ -11,7 +11,7 @@ use super::super::recipe::ModelArgs;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::labels::{ImprintSource, Review};
 use touch2touch_work::propose::ProposalSource;
 
@@ -82,8 +82,8 @@ pub(in super::super) struct LabelArgs {
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
     /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    pub(super) registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    pub(super) registration: Registration,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
     #[command(flatten)]

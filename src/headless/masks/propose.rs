@@ -7,7 +7,7 @@ use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use touch2touch_core::dataset::{PairEntry, PairId};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::filter::Filter;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
@@ -34,8 +34,8 @@ pub(in super::super) struct ProposeArgs {
     #[arg(long, value_name = "PAIR")]
     carry_from: Option<String>,
     /// The registration of `cad_registered`.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     /// Who labels; else whom the system says.
     #[arg(long, value_name = "NAME")]
     person: Option<String>,

@@ -10,7 +10,7 @@ use super::super::contact_mask::MaskArgs;
 use super::super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Metric;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_work::evaluate::Setup;
 use touch2touch_work::infer::bundle::{Bundle, find_all};
 use touch2touch_work::io::dataset::Dataset;
@@ -40,8 +40,8 @@ pub(in super::super) struct QueueArgs {
     #[command(flatten)]
     mask: MaskArgs,
     /// The registration that gives the angles.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     #[command(flatten)]
     mapping: MappingArgs,
     #[command(flatten)]

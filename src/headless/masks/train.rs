@@ -9,7 +9,7 @@ use clap::Args;
 use super::super::args::{DatasetArgs, RegistrationParser, keyed, parse_minutes};
 use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::units::counted;
 use touch2touch_work::bundles::{self, BundleKind};
 use touch2touch_work::export::DrawnMasks;
@@ -60,8 +60,8 @@ pub(in crate::headless) struct TrainArgs {
     #[command(flatten)]
     runtime: RuntimeArg,
     /// The registration of the poses that tell what the model is worth, where true ones are known.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = RegistrationChoice::default(), value_parser = RegistrationParser)]
-    registration: RegistrationChoice,
+    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
+    registration: Registration,
     /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.
     #[arg(long)]
     no_cache: bool,

@@ -10,7 +10,7 @@ use super::super::recipe::ModelArgs;
 use super::super::{Common, ToolArgs};
 use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
 use touch2touch_work::labels::ImprintSource;
 use touch2touch_work::recipe::Recipe;
@@ -32,7 +32,7 @@ pub(in crate::headless) struct PoseArgs {
     #[command(flatten)]
     pub(super) tool: ToolArgs,
     /// The registration: the key of one, `default`, `lab` (the paper's), or `all`, one after the other. A key may be
-    /// followed by what is left out: `:gate=MM` (contacts farther from the model) or `:trim=SHARE` (the farthest).
+    /// followed by `:gate=MM`, beyond which contacts are let go (for `distance_field`).
     #[arg(long = "engine", value_name = "ENGINE", default_value = "default", value_parser = RegistrationsParser)]
     pub(super) registration: Registrations,
     /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
@@ -71,7 +71,7 @@ pub(super) enum Imprints {
 
 /// The registrations to run, in this order.
 #[derive(Debug, Clone)]
-pub(in crate::headless) struct Registrations(pub(in crate::headless) Vec<RegistrationChoice>);
+pub(in crate::headless) struct Registrations(pub(in crate::headless) Vec<Registration>);
 
 /// Reads a registration, or one of the short names; lists them all in the help.
 #[derive(Debug, Clone, Copy)]
@@ -87,9 +87,9 @@ impl TypedValueParser for RegistrationsParser {
         value: &std::ffi::OsStr,
     ) -> Result<Registrations, clap::Error> {
         Ok(Registrations(match value.to_str() {
-            Some("default") => vec![RegistrationChoice::default()],
-            Some("lab") => vec![Registration::LabIcp.into()],
-            Some("all") => Registration::iter().map(Into::into).collect(),
+            Some("default") => vec![Registration::default()],
+            Some("lab") => vec![Registration::LabIcp],
+            Some("all") => Registration::iter().collect(),
             _ => vec![RegistrationParser.parse_ref(cmd, arg, value)?],
         }))
     }
@@ -139,8 +139,8 @@ impl PoseArgs {
 }
 
 /// The registration as the arguments want it.
-pub(super) fn registration(args: &PoseArgs, choice: RegistrationChoice) -> Box<dyn Register> {
-    if choice.by != Registration::LabIcp {
+pub(super) fn registration(args: &PoseArgs, choice: Registration) -> Box<dyn Register> {
+    if choice != Registration::LabIcp {
         return choice.method();
     }
     let mut config = LabIcpConfig { traps: args.paper_traps.clone(), ..LabIcpConfig::default() };

@@ -135,12 +135,16 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     let combo = ComboBox::from_id_salt("time machine engine").width(168.0).selected_text(registration.label());
     let combo = combo.show_ui(ui, |ui| {
         for e in Registration::iter() {
-            if ui.selectable_label(e == registration.by, e.label()).on_hover_text(e.description()).clicked() {
-                cx.out.push(prefer(move |s| s.registration = e.into()).into());
+            if ui
+                .selectable_label(e == registration.with_own_gate(), e.label())
+                .on_hover_text(e.description())
+                .clicked()
+            {
+                cx.out.push(prefer(move |s| s.registration = e).into());
             }
         }
     });
-    combo.response.accessible_name("Registration of the steps").on_hover_text(registration.by.description());
+    combo.response.accessible_name("Registration of the steps").on_hover_text(registration.description());
     ui.add_space(4.0);
     match inspect.start.map(PoseBits::get) {
         Some(start) => {

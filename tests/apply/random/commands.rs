@@ -21,7 +21,7 @@ use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
-    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, RegistrationChoice, Revision, ShiftMode, TouchKey,
+    DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, StrokeIn3d};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
@@ -43,7 +43,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch_core::manual::{ManualPose, PoseAxis};
-use touch2touch_core::pose::Rejection;
+use touch2touch_core::pose::Gate;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_work::about::{Cure, Examined, Worth};
 use touch2touch_work::error::TaskError;
@@ -258,14 +258,11 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
     })
 }
 
-fn registration() -> impl Strategy<Value = RegistrationChoice> {
-    let rejection = prop_oneof![
-        Just(Rejection::Own),
-        (1e-4..0.02).prop_map(|m| Rejection::gate(m).unwrap()),
-        (0.0..0.8).prop_map(|share| Rejection::trim(share).unwrap()),
-    ];
-    (any_of::<Registration>(), rejection)
-        .prop_map(|(by, rejection)| RegistrationChoice::new(by, rejection).unwrap_or_else(|_| by.into()))
+fn registration() -> impl Strategy<Value = Registration> {
+    prop_oneof![
+        any_of::<Registration>(),
+        (1e-4..0.02).prop_map(|m| Registration::DistanceField(Some(Gate::new(m).unwrap()))),
+    ]
 }
 
 fn shortcut() -> impl Strategy<Value = Shortcut> {

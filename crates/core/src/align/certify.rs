@@ -10,14 +10,13 @@ use glam::DVec2;
 
 use super::batch::{Cloud, Extent, State};
 use super::search::{Progress, Search};
-use super::windows::{Floor, Slopes};
+use super::windows::Slopes;
 use super::{AlignConfig, Certificate};
-use crate::field::DistanceField;
 
 /// The box is this much larger than the prior (24 degrees, 6 mm for the default).
 const WIDER: [f64; 2] = [24.0 / 22.5, 1.2];
 /// Cost per point, as a share of the squared kernel width, below which differences do not matter.
-pub(super) const NEGLIGIBLE: f64 = 1e-4;
+const NEGLIGIBLE: f64 = 1e-4;
 /// Boxes of the angle to start from, half as wide as this, radians.
 const SLAB_RAD: f64 = 3.0 * std::f64::consts::PI / 180.0;
 /// Cuts in a row; boxes are then some nanometers wide.
@@ -25,9 +24,9 @@ const DEEPEST: usize = 48;
 
 /// Poses about a middle one.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Region {
-    pub(super) middle: State,
-    pub(super) extent: Extent,
+struct Region {
+    middle: State,
+    extent: Extent,
     /// No pose in it costs less, per point.
     lower: f64,
 }
@@ -51,31 +50,9 @@ impl Region {
     }
 }
 
-/// Cost per point that is to be proved least.
-pub(super) trait Bounded {
-    /// Lower bound of the cost in a region that was cut `level` times, and the cost in its middle. Where the bound reaches
-    /// `enough`, both may stop there.
-    fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2];
-
-    /// Told before a region is cut: what is decided in all of it need not be asked in its parts.
-    fn narrow(&mut self, region: &Region, level: usize);
-
-    /// The end of a descent.
-    fn descend(&mut self, from: State) -> Progress;
-
-    /// Distance of the outermost point from the centroid, meters.
-    fn radius(&self) -> f64;
-
-    /// Differences below it do not matter.
-    fn negligible(&self) -> f64;
-
-    /// Look-ups so far.
-    fn lookups(&self) -> usize;
-}
-
 /// Proof by branch and bound under way: its question, and how far the answer has come.
-struct Proof<'a, C> {
-    cost: &'a mut C,
+struct Proof<'a, 's> {
+    cost: MaskCost<'a, 's>,
     config: &'a AlignConfig,
     centroid: DVec2,
     /// Largest size of y and z of a pose, meters, `grasp_from_object`.
@@ -85,32 +62,27 @@ struct Proof<'a, C> {
     /// Least bound of the boxes that are done or given up.
     least: f64,
     nodes: usize,
-    budget: usize,
 }
 
-/// Outcome of branch and bound, in the unit of the cost.
-pub(super) struct Proved {
-    /// True where no pose in the box is cheaper by more than the gap.
-    pub(super) certified: bool,
-    pub(super) best: Progress,
-    pub(super) lower_bound: f64,
-    pub(super) nodes: usize,
-    pub(super) lookups: usize,
-}
-
-/// Searches the prior, a little widened, from the answer `best`, whose cost is `cost`'s. Of the settings, the prior, the
-/// gap and the budget count.
-pub(super) fn prove(cost: &mut impl Bounded, centroid: DVec2, config: &AlignConfig, best: Progress) -> Proved {
-    let before = cost.lookups();
+/// Searches the prior, a little widened, for the best pose of `cloud`, from the answer `best`; returns the better one if there
+/// is one. Of the settings, the prior, the gap and the budget count.
+pub(super) fn certify(
+    search: &mut Search<'_>,
+    cloud: &Cloud,
+    config: &AlignConfig,
+    kernel: f64,
+    best: Progress,
+) -> (Certificate, Progress) {
+    let centroid = search.centroid;
+    let cost = MaskCost::new(search, cloud, kernel);
     let mut proof = Proof {
         config,
         centroid,
         shift_m: config.prior.shift_m * WIDER[1],
-        radius: cost.radius(),
+        radius: cost.whole().radius(),
         best,
         least: f64::INFINITY,
         nodes: 0,
-        budget: before + config.budget,
         cost,
     };
     if !proof.allows(&proof.best) {
@@ -121,115 +93,70 @@ pub(super) fn prove(cost: &mut impl Bounded, centroid: DVec2, config: &AlignConf
         proof.look(region, 0);
     }
     proof.cut_all(regions, 0);
-    Proved {
-        certified: proof.least >= proof.enough(),
-        best: proof.best,
-        lower_bound: proof.least.min(proof.best.cost),
-        nodes: proof.nodes,
-        lookups: proof.cost.lookups() - before,
-    }
-}
-
-/// Searches the prior as [`prove`] does for the best pose of `cloud`; returns the better one if there is one.
-pub(super) fn certify(
-    search: &mut Search<'_>,
-    cloud: &Cloud,
-    config: &AlignConfig,
-    kernel: f64,
-    best: Progress,
-) -> (Certificate, Progress) {
-    let centroid = search.centroid;
-    let mut cost = MaskCost { points: Undecided::new(search.field, cloud, kernel), search };
-    let proved = prove(&mut cost, centroid, config, best);
     let certificate = Certificate {
-        certified: proved.certified,
+        certified: proof.least >= proof.enough(),
         points: cloud.len(),
-        cost_m2: proved.best.cost,
-        lower_bound_m2: proved.lower_bound,
-        nodes: proved.nodes,
-        lookups: proved.lookups,
+        cost_m2: proof.best.cost,
+        lower_bound_m2: proof.least.min(proof.best.cost),
+        nodes: proof.nodes,
+        lookups: proof.cost.lookups,
     };
-    (certificate, proved.best)
+    (certificate, proof.best)
 }
 
-/// Contact points on the field, and what is undecided of them on each level of the cuts.
-pub(super) struct Undecided<'a> {
-    field: &'a DistanceField,
+/// The cost per point of contact points on the field, and what is undecided of them on each level of the cuts.
+struct MaskCost<'a, 's> {
+    search: &'a mut Search<'s>,
     kernel: f64,
     /// The whole cloud first.
     clouds: Vec<Cloud>,
     slopes: [Slopes; 3],
-    pub(super) lookups: usize,
+    lookups: usize,
 }
 
-impl<'a> Undecided<'a> {
-    pub(super) fn new(field: &'a DistanceField, cloud: &Cloud, kernel: f64) -> Self {
-        let clouds = vec![cloud.outermost_first()];
-        Self { field, kernel, clouds, slopes: field.slopes(), lookups: 0 }
+impl<'a, 's> MaskCost<'a, 's> {
+    fn new(search: &'a mut Search<'s>, cloud: &Cloud, kernel: f64) -> Self {
+        let slopes = search.field.slopes();
+        Self { search, kernel, clouds: vec![cloud.outermost_first()], slopes, lookups: 0 }
     }
 
-    pub(super) fn whole(&self) -> &Cloud {
+    fn whole(&self) -> &Cloud {
         &self.clouds[0]
     }
 
-    /// Lower bound of the cost, summed over the points, square meters.
-    pub(super) fn floor(&mut self, region: &Region, level: usize, enough: f64) -> Floor {
+    /// Lower bound of the cost in a region that was cut `level` times, and the cost in its middle. Where the bound reaches
+    /// `enough`, both may stop there.
+    fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2] {
+        let count = self.whole().len() as f64;
         let way = region.extent.way(self.whole().radius());
         let slopes = self.slopes.iter().find(|s| way < s.reach);
         let cloud = &self.clouds[level];
         self.lookups += cloud.asked();
-        self.field.bound(cloud, region.middle, self.kernel, region.extent, slopes, enough)
+        let floor = self.search.field.bound(cloud, region.middle, self.kernel, region.extent, slopes, enough * count);
+        [floor.least(region.extent.half), floor.here].map(|cost| cost / count)
     }
 
-    pub(super) fn narrow(&mut self, region: &Region, level: usize) {
+    /// Told before a region is cut: what is decided in all of it need not be asked in its parts.
+    fn narrow(&mut self, region: &Region, level: usize) {
         if self.clouds.len() == level + 1 {
             self.clouds.push(Cloud::default());
         }
         let (upper, lower) = self.clouds.split_at_mut(level + 1);
         self.lookups += upper[level].asked();
-        self.field.undecided(&upper[level], region.middle, region.extent, &mut lower[0]);
-    }
-}
-
-/// The cost of contact points on the field.
-struct MaskCost<'a, 's> {
-    points: Undecided<'s>,
-    search: &'a mut Search<'s>,
-}
-
-impl Bounded for MaskCost<'_, '_> {
-    fn bound(&mut self, region: &Region, level: usize, enough: f64) -> [f64; 2] {
-        let count = self.points.whole().len() as f64;
-        let floor = self.points.floor(region, level, enough * count);
-        [floor.least(region.extent.half), floor.here].map(|cost| cost / count)
+        self.search.field.undecided(&upper[level], region.middle, region.extent, &mut lower[0]);
     }
 
-    fn narrow(&mut self, region: &Region, level: usize) {
-        self.points.narrow(region, level);
-    }
-
+    /// The end of a descent.
     fn descend(&mut self, from: State) -> Progress {
         let mut found = Progress::new(from);
         let before = self.search.lookups;
-        self.search.descend_quietly(&mut found, self.points.whole(), self.points.kernel);
-        self.points.lookups += self.search.lookups - before;
+        self.search.descend_quietly(&mut found, &self.clouds[0], self.kernel);
+        self.lookups += self.search.lookups - before;
         found
-    }
-
-    fn radius(&self) -> f64 {
-        self.points.whole().radius()
-    }
-
-    fn negligible(&self) -> f64 {
-        NEGLIGIBLE * self.points.kernel.powi(2)
-    }
-
-    fn lookups(&self) -> usize {
-        self.points.lookups
     }
 }
 
-impl<C: Bounded> Proof<'_, C> {
+impl Proof<'_, '_> {
     /// Regions that cover the poses with angles up to `theta_rad`.
     fn slabs(&self, theta_rad: f64) -> Vec<Region> {
         let count = (theta_rad / SLAB_RAD).ceil().max(1.0) as i32;
@@ -261,7 +188,7 @@ impl<C: Bounded> Proof<'_, C> {
 
     /// Cost from which a region is done: it holds no pose that beats the best by more than the gap.
     fn enough(&self) -> f64 {
-        self.best.cost * (1.0 - self.config.gap) - self.cost.negligible()
+        self.best.cost * (1.0 - self.config.gap) - NEGLIGIBLE * self.cost.kernel.powi(2)
     }
 
     /// Bounds a region, and follows its middle if that is better than the best so far.
@@ -285,7 +212,7 @@ impl<C: Bounded> Proof<'_, C> {
     fn cut_all(&mut self, mut regions: Vec<Region>, level: usize) {
         regions.sort_by(|a, b| a.lower.total_cmp(&b.lower));
         for region in regions {
-            if region.lower >= self.enough() || self.cost.lookups() >= self.budget || level >= DEEPEST {
+            if region.lower >= self.enough() || self.cost.lookups >= self.config.budget || level >= DEEPEST {
                 self.least = self.least.min(region.lower);
             } else {
                 self.cut(&region, level);
@@ -321,6 +248,7 @@ mod tests {
     use super::*;
     use crate::align::testing::{cross, cross_contacts, cuboid, filled};
     use crate::align::{AlignReport, Rung, align};
+    use crate::field::DistanceField;
     use crate::frames::PlanarPose;
     use glam::DVec3;
 
@@ -375,6 +303,11 @@ mod tests {
         }
     }
 
+    /// The settings that go to the proof at once.
+    fn certified() -> AlignConfig {
+        AlignConfig { rungs: vec![Rung::Certified], ..AlignConfig::default() }
+    }
+
     fn cost(report: &AlignReport) -> f64 {
         report.runs[report.winner].cost_m2
     }
@@ -386,13 +319,13 @@ mod tests {
             let mut points = cross_contacts(900, truth, 4e-4, seed);
             points.extend((0..100).map(|i| DVec2::new(0.012, 0.012) + DVec2::from_angle(f64::from(i)) * 3e-3));
             let fast = align(&points, field(), &AlignConfig::default()).unwrap();
-            let proved = align(&points, field(), &AlignConfig::certified()).unwrap();
+            let proved = align(&points, field(), &certified()).unwrap();
             let certificate = proved.certificate.unwrap();
             assert_eq!((fast.rung, proved.rung, fast.certificate), (Rung::Single, Rung::Certified, None));
             assert!(certificate.certified && certificate.gap() < 0.025, "{certificate:?}");
             assert!(certificate.nodes > 50 && certificate.lookups < 10_000_000, "{certificate:?}");
             assert!(cost(&fast) <= cost(&proved) * 1.02, "{} against {}", cost(&fast), cost(&proved));
-            assert_eq!(proved, align(&points, field(), &AlignConfig::certified()).unwrap(), "bit for bit");
+            assert_eq!(proved, align(&points, field(), &certified()).unwrap(), "bit for bit");
         }
     }
 
@@ -401,9 +334,9 @@ mod tests {
         let rod = DistanceField::from_mesh(&cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06))).unwrap();
         let truth = PlanarPose { theta_rad: 0.2, y_m: 1e-3, z_m: 0.0 };
         let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, truth, 3e-4, 1);
-        let proved = align(&points, &rod, &AlignConfig::certified()).unwrap();
+        let proved = align(&points, &rod, &certified()).unwrap();
         assert!(proved.certificate.unwrap().certified && proved.is_degenerate());
-        let config = AlignConfig { budget: 20_000, ..AlignConfig::certified() };
+        let config = AlignConfig { budget: 20_000, ..certified() };
         let report = align(&points, &rod, &config).unwrap();
         let certificate = report.certificate.unwrap();
         assert!(!certificate.certified && certificate.lookups < 40_000, "{certificate:?}");
@@ -416,7 +349,7 @@ mod tests {
         // Descents that see no farther than 0.3 mm: only a start beside the truth arrives.
         let truth = PlanarPose { theta_rad: 0.16, y_m: -4e-3, z_m: 4e-3 };
         let points = cross_contacts(900, truth, 2e-4, 5);
-        let config = AlignConfig { kernels_m: vec![4e-4], max_iterations: 4, ..AlignConfig::certified() };
+        let config = AlignConfig { kernels_m: vec![4e-4], max_iterations: 4, ..certified() };
         let report = align(&points, field(), &config).unwrap();
         let found = report.grasp_from_object;
         let off = (found.theta_rad - truth.theta_rad).abs().to_degrees();

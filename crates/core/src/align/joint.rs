@@ -8,14 +8,11 @@
 //!
 //! Where the membrane says too little, the mask alone answers, and the report says so ([`Basis`]).
 
-mod bound;
-mod certify;
 mod cost;
 mod curvature;
 mod evidence;
 mod image;
 mod problem;
-mod pyramid;
 mod smooth;
 mod template;
 #[cfg(test)]
@@ -57,20 +54,8 @@ pub struct JointConfig {
     pub explained: f64,
     /// The same of a predicted one.
     pub predicted_explained: f64,
-    /// Prove by branch and bound that no pose of the prior is better, or find what is.
-    pub prove: bool,
-    /// Places of the membranes, spread evenly, that a proof is about; the answer is then refined on all.
-    pub proof_points: usize,
     /// Keep per-iteration states and per-point residuals.
     pub record: bool,
-}
-
-impl JointConfig {
-    /// The answer with a proof: branch and bound over the prior, whatever the starts say. Some ten to a hundred
-    /// milliseconds. Where the mask alone answers, its answer has the proof.
-    pub fn certified() -> Self {
-        Self { prove: true, mask: AlignConfig::certified(), ..Self::default() }
-    }
 }
 
 /// Weight of the mask beside the membrane, as a factor of its mean cost.
@@ -113,8 +98,6 @@ impl Default for JointConfig {
             doubtful: 0.3,
             explained: 0.05,
             predicted_explained: 0.5,
-            prove: false,
-            proof_points: 200,
             record: false,
         }
     }
@@ -212,9 +195,6 @@ impl Register for JointConfig {
         }
         if answer.fit.explained < config.explained {
             return by_mask(JointFit { basis: Basis::LittleContact, mask_weight: 1.0, ..answer.fit });
-        }
-        if config.prove {
-            problem.prove(&mut answer);
         }
         Ok(problem.report(scene.yz(), answer))
     }

@@ -16,8 +16,8 @@ use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-use super::icp::{Matcher, Samples};
 use super::register::{Ask, Register, Scene, check_overlap, clean_scene};
+use super::samples::{Matcher, Samples};
 use super::{AlignError, AlignReport, Fate, PointFit, Prior, Run, Rung, Stop, TraceStep, observability};
 use crate::frames::PlanarPose;
 use crate::tool::ToolModel;
@@ -127,8 +127,8 @@ impl LabModel {
     /// From points of the surface, meters, object frame. Those that are not finite are left out.
     pub fn new(points: &[DVec3]) -> Self {
         let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
-        let pairs: Vec<(DVec3, DVec3)> = points.iter().map(|p| (p.with_x(0.0), DVec3::ZERO)).collect();
-        Self { flat: Samples::in_plane(&pairs), points }
+        let flat: Vec<DVec3> = points.iter().map(|p| p.with_x(0.0)).collect();
+        Self { flat: Samples::in_plane(&flat), points }
     }
 
     fn yz(&self, item: u32) -> DVec2 {
@@ -178,8 +178,7 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
     let mut paper = Loop { config, model, scene, centroid, nearest: vec![0; count], lookups: 0, trace: Vec::new() };
     let ends: Vec<End> = (0..config.starts.len()).map(|run| paper.run(run)).collect();
     let chooser: Vec<f64> = if config.has(PaperTrap::RmseChoice) {
-        let contacts: Vec<(DVec3, DVec3)> = clean.points.iter().map(|p| (*p, DVec3::ZERO)).collect();
-        let contacts = Samples::in_space(&contacts);
+        let contacts = Samples::in_space(&clean.points);
         ends.iter().map(|end| gated_rmse(model, &contacts, end.run.end)).collect()
     } else {
         ends.iter().map(|end| end.run.cost_m2).collect()
@@ -189,7 +188,6 @@ pub fn lab_icp(points: &[DVec3], model: &LabModel, config: &LabIcpConfig) -> Res
     let fits = if config.record { fits(&model.flat, points, run.end) } else { Vec::new() };
     Ok(AlignReport {
         grasp_from_object: run.end,
-        grasp_from_object_6dof: None,
         converged: run.stop.converged(),
         stop: run.stop,
         start: run.start,
@@ -306,8 +304,7 @@ impl Loop<'_> {
         let (sin, cos) = requested.theta_rad.sin_cos();
         let moved: Vec<DVec2> =
             self.model.points.iter().map(|p| DVec2::new(p.y * cos + p.x * sin + requested.y_m, p.z)).collect();
-        let pairs: Vec<(DVec3, DVec3)> = moved.iter().map(|p| (DVec3::new(0.0, p.x, p.y), DVec3::ZERO)).collect();
-        let tree = Samples::in_plane(&pairs);
+        let tree = Samples::in_plane(&moved.iter().map(|p| DVec3::new(0.0, p.x, p.y)).collect::<Vec<_>>());
         let mut matched = Matched { changed: true, ..Matched::default() };
         for (p, slot) in self.scene.iter().zip(&mut self.nearest) {
             let (item, _) = tree.nearest(DVec3::new(0.0, p.x, p.y));
@@ -332,7 +329,6 @@ impl Loop<'_> {
                 run,
                 iteration,
                 grasp_from_object,
-                grasp_from_object_6dof: None,
                 cost_m2: matched.squares / points as f64,
                 mask_cost_m2: None,
                 inlier_share: matched.inliers as f64 / points as f64,

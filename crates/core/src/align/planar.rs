@@ -375,7 +375,6 @@ impl<'a> Problem<'a> {
         let pose = config.prior.slid_in(answer.pose, told);
         AlignReport {
             grasp_from_object: pose,
-            grasp_from_object_6dof: None,
             converged: best.stop.converged(),
             stop: best.stop,
             start: answer.starts[answer.winner],

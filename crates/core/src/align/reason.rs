@@ -32,9 +32,6 @@ pub enum Reason {
     /// Farther than the gate: its pull is negligible.
     #[strum(to_string = "beyond the gate")]
     BeyondGate,
-    /// Left out by a rejector.
-    #[strum(to_string = "trimmed")]
-    Trimmed,
     /// Outside the stored field of the tool.
     #[strum(to_string = "out of frame")]
     OutOfFrame,
@@ -52,7 +49,6 @@ impl From<Fate> for Reason {
             Fate::Inlier => Self::Inlier,
             Fate::Inside => Self::Inside,
             Fate::BeyondGate => Self::BeyondGate,
-            Fate::Trimmed => Self::Trimmed,
             Fate::OutOfField => Self::OutOfFrame,
             Fate::NotFinite => Self::InvalidDepth,
         }

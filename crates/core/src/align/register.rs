@@ -123,8 +123,6 @@ impl Register for AlignConfig {
 pub(super) struct CleanScene {
     /// Meters, grasp frame.
     pub(super) points: Vec<DVec3>,
-    /// For each offered point whether it is in `points`.
-    pub(super) kept: Vec<bool>,
     /// Mean of the points.
     pub(super) centroid: DVec3,
     /// Points left out.
@@ -135,13 +133,12 @@ pub(super) struct CleanScene {
 pub(super) fn clean_scene(scene: &Scene<'_>, needed: usize) -> Result<CleanScene, AlignError> {
     const MAX_COORDINATE_M: f64 = 1e6;
     let usable = |p: &DVec3| p.is_finite() && p.abs().max_element() <= MAX_COORDINATE_M;
-    let kept: Vec<bool> = scene.points().iter().map(usable).collect();
     let points: Vec<DVec3> = scene.points().iter().copied().filter(usable).collect();
     let yz: Vec<DVec2> = points.iter().map(|p| DVec2::new(p.y, p.z)).collect();
     let Cleaned { centroid, .. } = clean(&yz, needed)?;
     let x = points.iter().map(|p| p.x - points[0].x).sum::<f64>() / points.len() as f64 + points[0].x;
-    let not_finite = kept.len() - points.len();
-    Ok(CleanScene { points, kept, centroid: DVec3::new(x, centroid.x, centroid.y), not_finite })
+    let not_finite = scene.points().len() - points.len();
+    Ok(CleanScene { points, centroid: DVec3::new(x, centroid.x, centroid.y), not_finite })
 }
 
 /// Refuses points of which next to none come near the silhouette at any start: a nearest neighbor always exists,

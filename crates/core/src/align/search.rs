@@ -145,7 +145,6 @@ impl<'a> Search<'a> {
                 run,
                 iteration: at.iterations,
                 grasp_from_object: at.state.to_pose(self.centroid),
-                grasp_from_object_6dof: None,
                 cost_m2: n.cost / points as f64,
                 mask_cost_m2: None,
                 inlier_share: n.inliers as f64 / points as f64,

@@ -46,36 +46,6 @@ impl Slopes {
     }
 }
 
-/// For each cell, between which values a grid lies in a window around it: the lowest with its sign turned, and the
-/// highest.
-pub(super) struct Ranges {
-    pub(super) cells: Vec<[f32; 2]>,
-    /// Cells that the window reaches beyond the cell.
-    pub(super) reach: usize,
-}
-
-impl Ranges {
-    /// Ranges in windows that reach so many cells beyond each cell. Beyond the border the grid goes on with the border's
-    /// values.
-    pub(super) fn of<const N: usize>(grid: Lattice<'_>, reaches: [usize; N]) -> [Self; N] {
-        let (columns, rows) = (grid.columns, grid.rows);
-        let mut cells = vec![[f32::NEG_INFINITY; 2]; columns * rows];
-        for row in 0..rows - 1 {
-            for column in 0..columns - 1 {
-                let corners = grid.cell(column, row);
-                cells[row * columns + column] =
-                    corners.into_iter().fold([f32::NEG_INFINITY; 2], |range, value| greater(range, [-value, value]));
-            }
-        }
-        let mut window = 0;
-        reaches.map(|reach| {
-            cells = widen(&cells, columns, window, reach);
-            window = reach;
-            Self { cells: cells.clone(), reach }
-        })
-    }
-}
-
 /// Lower bound of a sum of costs over a box of states: a plane over it.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Floor {
@@ -88,13 +58,6 @@ pub(super) struct Floor {
 }
 
 impl Floor {
-    /// Adds `scale` times another.
-    pub(super) fn add(&mut self, other: &Self, scale: f64) {
-        self.low += scale * other.low;
-        self.slope.iter_mut().zip(other.slope).for_each(|(slope, other)| *slope += scale * other);
-        self.here += scale * other.here;
-    }
-
     /// Least cost anywhere in a box whose half widths (angle, y, z) are `half`, less what the sums may have been rounded up.
     pub(super) fn least(&self, half: [f64; 3]) -> f64 {
         let fall: f64 = self.slope.iter().zip(half).map(|(slope, half)| slope.abs() * half).sum();

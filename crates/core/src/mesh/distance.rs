@@ -87,17 +87,6 @@ impl MeshDistance {
         if p.is_finite() { self.nearest_below(p, f64::INFINITY).sqrt() } else { f64::NAN }
     }
 
-    /// The nearest point of the surface within `limit_m` (meters, may be infinite) and the unit normal of its
-    /// triangle, as the mesh is wound. `None` if there is none, or `p` is not finite.
-    pub(crate) fn closest(&self, p: DVec3, limit_m: f64) -> Option<(DVec3, DVec3)> {
-        if !p.is_finite() {
-            return None;
-        }
-        let triangle = self.search(p, limit_m * limit_m).triangle;
-        let t @ [a, b, c] = self.triangles.get(triangle?)?;
-        Some((nearest_on_triangle(t, p), (*b - *a).cross(*c - *a).try_normalize()?))
-    }
-
     /// Signed distance, meters, negative inside. NaN for a point that is not finite.
     pub fn signed(&self, p: DVec3) -> f64 {
         let distance = self.unsigned(p);
@@ -154,19 +143,7 @@ impl MeshDistance {
 
     /// Squared distance to the nearest triangle, or `limit` if none is nearer than that.
     fn nearest_below(&self, p: DVec3, limit: f64) -> f64 {
-        self.search(p, limit).squared
-    }
-
-    /// Triangles that are looked at to find the one nearest to `p`, which must be finite: some ten, but all of those
-    /// that are long and thin and lie side by side, since the boxes do not tell them apart.
-    pub(crate) fn effort(&self, p: DVec3) -> usize {
-        self.search(p, f64::INFINITY).looked_at
-    }
-
-    /// The triangle nearest to `p`, if one is nearer than the root of `limit`.
-    fn search(&self, p: DVec3, limit: f64) -> Nearest {
         let mut best = limit;
-        let (mut triangle, mut looked_at) = (None, 0);
         let mut stack = vec![(0u32, self.nodes[0].distance_squared(p))];
         while let Some((index, distance)) = stack.pop() {
             if distance >= best {
@@ -185,26 +162,13 @@ impl MeshDistance {
                     stack.push((b, db));
                 }
             } else {
-                looked_at += node.count as usize;
-                for (i, t) in self.leaf(node).iter().enumerate() {
-                    let distance = (nearest_on_triangle(t, p) - p).length_squared();
-                    if distance < best {
-                        best = distance;
-                        triangle = Some(node.start as usize + i);
-                    }
+                for t in self.leaf(node) {
+                    best = best.min((nearest_on_triangle(t, p) - p).length_squared());
                 }
             }
         }
-        Nearest { squared: best, triangle, looked_at }
+        best
     }
-}
-
-/// Result of a search.
-struct Nearest {
-    /// Squared distance to the triangle; the limit if there is none.
-    squared: f64,
-    triangle: Option<usize>,
-    looked_at: usize,
 }
 
 /// Puts the node over `triangles[start..end]` and all below it at the end of `nodes`; returns its index.
@@ -296,12 +260,6 @@ mod tests {
         q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
     }
 
-    /// True where a normal is one of the six of an axis-aligned box.
-    fn exact_axis(normal: DVec3) -> bool {
-        let n = normal.abs();
-        (n.max_element() - 1.0).abs() < 1e-12 && (n.element_sum() - 1.0).abs() < 1e-12
-    }
-
     proptest! {
         #[test]
         fn agrees_with_the_exact_box(x in -0.03..0.03f64, y in -0.03..0.03f64, z in -0.03..0.03f64) {
@@ -313,9 +271,6 @@ mod tests {
             let near = distance.signed_within(p, 0.001);
             prop_assert_eq!(near <= 0.001, exact <= 0.001);
             prop_assert!(exact.abs() > 0.001 || (near - exact).abs() < 1e-12);
-            let (foot, normal) = distance.closest(p, f64::INFINITY).unwrap();
-            prop_assert!((foot.distance(p) - exact.abs()).abs() < 1e-12);
-            prop_assert!(exact_axis(normal) && distance.closest(p, 0.5 * exact.abs()).is_none());
         }
     }
 

@@ -16,7 +16,7 @@ use crate::pose::PoseResult;
 use touch2touch_core::deviation;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::pose::{RegistrationChoice, ToolModel};
+use touch2touch_core::pose::{Registration, ToolModel};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::{angle_error, mm};
 use touch2touch_core::verdict::Verdict;
@@ -67,7 +67,7 @@ pub struct PairParts<'a> {
     /// Bases of the contact masks, as [`crate::mask::made_of`] says them.
     pub mask: &'a str,
     /// The registration.
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
     /// Pose by the registration; `None` where there is none.
     pub pose: Option<&'a PoseResult>,
     /// The true pose, `grasp_from_object`, where it is known.
@@ -268,7 +268,7 @@ mod tests {
         let mut model = spec.mesh();
         model.vertices.iter_mut().for_each(|v| v.x -= 0.004);
         let tool = ToolModel::new(model.clone()).unwrap();
-        let (registration, truth) = (RegistrationChoice::default(), sample.grasp_from_object);
+        let (registration, truth) = (Registration::default(), sample.grasp_from_object);
         let found = pose(&clouds.contact_points(), &tool, &*registration.method(), Ask::default(), truth).unwrap();
         let parts = PairParts {
             name: "a/b",

@@ -20,7 +20,7 @@ use touch2touch_core::align::Ask;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::label::agreement;
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PadId;
 
 /// Worth of a mask model on measured imprints whose tool and true pose are known.
@@ -62,7 +62,7 @@ pub(super) fn from_cad(touch: Touch<'_>, models: &Models) -> Result<Proposals, T
 pub fn mask_worth(
     dataset: &Dataset,
     pairs: &BTreeSet<PairId>,
-    (model, engine, registration): (&BundleInfo, EngineChoice, RegistrationChoice),
+    (model, engine, registration): (&BundleInfo, EngineChoice, Registration),
     models: &Models,
     cx: &JobCx,
 ) -> Result<Option<MaskWorth>, TaskError> {

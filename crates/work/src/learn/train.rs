@@ -30,7 +30,7 @@ use crate::models::Models;
 #[cfg(feature = "tune")]
 use crate::pairs::spread;
 use touch2touch_core::dataset::{PairId, Split};
-use touch2touch_core::pose::RegistrationChoice;
+use touch2touch_core::pose::Registration;
 use touch2touch_core::units::counted;
 
 pub use crate::error::Remark;
@@ -114,7 +114,7 @@ pub struct TrainSetup {
     /// The engine that makes these predictions again.
     pub engine: EngineChoice,
     /// The registration that the worth is told by, where true poses are known.
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
     /// The division.
     pub choice: TrainChoice,
     /// Length of the training.

@@ -17,7 +17,7 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::recipe_id::Named;
 use crate::labels::{ImprintOf, ImprintSource};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::pose::{Registration, RegistrationChoice};
+use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
 
@@ -59,7 +59,7 @@ pub struct Recipe {
     pub hand: bool,
     /// The registration; files have called it the engine from the beginning.
     #[serde(rename = "engine")]
-    pub registration: RegistrationChoice,
+    pub registration: Registration,
     /// The engine that runs the models.
     #[serde(rename = "runtime")]
     pub engine: EngineChoice,
@@ -150,7 +150,7 @@ impl Default for Recipe {
             mask: MaskChoice::default(),
             mask_model: None,
             hand: true,
-            registration: RegistrationChoice::default(),
+            registration: Registration::default(),
             engine: EngineChoice::default(),
         }
     }
@@ -166,7 +166,7 @@ impl Recipe {
             mask: MaskChoice::UNNAMED,
             mask_model: None,
             hand: true,
-            registration: Registration::DistanceField.into(),
+            registration: Registration::DistanceField(None),
             engine: EngineChoice::Auto,
         }
     }

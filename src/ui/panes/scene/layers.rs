@@ -34,7 +34,6 @@ pub(super) fn reason_rgb(reason: Reason) -> [u8; 3] {
         Reason::Inlier => [0x00, 0x9e, 0x73],
         Reason::Inside => [0xf0, 0xe4, 0x42],
         Reason::BeyondGate => [0xd5, 0x5e, 0x00],
-        Reason::Trimmed => [0xcc, 0x79, 0xa7],
         Reason::OutOfFrame => [0x00, 0x72, 0xb2],
         Reason::InvalidDepth => [0xe8, 0xe8, 0xe8],
         Reason::OutsideMask => [0x70, 0x70, 0x70],

@@ -46,25 +46,6 @@ impl Patch {
     pub(super) fn len(&self) -> usize {
         self.len
     }
-
-    /// Squared distance of a place from the center, square nodes.
-    fn squared(&self, i: usize) -> f32 {
-        self.y[i] * self.y[i] + self.z[i] * self.z[i]
-    }
-
-    /// Greatest distance of a place from the center, meters.
-    pub(super) fn radius(&self) -> f64 {
-        f64::from((0..self.len).map(|i| self.squared(i)).fold(0f32, f32::max).sqrt()) * STEP_M
-    }
-
-    /// Patch with the places far from the center first: neighbors in it move about equally far when it turns.
-    pub(super) fn outermost_first(&self) -> Self {
-        let mut order: Vec<usize> = (0..self.len).collect();
-        order.sort_by(|&a, &b| self.squared(b).total_cmp(&self.squared(a)));
-        order.extend(self.len..self.y.len());
-        let [y, z, band] = [&self.y, &self.z, &self.band].map(|list| order.iter().map(|&i| list[i]).collect());
-        Self { y, z, band, len: self.len }
-    }
 }
 
 /// Residuals of a step of lanes and how they change with the place: meters, and meters per node.
@@ -302,7 +283,6 @@ impl Cost for Noted<'_, '_> {
             run: self.run,
             iteration: at.iterations,
             grasp_from_object: at.state.to_pose(self.centroid),
-            grasp_from_object_6dof: None,
             cost_m2: sums.cost * kernel_m * kernel_m,
             mask_cost_m2: self.cost.mask.map(|mask| mask.cost(at.state) * kernel_m * kernel_m),
             inlier_share: sums.inliers as f64 / points.max(1) as f64,

@@ -13,9 +13,7 @@ use crate::align::batch::{Cloud, State};
 use crate::align::observability::of_cloud;
 use crate::align::planar::fits;
 use crate::align::search::{Progress, Search, minimize};
-use crate::align::{
-    ANGLE_SCALE_M, AlignError, AlignReport, Certificate, MIN_POINTS, Run, Rung, Scene, TraceStep, clean,
-};
+use crate::align::{ANGLE_SCALE_M, AlignError, AlignReport, MIN_POINTS, Run, Rung, Scene, TraceStep, clean};
 use crate::frames::PlanarPose;
 use crate::mesh::sampling::spread;
 use crate::tent::FreeShape;
@@ -39,7 +37,7 @@ pub(super) fn check(config: &JointConfig) -> Result<(), AlignError> {
     if config.starts.iter().any(|s| !s.is_finite()) {
         return bad("starts");
     }
-    if config.points.iter().chain(&config.mask_points).chain([&config.proof_points]).any(|n| *n < MIN_POINTS) {
+    if config.points.iter().chain(&config.mask_points).any(|n| *n < MIN_POINTS) {
         return bad("points");
     }
     if !config.kernels_m.iter().chain(&config.mask_kernels_m).all(positive) {
@@ -94,7 +92,6 @@ pub(super) struct Answer {
     runs: Vec<Progress>,
     winner: usize,
     pub(super) rung: Rung,
-    pub(super) certificate: Option<Certificate>,
     pub(super) fit: JointFit,
     pub(super) lookups: usize,
     trace: Vec<TraceStep>,
@@ -233,10 +230,6 @@ impl<'a> Problem<'a> {
         None
     }
 
-    pub(super) fn mask(&self) -> Option<&[Cloud; 2]> {
-        self.mask.as_ref()
-    }
-
     /// The images as a stage compares them.
     fn patches(&self, stage: usize) -> Patches<'_> {
         self.patches_of(stage.min(self.answer_band()), self.config.points[stage])
@@ -327,24 +320,7 @@ impl<'a> Problem<'a> {
         };
         let points = descents.patches[LAST].iter().map(|(_, patch)| patch.len()).sum();
         let Descents { lookups, trace, .. } = descents;
-        Answer { starts, runs, winner, rung, certificate: None, fit, lookups, trace, points }
-    }
-
-    /// Refines one more state for an answer, and takes it if it is better.
-    pub(super) fn follow(&self, answer: &mut Answer, state: State) {
-        let mut descents = self.descents();
-        let (run, mut at) = (answer.runs.len(), Progress::new(state));
-        descents.descend(run, &mut at, LAST, answer.fit.mask_weight);
-        answer.runs.push(at);
-        answer.starts.push(state.to_pose(self.centroid));
-        answer.lookups += descents.lookups;
-        answer.trace.append(&mut descents.trace);
-        let won = answer.runs[answer.winner];
-        let allowed = [&at, &won].map(|run| self.allowed(run));
-        if allowed == [true, false] || allowed[0] == allowed[1] && at.cost < won.cost {
-            answer.winner = run;
-            (answer.fit.explained, answer.fit.noise_m) = descents.told(at.state);
-        }
+        Answer { starts, runs, winner, rung, fit, lookups, trace, points }
     }
 
     /// Runs by preference: within the prior before outside, then the cheaper one.
@@ -412,14 +388,13 @@ impl<'a> Problem<'a> {
             if config.record { fits(points_yz, &self.tool.field, pose, config.mask_kernels_m[1]) } else { Vec::new() };
         AlignReport {
             grasp_from_object: pose,
-            grasp_from_object_6dof: None,
             converged: best.stop.converged(),
             stop: best.stop,
             start: answer.starts[answer.winner],
             winner: answer.winner,
             rung: answer.rung,
             ladder: Vec::new(),
-            certificate: answer.certificate,
+            certificate: None,
             iterations: runs.iter().map(|run| run.iterations).sum(),
             lookups: answer.lookups,
             offered: points_yz.len(),

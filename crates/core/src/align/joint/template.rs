@@ -5,7 +5,6 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use glam::DVec2;
 
-use super::pyramid::Pyramid;
 use super::smooth::{BANDS, Layer, Smooth};
 use crate::relax::Field;
 use crate::tent::{FreeShape, STEP_M, heights, lifted, tent};
@@ -22,7 +21,6 @@ pub(super) struct BandField {
     pub(super) field: Field,
     /// `(y, z)` of node (0, 0), meters.
     pub(super) origin: DVec2,
-    pub(super) pyramid: Pyramid,
 }
 
 /// The bands of one side of a tool, in the order of [`BANDS`].
@@ -66,6 +64,6 @@ fn made(tool: &ToolModel, side: f64, free: FreeShape) -> Option<Template> {
                     smooth.at(narrow, column, row)[0] - smooth.at(wide, column, row)[0];
             }
         }
-        BandField { field, origin: sheet.origin, pyramid: Pyramid::default() }
+        BandField { field, origin: sheet.origin }
     }))
 }

@@ -95,8 +95,7 @@ fn the_wrong_frame_applies_almost_nothing_of_a_start() {
 fn the_labs_choice_takes_an_empty_match() {
     let truth = PlanarPose { theta_rad: 0.1, y_m: 0.001, z_m: 0.0 };
     let scene = in_space(cross_contacts(300, truth, 1e-4, 4));
-    let contacts: Vec<(DVec3, DVec3)> = scene.iter().map(|p| (*p, DVec3::ZERO)).collect();
-    let contacts = Samples::in_space(&contacts);
+    let contacts = Samples::in_space(&scene);
     let model = model(2000);
     let far = PlanarPose { y_m: 0.5, ..truth };
     assert_eq!(gated_rmse(&model, &contacts, far), 0.0);

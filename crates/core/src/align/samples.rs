@@ -1,4 +1,4 @@
-//! Model points with normals, and the nearest of them to a contact point.
+//! Model points, and the nearest of them to a contact point.
 
 use std::sync::Arc;
 
@@ -13,59 +13,37 @@ enum Index {
     Space(Tree<3>),
 }
 
-/// Points with unit normals (zero where there is none), meters, object frame, under a k-d tree.
+/// Points, meters, object frame, under a k-d tree.
 #[derive(Clone, Debug)]
-pub struct Samples {
+pub(super) struct Samples {
     points: Arc<[DVec3]>,
-    normals: Arc<[DVec3]>,
     index: Arc<Index>,
 }
 
 impl Samples {
-    /// Compares in all three coordinates. Pairs that are not finite are left out.
-    pub fn in_space(pairs: &[(DVec3, DVec3)]) -> Self {
-        Self::new(pairs, |points| Index::Space(Tree::new(&points.iter().map(DVec3::to_array).collect::<Vec<_>>())))
+    /// Compares in all three coordinates. Points that are not finite are left out.
+    pub(super) fn in_space(points: &[DVec3]) -> Self {
+        Self::new(points, |points| Index::Space(Tree::new(&points.iter().map(DVec3::to_array).collect::<Vec<_>>())))
     }
 
-    /// Compares in y and z only. Pairs that are not finite are left out.
-    pub fn in_plane(pairs: &[(DVec3, DVec3)]) -> Self {
-        Self::new(pairs, |points| Index::Plane(Tree::new(&points.iter().map(|p| [p.y, p.z]).collect::<Vec<_>>())))
+    /// Compares in y and z only. Points that are not finite are left out.
+    pub(super) fn in_plane(points: &[DVec3]) -> Self {
+        Self::new(points, |points| Index::Plane(Tree::new(&points.iter().map(|p| [p.y, p.z]).collect::<Vec<_>>())))
     }
 
-    fn new(pairs: &[(DVec3, DVec3)], index: impl Fn(&[DVec3]) -> Index) -> Self {
+    fn new(points: &[DVec3], index: impl Fn(&[DVec3]) -> Index) -> Self {
         // A NaN would make every comparison, and so the tree, meaningless.
-        let (points, normals): (Vec<DVec3>, Vec<DVec3>) =
-            pairs.iter().filter(|(p, n)| p.is_finite() && n.is_finite()).copied().unzip();
-        Self { index: Arc::new(index(&points)), points: points.into(), normals: normals.into() }
-    }
-
-    /// Number of points.
-    pub fn len(&self) -> usize {
-        self.points.len()
-    }
-
-    /// True without a point.
-    pub fn is_empty(&self) -> bool {
-        self.points.is_empty()
+        let points: Arc<[DVec3]> = points.iter().copied().filter(|p| p.is_finite()).collect();
+        Self { index: Arc::new(index(&points)), points }
     }
 
     /// A point, meters, object frame.
-    pub fn point(&self, item: u32) -> DVec3 {
+    pub(super) fn point(&self, item: u32) -> DVec3 {
         self.points[item as usize]
     }
 
-    /// Normal of a point, object frame; zero where there is none.
-    pub fn normal(&self, item: u32) -> DVec3 {
-        self.normals[item as usize]
-    }
-
-    /// The points, meters, object frame.
-    pub fn points(&self) -> &[DVec3] {
-        &self.points
-    }
-
     /// The nearest point and how much farther the second nearest is, meters. `p` must be finite; the list not empty.
-    pub(in crate::align) fn nearest(&self, p: DVec3) -> (u32, f64) {
+    pub(super) fn nearest(&self, p: DVec3) -> (u32, f64) {
         let Two { items, squared } = match &*self.index {
             Index::Plane(tree) => tree.two_nearest(&[p.y, p.z]),
             Index::Space(tree) => tree.two_nearest(&p.to_array()),
@@ -78,22 +56,22 @@ impl Samples {
 /// for another model point to come nearer: half of the second nearest's lead at the last look-up. The answers are
 /// those of a full search.
 #[derive(Debug)]
-pub(in crate::align) struct Matcher {
+pub(super) struct Matcher {
     nearest: Vec<u32>,
     at: Vec<DVec3>,
     slack: Vec<f64>,
     /// Questions to the tree.
-    pub(in crate::align) lookups: usize,
+    pub(super) lookups: usize,
 }
 
 impl Matcher {
-    pub(in crate::align) fn new(count: usize) -> Self {
+    pub(super) fn new(count: usize) -> Self {
         Self { nearest: vec![u32::MAX; count], at: vec![DVec3::ZERO; count], slack: vec![-1.0; count], lookups: 0 }
     }
 
     /// The model point nearest to contact `i`, now at `p` in the object frame, and whether it is another than before.
     #[inline]
-    pub(in crate::align) fn find(&mut self, samples: &Samples, i: usize, p: DVec3) -> (u32, bool) {
+    pub(super) fn find(&mut self, samples: &Samples, i: usize, p: DVec3) -> (u32, bool) {
         let before = self.nearest[i];
         let slack = self.slack[i];
         if slack > 0.0 && p.distance_squared(self.at[i]) < slack * slack {
@@ -115,17 +93,12 @@ mod tests {
     use crate::align::testing::{cross, cuboid};
     use proptest::prelude::*;
 
-    fn pairs(points: impl Iterator<Item = DVec3>) -> Vec<(DVec3, DVec3)> {
-        points.map(|p| (p, DVec3::X)).collect()
-    }
-
     proptest! {
         /// A walk of small and large steps: the shortcut must give what a search of all points gives.
         #[test]
         fn the_matcher_equals_a_full_search(seed in 0u64..50, flat in proptest::bool::ANY) {
             let points = cross().sample_surface(300, seed);
-            let samples =
-                if flat { Samples::in_plane(&pairs(points.iter().copied())) } else { Samples::in_space(&pairs(points.iter().copied())) };
+            let samples = if flat { Samples::in_plane(&points) } else { Samples::in_space(&points) };
             let mut matcher = Matcher::new(40);
             let start = cross().sample_surface(40, seed + 1000);
             for step in 0..30 {
@@ -146,20 +119,14 @@ mod tests {
     #[test]
     fn axis_aligned_coincident_and_broken_points_are_taken() {
         let bar = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.03)).sample_surface(5000, 1);
-        for samples in [Samples::in_space(&pairs(bar.iter().copied())), Samples::in_plane(&pairs(bar.iter().copied()))]
-        {
-            assert_eq!(samples.len(), 5000);
+        for samples in [Samples::in_space(&bar), Samples::in_plane(&bar)] {
             let (item, _) = samples.nearest(DVec3::new(0.003, 0.0, 0.0));
             assert!(samples.point(item).with_x(0.0).length() < 0.002);
         }
-        let same = Samples::in_space(&pairs(std::iter::repeat_n(DVec3::splat(0.01), 5000)));
+        let same = Samples::in_space(&[DVec3::splat(0.01); 5000]);
         assert_eq!(same.nearest(DVec3::ZERO).1, 0.0);
-        assert_eq!(same.len(), 5000);
-        assert!(
-            Samples::in_space(&[]).is_empty()
-                && Samples::in_plane(&pairs(std::iter::repeat_n(DVec3::NAN, 9))).is_empty()
-        );
-        let one = Samples::in_plane(&pairs(std::iter::once(DVec3::Y)));
+        assert!(Samples::in_space(&[]).points.is_empty() && Samples::in_plane(&[DVec3::NAN; 9]).points.is_empty());
+        let one = Samples::in_plane(&[DVec3::Y]);
         assert_eq!(one.nearest(DVec3::ZERO), (0, f64::INFINITY));
     }
 }
