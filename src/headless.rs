@@ -15,7 +15,6 @@ mod figure;
 mod generate;
 mod guard;
 mod label;
-mod ledger;
 mod masks;
 mod models;
 mod notes;
@@ -76,8 +75,6 @@ enum Verb {
     Generate(generate::GenerateArgs),
     /// Any two imprints of a pair against each other: measured, predictions, the mean of seeds, a stored picture.
     Compare(Box<compare::CompareArgs>),
-    /// Everything between the decoder and the meters, for one pair: stages, histograms, line against truth, what is odd.
-    Ledger(Box<ledger::LedgerArgs>),
     /// Statistics of a data set's predictions and measurements, for the shift `--shift refit`.
     Stats(stats::StatsArgs),
     /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
@@ -253,7 +250,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Simulate(args)) => simulate::run(&args),
         Some(Verb::Generate(args)) => generate::run(&args),
         Some(Verb::Compare(args)) => compare::run(&args),
-        Some(Verb::Ledger(args)) => ledger::run(&args),
         Some(Verb::Stats(args)) => stats::run(&args),
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),

@@ -120,7 +120,6 @@ fn how(action: Action) -> How {
         A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
         A::OwnStarts => Verb(&["pose", "demo", "--pair", "a"]),
         A::NextPoseEngine => Options(&["pose", "demo", "--engine", "lab"]),
-        A::DepthChain => Verb(&["ledger", "demo", "--pair", "a"]),
         // Steps, residuals and reasons are in the report of the registration.
         A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
             Options(&["pose", "demo", "--trace", "--json"])

@@ -1,8 +1,5 @@
 //! The program as a user runs it: one JSON object on standard output, exit codes that mean what they say.
 
-#[cfg(feature = "onnx")]
-mod chain;
-
 use std::path::Path;
 use std::process::Output;
 
@@ -26,6 +23,8 @@ mod pages;
 mod queue;
 mod read_as;
 mod refused;
+#[cfg(feature = "onnx")]
+mod stats;
 mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]

@@ -181,7 +181,6 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "masks export --out OUT",
         "label",
         "compare --pair a",
-        "ledger --pair a",
         "figure --pairs a --out OUT.png",
         "export --pair a --out OUT",
         "training-data --out OUT",

@@ -123,7 +123,7 @@ fn the_studio_shows_a_predicted_color_picture() {
     for absent in [
         results::imprint(&state, ImprintSource::Predicted, lab::RIGHT).without::<()>(),
         results::comparison(&state, lab::RIGHT).without(),
-        results::ledger(&state, lab::RIGHT).without(),
+        results::flags(&state, lab::RIGHT).without(),
     ] {
         assert!(matches!(absent, Lookup::Absent(Absent::PredictsColor)), "{absent:?}");
     }

@@ -326,8 +326,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.footprint_visible ^= true));
         SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [],
             _ => does(prefer(|s| s.theme = next_of(&s.theme)));
-        DepthChain, View, "Depth chain", "Shows everything between the decoder and the meters, stage by stage", [],
-            _ => ui(UiRequest::ShowPane(Pane::Ledger));
         InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [],
             _ => does(prefer(|s| s.workspace = Workspace::Inspect));
         AlignWorkspace, View, "Align", "The cloud on the CAD model", [],
@@ -455,7 +453,6 @@ impl Action {
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",
             Self::SwitchTheme => "mode bright black white appearance",
-            Self::DepthChain => "ledger trace pipeline stages",
             Self::Screenshot | Self::SavePane => "png picture image figure save export",
             Self::CopyPane => "png picture image figure clipboard",
             Self::CopyHovered => "clipboard number",

@@ -24,7 +24,7 @@ pub use dataset::{
     AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey, ToolKey,
     TrainPlanKey,
 };
-pub use imprint::{AmbiguityKey, ColorKey, ImprintKey, LedgerKey, MeanKey, MetersKey, PictureKey};
+pub use imprint::{AmbiguityKey, ColorKey, FlagsKey, ImprintKey, MeanKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};
 pub use mask::{AutomaticMask, MaskKey, MaskVersion};
 pub use pose::{CloudKey, DeviationKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey};

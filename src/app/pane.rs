@@ -80,8 +80,8 @@ pub enum Demand {
     Comparison,
     /// The ambiguity of the GelSlim image.
     Ambiguity,
-    /// The depth chain.
-    Ledger,
+    /// What is implausible about a prediction's way to meters.
+    Flags,
     /// Any two imprints against each other.
     Versus,
     /// Cloud and pose in 3D, of the sides that are chosen.
@@ -107,7 +107,7 @@ macro_rules! panes {
                 at [Inspect Left, Align Left, Label Left, Evaluate Left, Adapt Left]
             } }
             metrics { Metrics {
-                "Metrics", "The metrics of this pair", Form, needs [Comparison, Ambiguity, Ledger, Poses],
+                "Metrics", "The metrics of this pair", Form, needs [Comparison, Ambiguity, Flags, Poses],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             generate { Generate {
@@ -137,10 +137,6 @@ macro_rules! panes {
             versus { Compare {
                     "Compare", "Any two imprints of the touch against each other: subtracted, side by side, wiped, in 3D",
                     Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
-            } }
-            ledger { Ledger {
-                "Depth chain" as "Chain", "Everything between the decoder and the meters, stage by stage",
-                Form, needs [Ledger], at [Inspect Bottom(1), Evaluate Bottom(3)]
             } }
             timemachine { TimeMachine {
                 "Time machine", "The steps of a registration, forwards and backwards",
@@ -218,7 +214,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Comparison, Imprint, Ledger, Masks, Pair, Poses, Scene, Scores,
+                    Ambiguity, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene, Scores,
                     Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
@@ -261,7 +257,6 @@ impl Pane {
         match self {
             Self::Settings | Self::Log => true,
             Self::Generate => workspace != Workspace::Inspect,
-            Self::Ledger => workspace == Workspace::Evaluate,
             _ => false,
         }
     }

@@ -7,7 +7,6 @@ use serde::Serialize;
 
 use super::args::{DatasetArgs, JsonArgs, RegistrationParser};
 use super::contact_mask::{MaskArgs, labels_of};
-use super::ledger::write_colored;
 use super::notes::Notes;
 use super::recipe::ModelArgs;
 use super::{Output, ToolArgs, VerbResult};
@@ -15,6 +14,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::manual::PoseDifference;
+use touch2touch_core::picture::colored;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Text;
 use touch2touch_core::units::{fixed, mm};
@@ -22,7 +22,7 @@ use touch2touch_work::compare::{Comparison, Depicted, between};
 use touch2touch_work::depict::{SubjectImprints, depict};
 use touch2touch_work::error::TaskError;
 use touch2touch_work::feel::Touch;
-use touch2touch_work::io::npz;
+use touch2touch_work::io::{images, npz};
 use touch2touch_work::job::JobCx;
 use touch2touch_work::labels::{ImprintSource, Labels};
 use touch2touch_work::pose::PoseResult;
@@ -228,7 +228,8 @@ fn write(out: &Path, finger: &str, error: &DepthMap) -> anyhow::Result<()> {
         .map_err(|err| anyhow::anyhow!("cannot create the output folder: {err}: {}", out.display()))?;
     npz::write_npy(&out.join(format!("a-minus-b-{finger}.npy")), error)?;
     let range = Range::symmetric(DIFFERENCE_M);
-    write_colored(&out.join(format!("a-minus-b-{finger}.png")), error, ColorMap::Diverging, range)
+    let picture = colored(error, ColorMap::Diverging, range).map(|pixel| pixel.map(f32::from));
+    Ok(images::write_rgb8(&out.join(format!("a-minus-b-{finger}.png")), &picture)?)
 }
 
 fn text(report: &Report) -> String {

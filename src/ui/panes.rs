@@ -4,7 +4,6 @@ pub(crate) mod adapt;
 pub(crate) mod browser;
 pub(crate) mod generate;
 pub(crate) mod images;
-pub(crate) mod ledger;
 pub(crate) mod log;
 pub(crate) mod masks;
 pub(crate) mod metrics;

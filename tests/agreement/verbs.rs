@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::random::{chain, compared, files, labels, posed, tables, watched};
+use super::random::{compared, files, labels, posed, tables, watched};
 use super::{exchange, proposals, python, recipes, stills};
 use crate::support::run;
 
@@ -38,7 +38,6 @@ fn held(verb: &str) -> Option<Held> {
             compared::any_two_imprints_differ_by_the_same_in_the_pane_and_by_the_verb,
             super::two_predictions_are_compared_by_one_function,
         ]),
-        "ledger" => By(&[chain::a_random_recipe_has_the_same_depth_chain_in_the_pane_and_by_the_verb]),
         "stats" => By(&[tables::statistics_of_a_random_recipe_are_the_same_by_button_and_verb_and_shift_the_same]),
         "watch" => By(&[
             watched::what_lies_in_a_folder_is_watched_to_the_numbers_that_the_studio_shows,

@@ -168,11 +168,10 @@ fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
 
 #[test]
 fn every_verb_takes_the_dataset_as_a_path_or_as_input_and_no_number_of_nothing() {
-    let verbs = ["generate", "ledger", "stats", "evaluate", "pose", "masks export", "doctor", "watch"];
+    let verbs = ["generate", "stats", "evaluate", "pose", "masks export", "doctor", "watch"];
     for verb in verbs {
         let needed: &[&str] = match verb {
             "generate" | "stats" | "masks export" => &["--out", "x"],
-            "ledger" => &["--pair", "x"],
             _ => &[],
         };
         let check = |dataset: &[&str]| {

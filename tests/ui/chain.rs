@@ -1,15 +1,14 @@
-//! The depth chain: its pane, its flags, the refit, the parts seen and invented, and the warning of a bare shaft.
+//! The depth chain: its flags, the refit, the parts seen and invented, and the warning of a bare shaft.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{LibraryCommand, PredictCommand};
 use touch2touch::app::keys::ShiftMode;
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
+use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{Theme, Workspace};
 use touch2touch_core::ambiguity::TouchKind;
 use touch2touch_core::catalog;
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::FlagKind;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
@@ -25,52 +24,30 @@ impl Rig {
         self.harness.step();
         self.settle();
     }
-
-    fn chains(&self) -> usize {
-        self.harness.state().state().results.ledgers.len()
-    }
 }
 
 #[test]
-fn the_pane_shows_every_stage_and_only_where_it_is_seen() {
+fn metrics_say_what_is_implausible_and_only_where_they_are_seen() {
     let Some(mut rig) = Rig::new(SIZE, 3) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
     rig.send(PredictCommand::Generate);
     rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
     rig.fill("Compare");
-    assert!(!rig.harness.state().state().selection.panes.contains(&Pane::Ledger));
-    let chains = rig.chains();
+    let flagged = |rig: &Rig| rig.harness.state().state().results.flags.len();
+    let before = flagged(&rig);
     rig.send(prefer(|s| s.shift = ShiftMode::Raw));
-    assert_eq!(rig.chains(), chains, "out of sight nothing is computed");
+    assert_eq!(flagged(&rig), before, "out of sight nothing is computed");
     rig.take("Back to all panes");
-    // By the palette's action, from a workspace that has no such pane.
-    rig.send(prefer(|s| s.workspace = Workspace::Align));
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
-    let state = rig.harness.state().state();
-    assert_eq!(state.settings.workspace, Workspace::Inspect);
-    assert!(state.selection.panes.contains(&Pane::Ledger));
-    let found = results::ledger(state, lab::RIGHT).ready().expect("the chain of the finger shown");
-    assert_eq!(found.ledger.flags[0].kind, FlagKind::DoubledMapping);
-    for stage in &found.ledger.stages {
-        let name = format!("Stage {}:", stage.stage.name());
-        assert!(rig.harness.query_all_by_label_contains(&name).next().is_some(), "{name}");
-    }
-    assert!(rig.harness.query_all_by_label_contains("Joint histogram: slope").next().is_some());
-    let what = found.ledger.flags[0].what.clone();
+    rig.send(prefer(|s| s.workspace = Workspace::Inspect));
+    let found = results::flags(rig.harness.state().state(), lab::RIGHT).ready().expect("those of the finger shown");
+    assert_eq!(found[0].kind, FlagKind::DoubledMapping);
+    let what = found[0].what.clone();
     assert!(rig.harness.query_all_by_label_contains(&what).next().is_some(), "{what}");
-    rig.shoot("test-depth-chain-raw");
-    // A reading is taken by a click; the flag goes.
-    rig.fill("Depth chain");
-    rig.take("Reading Exact inverse");
-    let state = rig.harness.state().state();
-    assert_eq!(state.settings.shift, ShiftMode::ExactInverse);
-    let found = results::ledger(state, lab::RIGHT).ready().unwrap();
-    assert!(found.ledger.flags.iter().all(|f| f.kind != FlagKind::DoubledMapping), "{:?}", found.ledger.flags);
-    rig.take("Depth chain of the left finger");
-    rig.shoot("test-depth-chain-maximized");
-    assert_eq!(rig.harness.state().state().selection.finger, lab::LEFT);
-    assert!(results::ledger(rig.harness.state().state(), lab::LEFT).ready().is_some());
+    rig.shoot("test-flags");
+    rig.send(prefer(|s| s.shift = ShiftMode::ExactInverse));
+    let found = results::flags(rig.harness.state().state(), lab::RIGHT).ready().unwrap();
+    assert!(found.iter().all(|flag| flag.kind != FlagKind::DoubledMapping), "{found:?}");
+    assert!(rig.harness.query_all_by_label_contains(&what).next().is_none());
 }
 
 #[test]
@@ -78,17 +55,14 @@ fn a_refit_is_computed_used_kept_and_refused_by_another_model() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
-    rig.take("Refit on this data set");
+    rig.send(PredictCommand::Refit);
     let state = rig.harness.state().state();
     let ShiftMode::Refit(refit) = state.settings.shift else { panic!("{:?}", state.settings.shift) };
     assert!(state.log.entries.iter().any(|e| e.text.contains("Shift statistics of 8 touches")), "{:?}", state.log);
-    assert!(results::ledger(state, lab::RIGHT).ready().is_some());
     let kept = std::fs::read_dir(rig.config.join("statistics")).unwrap().count();
     assert_eq!(kept, 1);
     // The mean of what is predicted is that of what is measured, over the data set.
     assert!(refit.stats().gt_std > 0.0 && refit.check("quick").is_ok() && refit.check("other").is_err());
-    rig.shoot("test-depth-chain-refit");
     // It is a choice like the others from now on, and survives a restart.
     rig.send(prefer(|s| s.shift = ShiftMode::Raw));
     rig.restart(SIZE);
@@ -117,26 +91,4 @@ fn seen_and_invented_stand_beside_each_other_and_a_bare_shaft_is_said() {
         assert!(rig.harness.query_all_by_label_contains(label).next().is_some(), "{label}");
     }
     rig.shoot("test-bare-shaft");
-}
-
-/// Pictures for looking at, with the shipped model: only where a folder for them is given.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_depth_chain() {
-    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
-        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(LibraryCommand::Select(PairId(30)));
-        rig.send(PredictCommand::Generate);
-        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Ledger)));
-        for theme in [Theme::Dark, Theme::Light] {
-            rig.send(prefer(move |s| s.theme = theme));
-            rig.send(prefer(|s| s.shift = ShiftMode::ExactInverse));
-            rig.shoot(&format!("{name}-chain-{theme:?}").to_lowercase());
-            rig.fill("Depth chain");
-            rig.send(prefer(|s| s.shift = ShiftMode::Raw));
-            rig.shoot(&format!("{name}-chain-full-{theme:?}").to_lowercase());
-            rig.take("Back to all panes");
-        }
-    }
 }

@@ -53,15 +53,15 @@ fn any_two_imprints_are_compared_where_somebody_looks() {
     let Some(mut rig) = Rig::new([1280.0, 800.0], 2) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(PredictCommand::Generate);
-    // Behind its tab nothing is made of what is wished there.
-    click(&mut rig, "Chain");
+    // Behind a pane that fills the window nothing is made of what is wished there.
+    rig.fill("Predicted imprint");
     set(&mut rig, "prediction:seed=7", "measured", VersusMode::Side);
     let made = |rig: &Rig| state(rig).results.made.values().map(Vec::len).sum::<usize>();
     assert!(!state(&rig).selection.panes.contains(&Pane::Compare));
     assert_eq!(made(&rig), 2, "one for each finger");
     let chosen = results::chosen(state(&rig), lab::RIGHT).cloned();
 
-    click(&mut rig, "Compare");
+    click(&mut rig, "Back to all panes");
     let (a, b) = (subject("prediction:seed=7"), Subject::Measured);
     assert_eq!(made(&rig), 4, "the wished ones, of both fingers: they make one pose");
     assert_eq!(results::chosen(state(&rig), lab::RIGHT).cloned(), chosen, "what the other panes show stays");

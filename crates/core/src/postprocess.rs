@@ -1,33 +1,29 @@
-//! From a decoder's picture to depth in meters: every step is a value, and every step can be looked at.
+//! From a decoder's picture to depth in meters.
 //!
 //! The released script maps its range twice: the decoder's [-1, 1] is first brought to [0, 1], and that is then treated
 //! as [-1, 1] again, so that it saves `(depth + max) / 2`. The paper's "pixel shift" mostly undoes this. [`ShiftMode`]
-//! names the three readings of a picture; [`DepthChain::run_with_ledger`] shows what each step did.
+//! names the three readings of a picture; [`flags()`] says what is implausible about one.
 //!
 //! Source: the lab's `tactile_style_transfer_estimator.py` lines 363-411 and `test.py` lines 148-256.
 
 use std::sync::Arc;
 
 use serde::{Deserialize, Serialize};
-use strum::IntoEnumIterator as _;
 
 mod color;
 mod correction;
 mod flags;
-mod ledger;
-mod record;
 mod refit;
+mod stats;
 
 pub use color::{ColorChain, Picture};
 pub use correction::{Correction, CorrectionPart, CorrectionParts, Response};
-pub use flags::{Flag, FlagKind, Severity};
-pub use ledger::{ChainReading, Ledger, correlation, ledger, readings};
-pub use record::{Against, Histogram, Orientation, Stage, StageRecord, Stats};
+pub use flags::{Flag, FlagKind, Severity, flags};
 pub use refit::{RefitShift, ShiftFit};
+pub use stats::Stats;
 
 use super::grid::{DepthMap, Grid};
 use super::resample::{self, Resampling};
-use super::units::{fixed, mm};
 
 /// Weights of red, green and blue in the lab's gray value (torchvision's `rgb_to_grayscale`; their sum is 0.9999).
 const LUMA: [f64; 3] = [0.2989, 0.587, 0.114];
@@ -224,31 +220,26 @@ pub struct DepthChain {
     pub offset: [f64; 2],
 }
 
-/// A correction with its parts as stages.
-fn corrected(fit: &Correction, meters: &DepthMap, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
+/// Meters after a correction.
+fn corrected(fit: &Correction, meters: &DepthMap) -> Result<DepthMap, PostprocessError> {
     if !fit.fits(meters.size()) {
         return Err(PostprocessError::Correction(meters.size()));
     }
     let placed = fit.placed(meters);
     let leveled = fit.leveled(&placed);
-    let weighed = fit.weighed(&placed, &leveled);
-    let answered = fit.answered(&placed, &weighed);
-    let [right, down] = fit.offset_px;
-    let [gain, offset_m] = fit.line;
-    let how = |part: CorrectionPart| match part {
-        CorrectionPart::Offset => format!("by {} px right, {} px down", fixed(right, 2), fixed(down, 2)),
-        CorrectionPart::Field => format!("{gain:.3} · d {} mm, plus the mean residual", signed(mm(offset_m))),
-        part => part.tip().to_owned(),
-    };
-    for (part, image) in CorrectionPart::iter().zip([&placed, &leveled, &weighed, &answered]) {
-        let note = (!fit.has(part)).then(|| "switched off".to_owned());
-        record(Stage::Corrected(part), &|| how(part), image, note);
-    }
-    Ok(answered)
+    Ok(fit.answered(&placed, &fit.weighed(&placed, &leveled)))
 }
 
-/// Is told of each stage: which, what it does, the image after it, and a note.
-type Recorder<'a> = dyn FnMut(Stage, &dyn Fn() -> String, &Grid<f32>, Option<String>) + 'a;
+/// A kind of image on the way.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// A channel of the decoder's picture, about -1 to 1.
+    Channel,
+    /// In meters.
+    Meters,
+    /// In meters, just after the shift.
+    Shifted,
+}
 
 impl DepthChain {
     /// The chain with the shift of `mode`.
@@ -289,19 +280,7 @@ impl DepthChain {
     /// # Errors
     /// See [`PostprocessError`].
     pub fn run(&self, raw: &RawPrediction) -> Result<DepthMap, PostprocessError> {
-        self.walk(raw, &mut |_, _, _, _| {})
-    }
-
-    /// Runs the chain and keeps the image and its figures after every step.
-    ///
-    /// # Errors
-    /// See [`PostprocessError`].
-    pub fn run_with_ledger(&self, raw: &RawPrediction) -> Result<(DepthMap, Vec<StageRecord>), PostprocessError> {
-        let mut ledger = Vec::new();
-        let depth = self.walk(raw, &mut |stage, how, image, note| {
-            ledger.push(StageRecord::new(stage, how(), image.clone(), note));
-        })?;
-        Ok((depth, ledger))
+        self.walk(raw, &mut |_, _| {})
     }
 
     /// The picture in meters before any shift, at the decoder's size: what statistics for a shift are taken of.
@@ -334,71 +313,28 @@ impl DepthChain {
         })
     }
 
-    fn walk(&self, raw: &RawPrediction, record: &mut Recorder<'_>) -> Result<DepthMap, PostprocessError> {
+    /// Runs the chain; `look` sees the images on the way.
+    fn walk(&self, raw: &RawPrediction, look: &mut dyn FnMut(Stage, &Grid<f32>)) -> Result<DepthMap, PostprocessError> {
         self.check()?;
         let weights = self.weights(raw)?;
-        let DepthRange { min_m, max_m } = self.range;
-        for (i, channel) in raw.channels.iter().enumerate() {
-            record(Stage::Channel(i as u8 + 1), &|| "as the decoder gives it".into(), channel, None);
-        }
-        let how = || match (weights.len(), self.reduction) {
-            (1, _) => "one channel: nothing to do".into(),
-            (n, Reduction::Mean) => format!("mean of {n} channels"),
-            (_, Reduction::Luma) => "luma: 0.2989 R + 0.587 G + 0.114 B".into(),
-        };
-        record(Stage::Reduced, &how, &combine(&raw.channels, &weights, f64::from), None);
-
+        raw.channels.iter().for_each(|channel| look(Stage::Channel, channel));
         let meters = self.denormalized(raw, &weights);
-        let clamped = raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.abs() > 1.0).count();
-        let note = (clamped > 0).then(|| format!("{clamped} values outside -1 to 1 were clamped"));
-        let how = || {
-            let range = format!("-1 to 1 is {} to {} mm", fixed(mm(min_m), 2), fixed(mm(max_m), 2));
-            match self.mapping {
-                Mapping::Correct => range,
-                Mapping::Doubled => format!("{range}, mapped twice: (depth + max) / 2"),
-            }
-        };
-        record(Stage::Meters, &how, &meters, note);
-
-        let (shifted, note) = self.shift.apply(meters, max_m);
-        record(Stage::Shifted, &|| self.shift_text(), &shifted, note);
-
-        let placed = if self.moved() {
-            let [width, height] = shifted.size();
-            let [right, down] = [self.offset[0] * width as f64, self.offset[1] * height as f64];
-            let placed = resample::moved(&shifted, [right, down]);
-            let how = || format!("by {} px right, {} px down: the window of this pad", fixed(right, 2), fixed(down, 2));
-            record(Stage::Placed, &how, &placed, None);
-            placed
-        } else {
-            shifted
-        };
-
-        let corrected = match &self.correction {
-            Some(correction) => corrected(correction, &placed, record)?,
-            None => placed,
-        };
-
-        let [width, height] = self.size;
-        let [from_width, from_height] = corrected.size();
-        let resized = self.resampling.resize(&corrected, width, height);
-        let how = || format!("{from_width} x {from_height} to {width} x {height}, {}", self.resampling);
-        record(Stage::Resized, &how, &resized, None);
-
-        let turned = if self.rotation_deg == 180 { resized.rotated_180() } else { resized };
-        record(Stage::Turned, &|| format!("by {}°, to the raw orientation", self.rotation_deg), &turned, None);
-        Ok(turned)
-    }
-
-    fn shift_text(&self) -> String {
-        match self.shift {
-            Shift::None => "none".into(),
-            Shift::ExactInverse => format!("exact inverse: 2 · d - {} mm", fixed(mm(self.range.max_m), 2)),
-            Shift::PaperMeanStd(stats) => {
-                let [gain, offset_m] = stats.affine(self.range.max_m);
-                format!("mean and deviation: {gain:.3} · d {} mm", signed(mm(offset_m)))
-            }
+        look(Stage::Meters, &meters);
+        let mut depth = self.shift.apply(meters, self.range.max_m);
+        look(Stage::Shifted, &depth);
+        if self.moved() {
+            let [width, height] = depth.size();
+            depth = resample::moved(&depth, [self.offset[0] * width as f64, self.offset[1] * height as f64]);
+            look(Stage::Meters, &depth);
         }
+        if let Some(correction) = &self.correction {
+            depth = corrected(correction, &depth)?;
+            look(Stage::Meters, &depth);
+        }
+        let resized = self.resampling.resize(&depth, self.size[0], self.size[1]);
+        let turned = if self.rotation_deg == 180 { resized.rotated_180() } else { resized };
+        look(Stage::Meters, &turned);
+        Ok(turned)
     }
 
     fn weights(&self, raw: &RawPrediction) -> Result<Vec<f64>, PostprocessError> {
@@ -421,11 +357,6 @@ fn combine(channels: &[Grid<f32>], weights: &[f64], map: impl Fn(f32) -> f64) ->
     })
 }
 
-/// A number with two decimals after its sign, for a sum.
-fn signed(value: f64) -> String {
-    if value < 0.0 { format!("- {:.2}", -value) } else { format!("+ {value:.2}") }
-}
-
 impl ShiftStats {
     /// True where the predictions' deviation is as good as zero beside their mean and the range that ends at `max_m`.
     pub fn has_no_spread(&self, max_m: f64) -> bool {
@@ -441,20 +372,14 @@ impl ShiftStats {
 }
 
 impl Shift {
-    /// The shifted image and a note if the shift could not be applied as asked.
-    fn apply(self, meters: Grid<f32>, max_m: f64) -> (Grid<f32>, Option<String>) {
+    /// The shifted image.
+    fn apply(self, meters: Grid<f32>, max_m: f64) -> Grid<f32> {
         match self {
-            Shift::None => (meters, None),
-            Shift::ExactInverse => (meters.map(|&d| (2.0 * f64::from(d) - max_m) as f32), None),
+            Shift::None => meters,
+            Shift::ExactInverse => meters.map(|&d| (2.0 * f64::from(d) - max_m) as f32),
             Shift::PaperMeanStd(s) => {
-                let note = s.has_no_spread(max_m).then(|| {
-                    format!(
-                        "the predictions' deviation ({:e} m) is as good as zero: only the mean was shifted",
-                        s.pred_std
-                    )
-                });
                 let [gain, _] = s.affine(max_m);
-                (meters.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32), note)
+                meters.map(|&d| ((f64::from(d) - s.pred_mean) * gain + s.gt_mean) as f32)
             }
         }
     }

@@ -35,7 +35,6 @@ pub use exchange::{export, import, pair_files};
 pub use labeling::{filter, labels, progress};
 pub use learn::{adapt, mask_worth, new_bundle, train, training_data, tuning};
 pub use study::{
-    canvas, compare, depict, deviation, doubts, evaluate, figure, fonts, layers, ledger, space, statistics, still,
-    subject,
+    canvas, compare, depict, deviation, doubts, evaluate, figure, fonts, layers, space, statistics, still, subject,
 };
 pub use way::{bundles, cloud, feel, imprint, mask, models, on_pad, pose, predict, prediction, recipe, tool};

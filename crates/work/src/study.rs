@@ -9,7 +9,6 @@ pub mod evaluate;
 pub mod figure;
 pub mod fonts;
 pub mod layers;
-pub mod ledger;
 pub mod space;
 pub mod statistics;
 pub mod still;

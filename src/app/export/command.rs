@@ -91,7 +91,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
                 .option("--b", placed(state, &versus.b))
                 .then(recipe_shown(state, ImprintSource::Predicted).words(Stage::Pose))
         }
-        (Pane::Ledger, _) => of_pair("ledger")?.option("--finger", &finger).then(drawn()),
         (Pane::Masks, _) => of_pair("label")?,
         (Pane::Results | Pane::Table, _) => {
             let mut words = verb("evaluate");

@@ -3,9 +3,9 @@
 use super::super::keys::{ImprintSource, Key, PredictionKey, ShiftMode, TouchKey};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::postprocess::Flag;
 use touch2touch_work::compare::Beside;
 use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::ledger::LedgerResult;
 
 /// One imprint in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -116,14 +116,14 @@ impl Key for AmbiguityKey {
     }
 }
 
-/// The depth chain of a prediction.
+/// What is implausible about the way of a prediction to meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LedgerKey(pub PredictionKey, pub ShiftMode);
+pub struct FlagsKey(pub PredictionKey, pub ShiftMode);
 
-impl Key for LedgerKey {
-    type Value = LedgerResult;
+impl Key for FlagsKey {
+    type Value = Vec<Flag>;
 
-    fn bytes(found: &LedgerResult) -> usize {
-        found.ledger.bytes()
+    fn bytes(found: &Vec<Flag>) -> usize {
+        found.len() * 512
     }
 }

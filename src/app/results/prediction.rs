@@ -4,8 +4,6 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use strum::IntoEnumIterator as _;
-
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{Key, Keyed, PredictionKey, StoredKey, TouchKey};
 use super::super::results;

@@ -46,7 +46,7 @@ impl Computes for PrefetchKey {
 
 /// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
 pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
-    let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison, Demand::Ledger];
+    let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison];
     let (_, cloud) = results::shows_cloud(state, ImprintSource::Predicted);
     let shown = cloud || needs.into_iter().any(|need| state.needs(need));
     if !state.settings.generate.by_itself

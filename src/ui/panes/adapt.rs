@@ -252,7 +252,7 @@ fn pads(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
         );
         ui.add(egui::Label::new(text).wrap());
     }
-    ui.label(caption("Each part is a stage of the depth chain, and can be switched off there", cx.p));
+    ui.label(caption("Generate has a switch for each part", cx.p));
 }
 
 fn signed(offset_m: f64) -> String {

@@ -12,6 +12,7 @@ use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
 use touch2touch_core::diffusion::GUIDANCE;
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_work::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
@@ -45,6 +46,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             model(cx, ui, &mut new);
             presets(cx, ui, &mut new);
             mapping(cx, ui);
+            fit_parts(cx, ui);
             run(cx, ui);
             let more = egui::CollapsingHeader::new(RichText::new("More").size(SMALL)).id_salt("more of generate");
             let more = more.show(ui, |ui| numbers(cx, ui, &mut new));
@@ -265,6 +267,30 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
         });
         let tip = format!("Range mapping: how the decoder's numbers become meters. {}", shift_tooltip(current));
         response.response.accessible_name("Range mapping").on_hover_text(tip);
+    });
+}
+
+/// The parts of a model's fit to a rig, each with a switch; nothing for a model without one.
+fn fit_parts(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let made = results::chosen(cx.state, cx.state.selection.finger);
+    let made = made.and_then(|recipe| cx.state.results.predictions.get(recipe));
+    let parts = match cx.state.settings.shift {
+        ShiftMode::Parts(parts) => parts,
+        ShiftMode::ExactInverse if made.is_some_and(|made| made.fit.is_some()) => CorrectionParts::ALL,
+        _ => return,
+    };
+    row(ui, cx.p.weak, "Fit", |ui| {
+        ui.horizontal_wrapped(|ui| {
+            for part in CorrectionPart::iter() {
+                let mut on = parts.has(part);
+                if ui.checkbox(&mut on, RichText::new(part.label()).size(SMALL)).on_hover_text(part.tip()).changed() {
+                    let next = parts.with(part, on);
+                    let whole = next == CorrectionParts::ALL;
+                    let mode = if whole { ShiftMode::ExactInverse } else { ShiftMode::Parts(next) };
+                    cx.push(prefer(move |s| s.shift = mode));
+                }
+            }
+        });
     });
 }
 

@@ -1,7 +1,7 @@
 //! The selected pair in words and figures: the verdict on its pose, the prediction against the truth.
 
 use crate::app::results;
-use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Sense, Ui};
+use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Ui};
 
 use super::{images, scene};
 use crate::app::action::Action;
@@ -267,16 +267,13 @@ fn line(column: f32) -> Line {
     Line { height: 17.0, size: 12.0, column, swatch: None }
 }
 
-/// Something implausible in the depth chain of the prediction, with the way there.
-fn flag(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let Some(chain) = results::ledger(cx.state, cx.state.selection.finger).shown() else { return };
-    let serious = chain.ledger.flags.iter().filter(|f| f.severity < Severity::Info).count();
-    let Some(first) = chain.ledger.flags.first().filter(|_| serious > 0) else { return };
+/// The worst of what is implausible about the way of the prediction to meters, with all of it behind it.
+fn flag(cx: &Cx<'_>, ui: &mut Ui) {
+    let Some(flags) = results::flags(cx.state, cx.state.selection.finger).shown() else { return };
+    let Some(first) = flags.first() else { return };
     let color = if first.severity == Severity::Wrong { cx.p.wrong } else { cx.p.caution };
-    let more = if serious > 1 { format!(" (and {} more)", serious - 1) } else { String::new() };
+    let more = if flags.len() > 1 { format!(" (and {} more)", flags.len() - 1) } else { String::new() };
     let text = RichText::new(format!("{}{more}", first.what)).size(SMALL).color(color);
-    let link = ui.add(Label::new(text).wrap().sense(Sense::click()));
-    if link.on_hover_text(format!("{} {} Click for the depth chain", first.why, first.action)).clicked() {
-        cx.act(Action::DepthChain);
-    }
+    let all: Vec<String> = flags.iter().map(|flag| format!("{} {} {}", flag.what, flag.why, flag.action)).collect();
+    ui.add(Label::new(text).wrap()).on_hover_text(all.join("\n"));
 }

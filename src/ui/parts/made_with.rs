@@ -26,8 +26,7 @@ pub(crate) fn is_predicted(cx: &Cx<'_>, pane: Pane) -> bool {
         Kind::Imprint(source) => source == ImprintSource::Predicted,
         Kind::Steps => cx.state.inspect.source == ImprintSource::Predicted,
         Kind::Versus => cx.state.settings.compared().is_error(),
-        Kind::Form => pane == Pane::Ledger,
-        Kind::Color | Kind::Scene => false,
+        Kind::Form | Kind::Color | Kind::Scene => false,
     }
 }
 

@@ -1,9 +1,11 @@
 //! Flags: implausible things about a depth chain, each with what was seen, why that is odd, and what to do.
 
-use serde::Serialize;
-
-use super::record::{Against, Stage, StageRecord};
-use super::{DepthChain, DepthRange, Mapping, RawPrediction, Shift};
+use super::{
+    DepthChain, DepthRange, Mapping, PostprocessError, RELATIVE_NO_SPREAD, RawPrediction, Shift, Stage, Stats,
+};
+use crate::grid::{DepthMap, Grid};
+use crate::metrics::line;
+use crate::resample::bilinear;
 use crate::units::{text_mm, text_percent};
 
 /// Share of clamped values from which it matters.
@@ -18,24 +20,18 @@ const CHANNELS_APART_M: f64 = 5e-4;
 /// Largest sound distance of a fitted slope from 1, and of an offset from 0 (meters).
 const SLOPE_OFF: f64 = 0.15;
 const OFFSET_OFF_M: f64 = 1e-3;
-/// Largest sound distance of a shift's gain from the exact inverse's 2.
-const GAIN_OFF: f64 = 0.03;
 
 /// Severity: how much a person should care.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Severity {
     /// The result cannot be right.
     Wrong,
     /// The result may be wrong.
     Caution,
-    /// Good to know.
-    Info,
 }
 
 /// Kind of implausible thing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, strum::EnumIter)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum FlagKind {
     /// Values that are not numbers.
     NotFinite,
@@ -51,27 +47,23 @@ pub enum FlagKind {
     Clamped,
     /// The shift could not divide by the predictions' deviation.
     NoSpread,
-    /// The shift's gain is not the 2 that undoes the doubled mapping.
-    ShiftGain,
     /// Depths outside what the model was trained on.
     OutOfRange,
     /// The channels, which should be equal, are not.
     ChannelsApart,
     /// Prediction and truth have little in common.
     Unlike,
-    /// The line through the joint histogram is not the diagonal.
+    /// The line through prediction against truth is not the diagonal.
     Calibration,
 }
 
 /// One thing that is implausible.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Flag {
     /// Severity: how much a person should care.
     pub severity: Severity,
     /// Kind of thing.
     pub kind: FlagKind,
-    /// The stage at which it shows.
-    pub stage: String,
     /// Observation, with its numbers.
     pub what: String,
     /// Why that is odd.
@@ -80,64 +72,96 @@ pub struct Flag {
     pub action: String,
 }
 
-impl Flag {
-    /// All of it as one text.
-    pub fn text(&self) -> String {
-        format!("{} {} {}", self.what, self.why, self.action)
+/// Everything that is implausible, the worst first. `truth` is the measured imprint (meters, raw orientation); a result of
+/// another size is resized to it for the comparison.
+///
+/// # Errors
+/// See [`PostprocessError`].
+pub fn flags(chain: &DepthChain, raw: &RawPrediction, truth: Option<&DepthMap>) -> Result<Vec<Flag>, PostprocessError> {
+    let mut seen = Vec::new();
+    let look = &mut |stage, image: &Grid<f32>| seen.push(Seen { stage, stats: Stats::of(image), len: image.len() });
+    let result = chain.walk(raw, look)?;
+    let mut list = List(Vec::new());
+    list.numbers(&seen);
+    list.clamped(raw);
+    list.channels(chain, raw);
+    list.doubled(chain, &seen);
+    list.no_spread(chain);
+    list.range(chain, &result);
+    if let Some(truth) = truth {
+        let same = result.size() == truth.size();
+        list.against(&if same { result } else { bilinear(&result, truth.width(), truth.height()) }, truth);
+    }
+    list.0.sort_by_key(|flag| (flag.severity, flag.kind));
+    Ok(list.0)
+}
+
+/// An image on the way.
+struct Seen {
+    stage: Stage,
+    stats: Stats,
+    /// Pixels.
+    len: usize,
+}
+
+impl Seen {
+    /// A value with its unit.
+    fn text(&self, value: f64) -> String {
+        if self.stage == Stage::Channel { format!("{value:.3}") } else { text_mm(value) }
     }
 }
 
-/// Everything that is implausible, the worst first.
-pub(super) fn flags(
-    chain: &DepthChain,
-    raw: &RawPrediction,
-    stages: &[StageRecord],
-    against: Option<&Against>,
-) -> Vec<Flag> {
-    let mut list = List(Vec::new());
-    list.numbers(stages);
-    list.clamped(raw);
-    list.channels(chain, raw);
-    list.doubled(chain, stages);
-    list.shift(chain, stages);
-    list.range(chain, stages);
-    if let Some(against) = against {
-        list.orientation(against);
-        list.calibration(against);
+/// Pearson's correlation over the pixels that are finite in both images, in f64. `None` for images of different size,
+/// and where one of them is flat.
+fn correlation(a: &Grid<f32>, b: &Grid<f32>) -> Option<f64> {
+    if a.size() != b.size() {
+        return None;
     }
-    list.0.sort_by_key(|flag| (flag.severity, flag.kind));
-    list.0
+    let pairs = || {
+        let both = a.as_slice().iter().zip(b.as_slice()).filter(|(a, b)| a.is_finite() && b.is_finite());
+        both.map(|(&a, &b)| (f64::from(a), f64::from(b)))
+    };
+    let count = pairs().count() as f64;
+    if count == 0.0 {
+        return None;
+    }
+    let (mean_a, mean_b) = (pairs().map(|p| p.0).sum::<f64>() / count, pairs().map(|p| p.1).sum::<f64>() / count);
+    let (mut aa, mut bb, mut ab, mut size_a, mut size_b) = (0.0, 0.0, 0.0, 0.0f64, 0.0f64);
+    for (a, b) in pairs() {
+        (size_a, size_b) = (size_a.max(a.abs()), size_b.max(b.abs()));
+        let (a, b) = (a - mean_a, b - mean_b);
+        (aa, bb, ab) = (aa + a * a, bb + b * b, ab + a * b);
+    }
+    let spread = |sum: f64, size: f64| (sum / count).sqrt() > RELATIVE_NO_SPREAD * size;
+    (spread(aa, size_a) && spread(bb, size_b)).then(|| ab / (aa.sqrt() * bb.sqrt())).filter(|r| r.is_finite())
 }
 
 struct List(Vec<Flag>);
 
 impl List {
-    fn add(&mut self, severity: Severity, kind: FlagKind, stage: Stage, [what, why, action]: [String; 3]) {
-        self.0.push(Flag { severity, kind, stage: stage.name(), what, why, action });
+    fn add(&mut self, severity: Severity, kind: FlagKind, [what, why, action]: [String; 3]) {
+        self.0.push(Flag { severity, kind, what, why, action });
     }
 
-    fn numbers(&mut self, stages: &[StageRecord]) {
-        // Where it begins; later stages only carry it on.
-        if let Some(bad) = stages.iter().find(|s| s.invalid > 0) {
+    fn numbers(&mut self, seen: &[Seen]) {
+        // Where it begins; later images only carry it on.
+        if let Some(bad) = seen.iter().find(|s| s.stats.count < s.len) {
             self.add(
                 Severity::Wrong,
                 FlagKind::NotFinite,
-                bad.stage,
                 [
-                    format!("{} of {} values are not numbers.", bad.invalid, bad.image.len()),
+                    format!("{} of {} values are not numbers.", bad.len - bad.stats.count, bad.len),
                     "A model that gives NaN or infinity has met an input or a schedule it cannot take.".into(),
                     "Generate again with another sampler or more steps; if it stays, check the bundle.".into(),
                 ],
             );
         }
-        let flat = |s: &&StageRecord| s.stats.is_flat() && s.image.len() > 1;
-        if let Some(flat) = stages.iter().find(flat) {
+        if let Some(flat) = seen.iter().find(|s| s.stats.is_flat() && s.len > 1) {
             self.add(
                 Severity::Wrong,
                 FlagKind::Constant,
-                flat.stage,
                 [
-                    format!("All values are {}.", value(flat, flat.stats.mean)),
+                    format!("All values are {}.", flat.text(flat.stats.mean)),
                     "An imprint has a touched and an untouched part; a constant image shows neither.".into(),
                     "Check that the GelSlim image shows a contact and that the bundle fits this sensor.".into(),
                 ],
@@ -148,25 +172,20 @@ impl List {
     fn clamped(&mut self, raw: &RawPrediction) {
         let values = || raw.channels.iter().flat_map(|c| c.as_slice()).filter(|v| v.is_finite());
         let (count, clamped) = (values().count(), values().filter(|v| v.abs() > 1.0).count());
-        if clamped == 0 {
+        let share = clamped as f64 / count as f64;
+        if clamped == 0 || share < CLAMPED {
             return;
         }
-        let share = clamped as f64 / count as f64;
-        let severity = if share >= CLAMPED { Severity::Caution } else { Severity::Info };
         self.add(
-            severity,
+            Severity::Caution,
             FlagKind::Clamped,
-            Stage::Meters,
             [
                 format!(
                     "{clamped} of {count} decoder values ({}) were outside -1 to 1 and were clamped.",
                     text_percent(share)
                 ),
                 "Beyond its range the model cannot say how deep: those pixels read the end of the range.".into(),
-                match severity {
-                    Severity::Info => "A few are ordinary overshoot; nothing needs doing.".into(),
-                    _ => "Check the bundle's output range, or use more steps.".into(),
-                },
+                "Check the bundle's output range, or use more steps.".into(),
             ],
         );
     }
@@ -192,7 +211,6 @@ impl List {
             self.add(
                 Severity::Caution,
                 FlagKind::ChannelsApart,
-                Stage::Reduced,
                 [
                     format!("The {n} channels disagree by {} (root mean square).", text_mm(apart_m)),
                     "They are trained to be copies of one depth; where they differ the model is unsure.".into(),
@@ -202,8 +220,8 @@ impl List {
         }
     }
 
-    fn doubled(&mut self, chain: &DepthChain, stages: &[StageRecord]) {
-        let Some(result) = stages.iter().find(|s| s.stage == Stage::Shifted) else { return };
+    fn doubled(&mut self, chain: &DepthChain, seen: &[Seen]) {
+        let Some(result) = seen.iter().find(|s| s.stage == Stage::Shifted) else { return };
         let DepthRange { min_m, max_m } = chain.range;
         let middle = (min_m + max_m) / 2.0;
         if result.stats.count == 0 || result.stats.min < middle - 1e-9 * (max_m - min_m) {
@@ -223,83 +241,64 @@ impl List {
                 "The decoder's picture seems to be in 0 to 1 already: correct the bundle's output range."
             }
         };
-        self.add(Severity::Wrong, FlagKind::DoubledMapping, Stage::Shifted, [what, why.into(), action.into()]);
+        self.add(Severity::Wrong, FlagKind::DoubledMapping, [what, why.into(), action.into()]);
     }
 
-    fn shift(&mut self, chain: &DepthChain, stages: &[StageRecord]) {
+    fn no_spread(&mut self, chain: &DepthChain) {
         let Shift::PaperMeanStd(stats) = chain.shift else { return };
-        if stats.has_no_spread(chain.range.max_m) {
-            let note = stages.iter().find(|s| s.stage == Stage::Shifted).and_then(|s| s.note.clone());
-            self.add(
-                Severity::Caution,
-                FlagKind::NoSpread,
-                Stage::Shifted,
-                [
-                    format!("Only the mean was shifted: {}.", note.unwrap_or_default()),
-                    "Dividing by a deviation of zero would send every pixel to the end of the range.".into(),
-                    "Compute the statistics again over more pairs.".into(),
-                ],
-            );
+        if !stats.has_no_spread(chain.range.max_m) {
             return;
         }
-        let [gain, offset_m] = stats.affine(chain.range.max_m);
-        // What undoes the doubled mapping has the gain 2 and the offset -max.
-        if chain.mapping == Mapping::Doubled && (gain / 2.0 - 1.0).abs() > GAIN_OFF {
-            let error_m = |depth_m: f64| gain * (depth_m + chain.range.max_m) / 2.0 + offset_m - depth_m;
-            let steeper = if gain > 2.0 { "steep" } else { "flat" };
-            self.add(
-                Severity::Info,
-                FlagKind::ShiftGain,
-                Stage::Shifted,
-                [
-                    format!(
-                        "The shift's gain is {gain:.3} where 2 undoes the doubled mapping: {} too {steeper}.",
-                        text_percent((gain / 2.0 - 1.0).abs())
-                    ),
-                    format!(
-                        "A depth the model gives as 0 becomes {}, 10 mm becomes {} (off by {}).",
-                        text_mm(error_m(0.0)),
-                        text_mm(0.01 + error_m(0.01)),
-                        text_mm(error_m(0.01))
-                    ),
-                    "Choose the exact inverse for depths as the model means them.".into(),
-                ],
-            );
-        }
+        self.add(
+            Severity::Caution,
+            FlagKind::NoSpread,
+            [
+                format!("Only the mean was shifted: the predictions' deviation is {:e} m.", stats.pred_std),
+                "Dividing by a deviation of zero would send every pixel to the end of the range.".into(),
+                "Compute the statistics again over more pairs.".into(),
+            ],
+        );
     }
 
-    fn range(&mut self, chain: &DepthChain, stages: &[StageRecord]) {
-        let Some(result) = stages.last() else { return };
+    fn range(&mut self, chain: &DepthChain, result: &DepthMap) {
         let DepthRange { min_m, max_m } = chain.range;
         let slack = 1e-3 * (max_m - min_m);
-        let outside =
-            result.image.as_slice().iter().filter(|v| f64::from(**v) < min_m - slack || f64::from(**v) > max_m + slack);
-        let (count, of) = (outside.count(), result.stats.count);
-        if count > 0 {
-            self.add(
-                if count as f64 >= CLAMPED * of as f64 { Severity::Caution } else { Severity::Info },
-                FlagKind::OutOfRange,
-                Stage::Shifted,
-                [
-                    format!(
-                        "{count} of {of} pixels ({}) are outside {} to {}.",
-                        text_percent(count as f64 / of as f64),
-                        text_mm(min_m),
-                        text_mm(max_m)
-                    ),
-                    "The model was trained on depths inside this range: the shift carried them out of it.".into(),
-                    "Choose the exact inverse, or statistics of this bundle's own predictions.".into(),
-                ],
-            );
+        let outside = |v: &&f32| f64::from(**v) < min_m - slack || f64::from(**v) > max_m + slack;
+        let values = result.as_slice();
+        let (count, of) = (values.iter().filter(outside).count(), values.iter().filter(|v| v.is_finite()).count());
+        if count == 0 || (count as f64) < CLAMPED * of as f64 {
+            return;
+        }
+        self.add(
+            Severity::Caution,
+            FlagKind::OutOfRange,
+            [
+                format!(
+                    "{count} of {of} pixels ({}) are outside {} to {}.",
+                    text_percent(count as f64 / of as f64),
+                    text_mm(min_m),
+                    text_mm(max_m)
+                ),
+                "The model was trained on depths inside this range: the shift carried them out of it.".into(),
+                "Choose the exact inverse, or statistics of this bundle's own predictions.".into(),
+            ],
+        );
+    }
+
+    fn against(&mut self, result: &DepthMap, truth: &DepthMap) {
+        let as_is = correlation(result, truth);
+        self.orientation(result, truth, as_is);
+        // A line through images that show different things says nothing about the mapping.
+        if as_is.is_some_and(|r| r >= 2.0 * UNLIKE) {
+            self.calibration(result, truth);
         }
     }
 
-    fn orientation(&mut self, against: &Against) {
-        let o = &against.orientation;
-        let straight = o.as_is.unwrap_or(0.0);
+    fn orientation(&mut self, result: &DepthMap, truth: &DepthMap, as_is: Option<f64>) {
+        let straight = as_is.unwrap_or(0.0);
         let better = |other: Option<f64>| other.filter(|r| *r > TURNED_AT_LEAST && *r > straight + TURNED_BY);
-        let turned = better(o.turned_180);
-        let mirrored = better(o.rows_reversed).filter(|r| turned.is_none_or(|t| *r > t));
+        let turned = better(correlation(result, &truth.rotated_180()));
+        let mirrored = better(correlation(result, &truth.rows_reversed())).filter(|r| turned.is_none_or(|t| *r > t));
         let seen = |r: f64, how: &str| {
             format!("Prediction and truth correlate {straight:.2} as they lie, but {r:.2} with the truth {how}.")
         };
@@ -307,7 +306,6 @@ impl List {
             self.add(
                 Severity::Wrong,
                 FlagKind::TurnedBy180,
-                Stage::Turned,
                 [
                     seen(r, "turned by 180°"),
                     "Bubble and GelSlim images are turned against each other by 180°; one turn is missing, or one too \
@@ -321,7 +319,6 @@ impl List {
             self.add(
                 Severity::Wrong,
                 FlagKind::Mirrored,
-                Stage::Turned,
                 [
                     seen(r, "mirrored (rows reversed)"),
                     "The two fingers see mirror images: one finger may stand for the other.".into(),
@@ -331,12 +328,11 @@ impl List {
         }
         if turned.is_none()
             && mirrored.is_none()
-            && let Some(r) = o.as_is.filter(|r| *r < UNLIKE)
+            && let Some(r) = as_is.filter(|r| *r < UNLIKE)
         {
             self.add(
                 Severity::Caution,
                 FlagKind::Unlike,
-                Stage::Turned,
                 [
                     format!("Prediction and truth correlate only {r:.2}."),
                     "They show different contacts: the tool may be new to the model, or the pair mismatched.".into(),
@@ -346,11 +342,9 @@ impl List {
         }
     }
 
-    fn calibration(&mut self, against: &Against) {
-        let Some(line) = against.joint.line else { return };
-        // A line through images that show different things says nothing about the mapping.
-        let alike = against.orientation.as_is.is_some_and(|r| r >= 2.0 * UNLIKE);
-        if !alike || ((line.slope - 1.0).abs() <= SLOPE_OFF && line.offset.abs() <= OFFSET_OFF_M) {
+    fn calibration(&mut self, result: &DepthMap, truth: &DepthMap) {
+        let Some(line) = line(result, truth) else { return };
+        if (line.slope - 1.0).abs() <= SLOPE_OFF && line.offset.abs() <= OFFSET_OFF_M {
             return;
         }
         let doubled = (line.slope - 0.5).abs() < 0.15 && line.offset > 2.0 * OFFSET_OFF_M;
@@ -360,12 +354,11 @@ impl List {
         };
         let action = match doubled {
             true => "Choose the exact inverse.",
-            false => "Compare the readings below; a refit corrects slope and offset over a whole dataset.",
+            false => "A refit corrects slope and offset over a whole data set.",
         };
         self.add(
             Severity::Caution,
             FlagKind::Calibration,
-            Stage::Turned,
             [
                 format!(
                     "The line through prediction against truth has slope {:.2}, offset {}.",
@@ -377,9 +370,4 @@ impl List {
             ],
         );
     }
-}
-
-/// A value of a stage with its unit.
-fn value(stage: &StageRecord, value: f64) -> String {
-    if stage.stage.is_meters() { text_mm(value) } else { format!("{value:.3}") }
 }

@@ -6,7 +6,7 @@ use super::prediction::{Chains, Prediction};
 use crate::error::TaskError;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::postprocess::{
-    Correction, CorrectionParts, DepthChain, PostprocessError, RawPrediction, ShiftMode,
+    Correction, CorrectionParts, DepthChain, Flag, PostprocessError, RawPrediction, ShiftMode, flags,
 };
 use touch2touch_core::resample::{bilinear, bilinear_rgb};
 use touch2touch_core::rig::{PadId, PerPad};
@@ -47,6 +47,21 @@ pub fn imprint_of(
     let bubble = sample.pad(finger).and_then(|t| t.depth());
     let chain = chain_of_pad(prediction, shift, sample, finger)?;
     through(&chain, prediction, shift, bubble.map_or([0, 0], |b| b.imprint.size()))
+}
+
+/// Everything that is implausible about the way of a finger's prediction to meters, the worst first.
+///
+/// # Errors
+/// As [`imprint`].
+pub fn flags_of(
+    prediction: &Prediction,
+    shift: ShiftMode,
+    sample: &Sample,
+    finger: PadId,
+) -> Result<Vec<Flag>, TaskError> {
+    let measured = sample.pad(finger).and_then(|touch| touch.depth()).map(|bubble| &bubble.imprint);
+    let chain = chain_of_pad(prediction, shift, sample, finger)?;
+    flags(&chain, &prediction.raw, measured).map_err(|err| TaskError::from_error("Depth chain", &err))
 }
 
 /// The predictions of a pair's pads in meters, as [`imprint_of`].
