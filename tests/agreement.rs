@@ -146,7 +146,7 @@ fn how(action: Action) -> How {
         A::CompareMode | A::SwapCompared => {
             Options(&["compare", "demo", "--pair", "a", "--a", "prediction:seed=7", "--b", "measured"])
         }
-        A::Section | A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
+        A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera => Window,
         A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop | A::CameraBottom => Window,
         A::CameraOblique | A::NextSides | A::NextGel | A::SwitchTheme => Window,
         A::InspectWorkspace | A::AlignWorkspace | A::LabelWorkspace | A::EvaluateWorkspace | A::AdaptWorkspace => {

@@ -18,7 +18,7 @@ use super::state::library::Place;
 use super::state::settings::scene::{LayerLook, SceneLayer, SceneLook};
 use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
-use super::state::workbench::{Layer, SceneTool, Section};
+use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
 use super::{adapt, export, labels, results, train};
 use touch2touch_core::label::{CleanKind, Paint};

@@ -308,8 +308,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
         SwapCompared, View, "Swap A and B", "Puts B in the place of A in the Compare pane, and A in that of B", [shift(K::R)],
             _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));
-        Section, View, "Cut open", "Cuts the 3D views open with a plane, or no longer", [plain(K::X)],
-            state => does(WorkbenchCommand::SetSection(state.workbench.section.is_none().then(Section::default)));
         WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)],
             _ => does(prefer(|s| s.scene.only_window ^= true));
         MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [],
@@ -448,7 +446,6 @@ impl Action {
             Self::MeasureDistance | Self::MeasureAngle => "ruler mm length degrees",
             Self::LockRange | Self::RangeOnce | Self::ResetRange => "colorbar colormap scale limits minimum maximum mm",
             Self::Fit => "zoom center home view",
-            Self::Section => "clip slice plane cross",
             Self::EyeDome => "edl shadow",
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",

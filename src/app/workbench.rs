@@ -1,7 +1,6 @@
 //! The room of the workbench: layers, poses by hand, measuring.
 
-pub(crate) use super::state::workbench::SECTION_REACH_M;
-pub use super::state::workbench::{Layer, ManualTry, Picked, SceneTool, Section, SectionAxis, Workbench};
+pub use super::state::workbench::{Layer, ManualTry, Picked, SceneTool, Workbench};
 
 use glam::DVec3;
 
@@ -26,8 +25,6 @@ pub enum WorkbenchCommand {
     TryTools(bool),
     /// True where each 3D pane shows the clouds of both imprints.
     SetBothClouds(bool),
-    /// The plane that cuts the 3D views open; none does without one.
-    SetSection(Option<Section>),
     /// The effect of a click.
     SetTool(SceneTool),
     /// True where the tool can leave the plane; closing it brings the tool back into the plane.
@@ -59,10 +56,6 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
         WorkbenchCommand::SetLayer(layer) => bench.layer = layer,
         WorkbenchCommand::TryTools(on) => bench.tools_tried = pair.filter(|_| on),
         WorkbenchCommand::SetBothClouds(on) => bench.both_clouds = on,
-        WorkbenchCommand::SetSection(section) => {
-            let within = |s: Section| Section { at_m: s.at_m.clamp(-SECTION_REACH_M, SECTION_REACH_M), ..s };
-            bench.section = section.filter(|s| s.at_m.is_finite()).map(within);
-        }
         WorkbenchCommand::SetTool(tool) => {
             // Where nothing is drawn in 3D any more, nobody can end what is.
             if state.document.stroke.as_ref().is_some_and(|stroke| stroke.drawing.sight.is_some()) {

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use eframe::egui::{Key, OutputCommand};
 use egui_kittest::kittest::Queryable as _;
-use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{LabelsCommand, Pane, PredictCommand};
 use touch2touch::app::export;
 use touch2touch::app::settings::prefer;

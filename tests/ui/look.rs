@@ -11,7 +11,7 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{
     LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, Theme, Versus, VersusMode, Workspace,
 };
-use touch2touch::app::workbench::{Layer, SceneTool, Section, SectionAxis, WorkbenchCommand};
+use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::Paint;
@@ -198,10 +198,7 @@ fn pictures_of_the_3d_views() {
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
         rig.send(prefer(move |s| s.scene.set(SceneLayer::Surface, surface)));
         rig.shoot(&format!("{name}-3d-surface"));
-        let section = Section { axis: SectionAxis::Tool, at_m: 0.0, flipped: false };
-        rig.send(Command::Workbench(WorkbenchCommand::SetSection(Some(section))));
         rig.send(prefer(move |s| (s.scene.only_window, s.scene.orthographic) = (true, true)));
-        rig.shoot(&format!("{name}-3d-section"));
         rig.send(prefer(|s| s.theme = Theme::Light));
         rig.shoot(&format!("{name}-3d-light"));
     }

@@ -1,4 +1,4 @@
-//! The 3D views: distances, what is drawn, the plane that cuts, cameras.
+//! The 3D views: distances, what is drawn, cameras.
 
 use eframe::egui::{Event, Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
@@ -9,7 +9,7 @@ use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{LayerLook, SceneLayer};
 use touch2touch::app::state::State;
-use touch2touch::app::workbench::{Layer, SectionAxis};
+use touch2touch::app::workbench::Layer;
 use touch2touch_core::rig::lab;
 
 use super::rig::Rig;
@@ -95,24 +95,16 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
 }
 
 #[test]
-fn a_plane_cuts_by_key_and_bar_and_says_where() {
+fn only_the_window_is_shown_by_key_and_all_again_by_the_bar() {
     let Some(mut rig) = Rig::aligned() else { return };
     let whole = colors(&mut rig);
     rig.harness.hover_at(view_center(&rig));
-    press(&mut rig, Key::X);
-    let section = state(&rig).workbench.section.expect("a plane");
-    assert_eq!((section.axis, section.at_m), (SectionAxis::Closing, 0.0));
-    assert_ne!(colors(&mut rig), whole);
-    let across = rig.harness.get_by_label("Cut across z, along the tool").rect().center();
-    rig.click_at(across);
-    assert_eq!(state(&rig).workbench.section.unwrap().axis, SectionAxis::Tool);
-    rig.shoot("test-section");
-    let close = rig.harness.query_all_by_label("Cut no longer").next().unwrap().rect().center();
-    rig.click_at(close);
-    assert_eq!(state(&rig).workbench.section, None);
     press(&mut rig, Key::W);
     assert!(state(&rig).settings.scene.only_window);
     assert_ne!(colors(&mut rig), whole);
+    let close = rig.harness.query_all_by_label("Show all").next().unwrap().rect().center();
+    rig.click_at(close);
+    assert!(!state(&rig).settings.scene.only_window);
 }
 
 #[test]

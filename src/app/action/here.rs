@@ -62,7 +62,7 @@ impl Action {
     fn is_of_scene(self) -> bool {
         use Action as A;
         let look = matches!(self, A::CameraLeft | A::CameraRight | A::CameraFront | A::CameraBack | A::CameraTop)
-            || matches!(self, A::CameraBottom | A::CameraOblique | A::Section | A::Distances | A::NextSides)
+            || matches!(self, A::CameraBottom | A::CameraOblique | A::Distances | A::NextSides)
             || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
             || matches!(self, A::LinkCameras | A::NextLayer | A::BothClouds);
         look || self.is_nudge()

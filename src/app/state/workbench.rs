@@ -78,52 +78,6 @@ impl SceneTool {
     }
 }
 
-/// The axis that a cutting plane stands on, grasp frame.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, EnumIter)]
-pub enum SectionAxis {
-    /// x: the closing axis, from finger to finger.
-    #[default]
-    Closing,
-    /// y: across.
-    Lateral,
-    /// z: along the tool.
-    Tool,
-}
-
-impl SectionAxis {
-    /// The name on screen.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Closing => "x, finger to finger",
-            Self::Lateral => "y, across",
-            Self::Tool => "z, along the tool",
-        }
-    }
-
-    /// The unit vector, grasp frame.
-    pub fn unit(self) -> DVec3 {
-        match self {
-            Self::Closing => DVec3::X,
-            Self::Lateral => DVec3::Y,
-            Self::Tool => DVec3::Z,
-        }
-    }
-}
-
-/// A plane that cuts the 3D views open: what lies beyond it along its axis is not drawn.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Section {
-    /// The axis it stands on.
-    pub axis: SectionAxis,
-    /// The position on the axis, meters.
-    pub at_m: f64,
-    /// True where what lies before it is left out instead.
-    pub flipped: bool,
-}
-
-/// The farthest that a plane can stand from the middle of the grasp, meters.
-pub(crate) const SECTION_REACH_M: f64 = 0.06;
-
 /// A point that was clicked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Picked {
@@ -165,8 +119,6 @@ pub struct Workbench {
     pub tools_tried: Option<PairKey>,
     /// True where each 3D pane shows the clouds of both imprints.
     pub both_clouds: bool,
-    /// The plane that cuts the 3D views open.
-    pub section: Option<Section>,
     /// The effect of a click.
     pub tool: SceneTool,
     /// True where the tool can leave the plane.
@@ -187,7 +139,6 @@ impl Default for Workbench {
             layer: Layer::None,
             tools_tried: None,
             both_clouds: false,
-            section: None,
             tool: SceneTool::Look,
             six_dof: false,
             side: ImprintSource::Measured,

@@ -9,10 +9,10 @@ mod layers;
 mod legend;
 mod measure;
 mod overlay;
-mod section;
 mod steps;
 mod strip;
 mod verdict;
+mod window;
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 use glam::{DAffine3, DVec3};
@@ -169,12 +169,12 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
     ui.scope_builder(UiBuilder::new().max_rect(head.shrink2(vec2(4.0, 2.0))), |ui| {
         ui.horizontal_centered(|ui| choose_sides(cx, ui));
     });
-    // What cuts has a row of its own: in a narrow pane there is none to share.
-    let cut = if section::is_shown(cx.state) { HEAD } else { 0.0 };
-    let (bar, area) = area.split_top_bottom_at_y((area.top() + cut).min(area.bottom()));
-    if cut > 0.0 {
-        let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("section"));
-        section::bar(cx, &mut ui);
+    // The window has a row of its own: in a narrow pane there is none to share.
+    let row = if cx.state.settings.scene.only_window { HEAD } else { 0.0 };
+    let (bar, area) = area.split_top_bottom_at_y((area.top() + row).min(area.bottom()));
+    if row > 0.0 {
+        let mut ui = ui.new_child(UiBuilder::new().max_rect(bar.shrink2(vec2(4.0, 2.0))).id_salt("window"));
+        window::bar(cx, &mut ui);
     }
     memory.hovered = None;
     let sides = sides_shown(cx.state);

@@ -35,7 +35,7 @@ use touch2touch::app::settings::{
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
 use touch2touch::app::train::{Train, TrainForm};
-use touch2touch::app::workbench::{Layer, Picked, SceneTool, Section, SectionAxis};
+use touch2touch::app::workbench::{Layer, Picked, SceneTool};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::evaluation::Metric;
@@ -121,14 +121,6 @@ fn cure() -> impl Strategy<Value = Cure> {
         any::<usize>().prop_map(|pairs| Cure::TrainFromCad { pairs }),
         any::<usize>().prop_map(|pairs| Cure::Examine { pairs }),
     ]
-}
-
-fn section() -> impl Strategy<Value = Section> {
-    (any_of::<SectionAxis>(), number(), any::<bool>()).prop_map(|(axis, at, flipped)| Section {
-        axis,
-        at_m: f64::from(at),
-        flipped,
-    })
 }
 
 fn scene() -> impl Strategy<Value = SceneLook> {
@@ -508,7 +500,6 @@ draws! {
         1 SetLayer(any_of::<Layer>()),
         1 TryTools(any::<bool>()),
         1 SetBothClouds(any::<bool>()),
-        1 SetSection(proptest::option::of(section())),
         3 SetTool(any_of::<SceneTool>()),
         1 SetSixDof(any::<bool>()),
         1 SetSide(source()),

@@ -174,11 +174,6 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
 /// The planes that cut a view open.
 pub(super) fn cut(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Plane> {
     let mut planes = Vec::new();
-    if let Some(section) = cx.state.workbench.section {
-        let axis = section.axis.unit();
-        let side = if section.flipped { axis } else { -axis };
-        planes.push(Plane::through(axis * section.at_m, side));
-    }
     let window = memory.clouds[source as usize].as_ref().and_then(|cloud| cloud.window);
     if let Some([lo, hi]) = window.filter(|_| cx.state.settings.scene.only_window) {
         for axis in [DVec3::Y, DVec3::Z] {

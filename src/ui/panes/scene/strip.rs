@@ -39,9 +39,7 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, column: Rect) {
         views(cx, ui);
         line(cx, ui);
         let (tool, layer) = (cx.state.workbench.tool, cx.state.workbench.layer);
-        let cut = cx.state.workbench.section.is_some();
         switch(cx, ui, Icon::Distance, Action::Distances, layer == Layer::Distance);
-        switch(cx, ui, Icon::Cut, Action::Section, cut);
         shown(cx, ui);
         line(cx, ui);
         switch(cx, ui, Icon::Ruler, Action::MeasureDistance, tool == SceneTool::Distance);

@@ -45,7 +45,7 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
     ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other paints"),
-    ("[[section]], [[window_only]], [[parallel]]", "cut open, GelSlim's window only, parallel lines"),
+    ("[[window_only]], [[parallel]]", "GelSlim's window only, parallel lines"),
     ("Click on the colored dots", "legend: show or hide, color, size, opacity"),
 ];
 

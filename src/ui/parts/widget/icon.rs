@@ -13,8 +13,6 @@ pub enum Icon {
     Views,
     /// Two arrows apart: how far.
     Distance,
-    /// A plane through a box.
-    Cut,
     /// Layers on each other.
     Layers,
     /// A ruler.
@@ -64,10 +62,6 @@ impl Icon {
                 vec![[2.5, 7.0], [11.5, 7.0]],
                 vec![[4.5, 5.0], [2.5, 7.0], [4.5, 9.0]],
                 vec![[9.5, 5.0], [11.5, 7.0], [9.5, 9.0]],
-            ],
-            Self::Cut => vec![
-                vec![[2.0, 5.0], [7.0, 2.5], [12.0, 5.0], [12.0, 10.0], [7.0, 12.5], [2.0, 10.0], [2.0, 5.0]],
-                vec![[7.0, 0.5], [7.0, 13.5]],
             ],
             Self::Layers => vec![
                 vec![[7.0, 1.5], [13.0, 4.5], [7.0, 7.5], [1.0, 4.5], [7.0, 1.5]],
