@@ -1,13 +1,11 @@
 //! [`Action`]: the table of what a person can trigger. Menus, toolbar, palette and shortcut sheet are made from it; the
 //! commands in its rows are spelt in [`super::act`].
 
-mod bindings;
 mod here;
 mod key;
 
 use strum::{EnumIter, EnumString, IntoEnumIterator, IntoStaticStr};
 
-pub use bindings::Bindings;
 pub use key::{Key, Shortcut};
 use key::{alt, alt_shift, ctrl, ctrl_shift, plain, shift};
 
@@ -385,8 +383,8 @@ macro_rules! define {
                 match self { $( Self::$name => Group::$group, )* }
             }
 
-            /// The shortcuts where a person chose none ([`Bindings`] has those in force), the main one first.
-            pub fn defaults(self) -> &'static [Shortcut] {
+            /// The shortcuts, the main one first.
+            pub fn keys(self) -> &'static [Shortcut] {
                 match self { $( Self::$name => const { &[$($shortcut),*] }, )* }
             }
         }
@@ -396,7 +394,40 @@ macro_rules! define {
 use Key as K;
 actions!(define);
 
+/// A text in which `[[generate]]` stands for the main shortcut of that action, or for its name where it has none.
+pub fn with_keys(text: &str) -> String {
+    let mut parts = text.split("[[");
+    let mut filled = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let (name, rest) = part.split_once("]]").unwrap_or((part, ""));
+        filled += &name.parse().map_or_else(
+            |_| name.to_owned(),
+            |action: Action| action.keys().first().map_or_else(|| action.name().to_owned(), Shortcut::to_string),
+        );
+        filled += rest;
+    }
+    filled
+}
+
 impl Action {
+    /// The main shortcut as menus show it; empty if there is none.
+    pub fn key_text(self) -> String {
+        self.keys().first().map_or(String::new(), Shortcut::to_string)
+    }
+
+    /// A text with the main shortcut behind it: `Stop this job (Esc)`.
+    pub fn behind(self, text: &str) -> String {
+        match self.keys().first() {
+            Some(shortcut) => format!("{text} ({shortcut})"),
+            None => text.to_owned(),
+        }
+    }
+
+    /// Tooltip with the shortcut behind it.
+    pub fn help(self) -> String {
+        self.behind(self.tooltip())
+    }
+
     /// True where it moves the tool in hand: Shift and Ctrl make its steps larger and smaller.
     pub(crate) fn is_nudge(self) -> bool {
         matches!(
@@ -473,13 +504,19 @@ mod tests {
         let mut shortcuts: BTreeMap<Shortcut, Action> = BTreeMap::new();
         let mut names: BTreeMap<&str, Action> = BTreeMap::new();
         for action in Action::iter() {
-            for shortcut in action.defaults() {
+            for shortcut in action.keys() {
                 assert_eq!(shortcuts.insert(*shortcut, action), None, "{shortcut} is taken, {action:?} wants it too");
-                assert_eq!(shortcut.used_by(), None, "{action:?} {shortcut}");
-                assert_eq!(shortcut.plainly(), *shortcut, "{action:?}");
             }
             assert_eq!(names.insert(action.name(), action), None);
         }
+    }
+
+    #[test]
+    fn keys_are_said_behind_texts_and_within() {
+        assert_eq!(Action::Redo.help(), "Does it again (Ctrl+Shift+Z)");
+        assert_eq!(with_keys("[[redo]], [[open_demo]] or [[fit]]."), "Ctrl+Shift+Z, Open the demo or 0.");
+        assert_eq!(with_keys("Nothing to fill"), "Nothing to fill");
+        assert_eq!((Action::CameraTop.key_text().as_str(), Action::OpenDemo.key_text().as_str()), ("Ctrl+4", ""));
     }
 
     #[test]

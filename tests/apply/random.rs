@@ -7,7 +7,6 @@ use std::collections::BTreeMap;
 
 use proptest::prelude::*;
 use strum::IntoEnumIterator;
-use touch2touch::app::action::Action;
 use touch2touch::app::apply::apply;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
@@ -144,9 +143,5 @@ proptest! {
         let mut bench = Bench::open_simulated();
         bench.send(LibraryCommand::Select(SIMULATED));
         carry_out(&mut bench, commands)?;
-        let keys = &bench.state.settings.keys;
-        for action in Action::iter() {
-            prop_assert!(keys.all(action).into_iter().all(|key| keys.holder(key) == Some(action)), "{:?}", action);
-        }
     }
 }

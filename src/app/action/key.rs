@@ -1,9 +1,8 @@
 //! [`Key`] and [`Shortcut`]: what is pressed for an action.
 
 use std::fmt;
-use std::str::FromStr;
 
-use strum::{EnumIter, IntoEnumIterator as _};
+use strum::EnumIter;
 
 /// A key, by what is printed on it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, EnumIter)]
@@ -44,27 +43,17 @@ pub enum Key {
     Num6,
     Num7,
     Num8,
-    Num9,
     ArrowLeft,
     ArrowRight,
     ArrowUp,
     ArrowDown,
     F1,
-    F2,
-    F3,
-    F4,
     F5,
-    F6,
-    F7,
-    F8,
-    F9,
-    F10,
     F11,
     F12,
     Escape,
     Enter,
     Backspace,
-    Insert,
     Delete,
     Space,
     Home,
@@ -78,10 +67,6 @@ pub enum Key {
     Backtick,
     Comma,
     Period,
-    Semicolon,
-    Quote,
-    Slash,
-    Backslash,
     Questionmark,
     Exclamationmark,
 }
@@ -105,10 +90,6 @@ impl Key {
             Self::Backtick => "`".into(),
             Self::Comma => ",".into(),
             Self::Period => ".".into(),
-            Self::Semicolon => ";".into(),
-            Self::Quote => "'".into(),
-            Self::Slash => "/".into(),
-            Self::Backslash => "\\".into(),
             Self::Questionmark => "?".into(),
             Self::Exclamationmark => "!".into(),
             _ => name.strip_prefix("Num").map_or(name.clone(), ToOwned::to_owned),
@@ -158,64 +139,6 @@ impl fmt::Display for Shortcut {
     }
 }
 
-impl FromStr for Shortcut {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let mut parts: Vec<&str> = text.split('+').collect();
-        let last = parts.pop().unwrap_or_default();
-        let key = Key::iter().find(|key| key.text() == last).ok_or_else(|| format!("there is no key {last:?}"))?;
-        let mut shortcut = plain(key);
-        for part in parts {
-            match part {
-                "Ctrl" => shortcut.ctrl = true,
-                "Alt" => shortcut.alt = true,
-                "Shift" => shortcut.shift = true,
-                _ => return Err(format!("there is no modifier {part:?}")),
-            }
-        }
-        Ok(shortcut.plainly())
-    }
-}
-
-impl Shortcut {
-    /// The shortcut without Shift where the key itself is typed with it.
-    #[must_use]
-    pub(crate) fn plainly(self) -> Self {
-        match self.key {
-            Key::Slash if self.shift => Self { shift: false, key: Key::Questionmark, ..self },
-            Key::Num1 if self.shift => Self { shift: false, key: Key::Exclamationmark, ..self },
-            key => Self { shift: self.shift && !key.is_shifted(), ..self },
-        }
-    }
-
-    /// Who else uses it, so that it cannot be an action's: the desktop around the window, text boxes, or a pane itself.
-    pub(crate) fn used_by(self) -> Option<&'static str> {
-        use Key as K;
-        let arrow = (K::ArrowLeft..=K::ArrowDown).contains(&self.key);
-        Some(match self {
-            Self { ctrl: true, alt: true, key, .. }
-                if arrow || key.is_function() || matches!(key, K::Delete | K::Backspace | K::L | K::T) =>
-            {
-                "the desktop"
-            }
-            // GNOME, KDE and Windows: menus, closing, moving and sizing windows, going from one to the other.
-            Self { ctrl: false, alt: true, key, .. }
-                if (K::F1..=K::F10).contains(&key) || matches!(key, K::Space | K::Escape | K::Backtick) =>
-            {
-                "the desktop"
-            }
-            Self { ctrl: true, alt: false, key: K::Escape, .. } => "the desktop",
-            Self { ctrl: true, alt: false, shift: false, key: K::X | K::V } => "cutting and pasting",
-            Self { ctrl: true, alt: false, key: K::Minus | K::Equals | K::Num0, .. } => "the zoom of the window",
-            Self { ctrl: false, alt: false, shift: false, key: K::F } => {
-                "the Compare pane, which shows B while it is held"
-            }
-            _ => return None,
-        })
-    }
-}
-
 pub(super) const fn plain(key: Key) -> Shortcut {
     Shortcut { ctrl: false, shift: false, alt: false, key }
 }
@@ -233,53 +156,4 @@ pub(super) const fn ctrl(key: Key) -> Shortcut {
 }
 pub(super) const fn ctrl_shift(key: Key) -> Shortcut {
     Shortcut { ctrl: true, ..shift(key) }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_shortcut_is_read_as_it_is_written() {
-        for key in Key::iter() {
-            for bits in 0..8 {
-                let s = Shortcut { ctrl: bits & 1 > 0, shift: bits & 2 > 0, alt: bits & 4 > 0, key }.plainly();
-                assert_eq!(s.to_string().parse(), Ok(s));
-            }
-        }
-        assert_eq!("Shift+/".parse(), Ok(plain(Key::Questionmark)));
-        for bad in ["", "Ctrl+", "Ctrl", "Super+A", "a", "Ctrl + A", "Ctrl+AB"] {
-            assert!(bad.parse::<Shortcut>().is_err(), "{bad:?}");
-        }
-    }
-
-    #[test]
-    fn what_window_managers_use_is_known() {
-        for text in [
-            "Alt+F4",
-            "Alt+F2",
-            "Alt+Space",
-            "Alt+Esc",
-            "Alt+Shift+Esc",
-            "Ctrl+Alt+Left",
-            "Ctrl+Alt+Right",
-            "Ctrl+Alt+Up",
-            "Ctrl+Alt+Down",
-            "Ctrl+Alt+Shift+Left",
-            "Ctrl+Alt+F1",
-            "Ctrl+Alt+F12",
-            "Ctrl+Alt+Delete",
-            "Ctrl+Alt+T",
-            "Ctrl+V",
-        ] {
-            assert!(text.parse::<Shortcut>().unwrap().used_by().is_some(), "{text}");
-        }
-        for text in ["Alt+Left", "Ctrl+F4", "F4", "Ctrl+Shift+V", "Esc", "Shift+F", "Ctrl+F"] {
-            assert_eq!(text.parse::<Shortcut>().unwrap().used_by(), None, "{text}");
-        }
-        // Tab, Print and the key with the desktop's sign cannot be chosen at all.
-        for name in ["Tab", "Print", "Super"] {
-            assert!(Key::iter().all(|key| key.text() != name && format!("{key:?}") != name));
-        }
-    }
 }

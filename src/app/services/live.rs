@@ -8,7 +8,6 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::super::action::Bindings;
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::services::Opened;
 use super::super::source::DataSource;
@@ -379,9 +378,8 @@ fn parse_settings(bytes: &[u8]) -> Result<(Settings, Vec<String>), String> {
             version.map_or_else(|| "unknown".into(), |v| v.to_string())
         ));
     }
-    let mut refused = value.get("keys").map_or_else(Vec::new, |keys| Bindings::read(keys).1);
     let fits = |value: Value| serde_json::from_value::<Settings>(value).is_ok();
-    refused.extend(leave_out(&mut value, "", &fits).into_iter().map(|path| format!("{path} cannot be read")));
+    let refused = leave_out(&mut value, "", &fits).into_iter().map(|path| format!("{path} cannot be read")).collect();
     Ok((serde_json::from_value(value).map_err(|err| err.to_string())?, refused))
 }
 
@@ -416,7 +414,6 @@ fn leave_out(value: &mut Value, path: &str, fits: &dyn Fn(Value) -> bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::action::Action;
     use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource, Versus, Workspace};
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
@@ -555,11 +552,6 @@ mod tests {
         std::fs::write(&file, r#"{"version": 1, "ui_zoom": 1e9, "new_key": 3}"#).unwrap();
         assert_eq!(services.load_settings().0.ui_zoom, 4.0);
         // Keys that cannot be used cost nothing else, and are said.
-        std::fs::write(&file, r#"{"version": 1, "ui_zoom": 2.0, "keys": {"fly": ["F9"], "save": ["F8"]}}"#).unwrap();
-        let (settings, problem) = services.load_settings();
-        assert_eq!((settings.ui_zoom, settings.keys.text(Action::Save).as_str()), (2.0, "F8"));
-        assert!(problem.unwrap().why.starts_with("fly: there is no such action ("));
-        assert!(file.exists());
         // A field that cannot be read falls back alone, and the file as it was is kept.
         let one = r#"{"version": 1, "theme": "plaid", "ui_zoom": 2.0, "recent": ["demo", 7, {"path": "/data/x"}],
             "versus": {"inspect": {"a": "measured", "b": "prediction:bundle=a, b"}, "label": {"a": "stored"}},

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use super::super::action::{Action, Bindings};
+use super::super::action::Action;
 use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
@@ -103,8 +103,6 @@ pub struct Settings {
     pub layouts: std::collections::BTreeMap<String, String>,
     /// The workspace in front.
     pub workspace: Workspace,
-    /// The keys of actions.
-    pub keys: Bindings,
     /// Folders with further model bundles.
     pub bundle_folders: Vec<PathBuf>,
     /// The screen when the window was closed.
@@ -160,7 +158,6 @@ impl Default for Settings {
             recent: Vec::new(),
             layouts: std::collections::BTreeMap::new(),
             workspace: Workspace::Inspect,
-            keys: Bindings::default(),
             bundle_folders: Vec::new(),
             last: Last::default(),
         }

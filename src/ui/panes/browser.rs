@@ -98,7 +98,7 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
              with one; is:todo, is:in-progress, is:flagged, is:done and \
              is:skip to review states; angle>5, verdict=wrong, psnr<20, ssim<0.8 to scores (of the source chosen, \
              or measured:angle>2) in °, dB and %";
-        response.on_hover_text(cx.keys().behind(tip, Action::FindPair));
+        response.on_hover_text(Action::FindPair.behind(tip));
         let sort = cx.state.library.sort;
         let combo = egui::ComboBox::from_id_salt("sort").width(sort_width).selected_text(sort.name());
         let response = combo.show_ui(ui, |ui| {

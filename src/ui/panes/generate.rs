@@ -151,7 +151,7 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
             },
         );
         let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
-        if lock.on_hover_text(cx.keys().help(Action::LockSeed)).clicked() {
+        if lock.on_hover_text(Action::LockSeed.help()).clicked() {
             new.seed_locked = !new.seed_locked;
         }
         cx.action_button(ui, Action::GenerateNewSeed, "New");
@@ -203,7 +203,7 @@ fn run(cx: &mut Cx<'_>, ui: &mut Ui) {
             let text = RichText::new("Generate").family(crate::ui::parts::theme::medium()).color(cx.p.on_accent);
             let button = egui::Button::new(text).fill(cx.p.accent).min_size(vec2(width, 28.0));
             let response = ui.add_enabled(can.is_ok(), button).accessible_name("Generate");
-            let response = response.on_hover_text(cx.keys().help(Action::Generate));
+            let response = response.on_hover_text(Action::Generate.help());
             let why = can.err().map_or("", |absent| absent.text());
             if response.on_disabled_hover_text(why).clicked() {
                 cx.act(Action::Generate);

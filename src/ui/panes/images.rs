@@ -234,7 +234,7 @@ pub(crate) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
         Some(hint) => format!("{}\n{hint}", err.why),
         None => err.why.clone(),
     };
-    let again = cx.keys().behind("Computes it again", Action::RunPose);
+    let again = Action::RunPose.behind("Computes it again");
     if empty::show(ui, &format!("{} failed", err.what), &why, Some(("Try again", &again))) {
         cx.push(TasksCommand::Retry);
     }
@@ -289,7 +289,7 @@ pub(crate) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
         Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Generate.", what),
         _ => ("", what),
     };
-    let text = button.map(|a: Action| (cx.keys().behind(a.name(), a), a));
+    let text = button.map(|a: Action| (a.behind(a.name()), a));
     let shown = text.as_ref().map(|(text, a)| (text.as_str(), a.tooltip()));
     if empty::show(ui, what, why, shown)
         && let Some((_, action)) = text

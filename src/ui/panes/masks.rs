@@ -9,7 +9,7 @@ use eframe::egui::{self, Align, Layout, RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
 use super::browser::review_color;
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::command::{LabelsCommand, Pane, ViewCommand};
 use crate::app::keys::ImprintSource;
 use crate::app::labels::Review;
@@ -95,10 +95,10 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing.x = GAP;
         for tool in MaskTool::iter() {
             let (mask, row) = (&cx.state.settings.mask, tool.row(&cx.state.settings.mask));
-            let key = cx.keys().text(row.action);
+            let key = row.action.key_text();
             let button =
                 icon::Button { icon: sign(tool), key: &key, name: row.name, enabled: true, on: mask.tool == tool };
-            let help = format!("{}: {}", row.name, cx.keys().help(row.action));
+            let help = format!("{}: {}", row.name, row.action.help());
             if button.show(ui, vec2(wide, icon::SIZE.y)).on_hover_text(help).clicked() {
                 cx.act(row.action);
             }
@@ -133,7 +133,7 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
         for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
             let button = ui.add(egui::Button::selectable(now == layers, text));
             let tip = format!("Drawings in 3D reach {}", layers.name());
-            if button.on_hover_text(cx.keys().behind(&tip, Action::PaintLayers)).clicked() && now != layers {
+            if button.on_hover_text(Action::PaintLayers.behind(&tip)).clicked() && now != layers {
                 cx.act(Action::PaintLayers);
             }
         }
@@ -147,8 +147,8 @@ fn paints(cx: &mut Cx<'_>, ui: &mut Ui) {
         let now = cx.state.settings.mask.paint;
         for (paint, text, tip, color) in [
             (Paint::Contact, "contact", "The tools add contact; the right button removes it".to_owned(), CONTACT),
-            (Paint::Ignore, "ignore", cx.keys().help(Action::PaintIgnore), IGNORED),
-            (Paint::LetThrough, "proposal", cx.keys().help(Action::LetThrough), PROPOSED),
+            (Paint::Ignore, "ignore", Action::PaintIgnore.help(), IGNORED),
+            (Paint::LetThrough, "proposal", Action::LetThrough.help(), PROPOSED),
         ] {
             if paint == Paint::LetThrough && now != paint && !results::proposes(cx.state) {
                 continue;
@@ -170,7 +170,7 @@ fn undo(cx: &mut Cx<'_>, ui: &mut Ui) {
         let enabled = action.command(cx.state).is_some();
         let button = icon::Button { icon, key: "", name: action.name(), enabled, on: false };
         let what = what.map_or(String::new(), |what| format!(" {what}"));
-        let tip = cx.keys().behind(&format!("{}{what}", action.name()), action);
+        let tip = action.behind(&format!("{}{what}", action.name()));
         if button.show(ui, vec2(24.0, LINE)).on_hover_text(tip).clicked() {
             cx.act(action);
         }
@@ -208,7 +208,7 @@ fn radius(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.label(caption(format!("{mm:.2} mm"), cx.p));
     let tip = "Radius of brush and eraser, image pixels: drag or type; [[brush_smaller]] and [[brush_larger]], Shift + wheel \
                or Alt + move over the image. Double-click resets";
-    response.on_hover_text(cx.keys().fill(tip));
+    response.on_hover_text(with_keys(tip));
 }
 
 /// A slider over millimeters of a length in meters; whether it changed.

@@ -4,7 +4,7 @@ use crate::app::results;
 use eframe::egui::{Align, Button, Label, Layout, RichText, ScrollArea, Ui};
 
 use super::{images, scene};
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::command::{LabelsCommand, Pane};
 use crate::app::keys::ImprintSource;
 use crate::app::state::{Absent, Lookup};
@@ -75,7 +75,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
         }
         None if pose.verdict.as_ref().is_some_and(|verdict| verdict.grade > Grade::Good) => {
             let button = ui.add(Button::new(RichText::new(Action::TryTools.name()).size(SMALL)).small());
-            if button.on_hover_text(cx.keys().help(Action::TryTools)).clicked() {
+            if button.on_hover_text(Action::TryTools.help()).clicked() {
                 cx.act(Action::TryTools);
             }
         }
@@ -163,7 +163,7 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
     let error = error.map_or(String::new(), |error| format!(" (error {})", units::text_deg(error)));
     ui.horizontal(|ui| {
         ui.label(RichText::new(format!("Accepted by hand: {angle}{error}")).size(SMALL).color(cx.p.good));
-        let tip = cx.keys().fill("The registered pose counts again ([[undo]] brings it back)");
+        let tip = with_keys("The registered pose counts again ([[undo]] brings it back)");
         let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
         if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
             cx.push(LabelsCommand::AcceptPose(source, false));

@@ -73,7 +73,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.out.push(prefer(move |s| s.footprint_visible = footprint).into());
     }
     let mut mask = settings.mask_visible;
-    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(cx.keys().help(Action::MaskVisible)).changed() {
+    if ui.checkbox(&mut mask, "Contact mask on imprints").on_hover_text(Action::MaskVisible.help()).changed() {
         cx.out.push(prefer(move |s| s.mask_visible = mask).into());
     }
     let mut linked = settings.cameras_linked;

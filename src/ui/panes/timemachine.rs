@@ -11,7 +11,7 @@ use eframe::egui::{
 use strum::IntoEnumIterator as _;
 
 use super::images;
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::command::{Command, Pane};
 use crate::app::inspect::{InspectCommand, Inspected};
 use crate::app::keys::{ImprintSource, PoseBits, Registration};
@@ -158,7 +158,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         let mut lines = inspect.lines;
         let text = RichText::new("Lines").size(12.0);
         let tip = "Draws a line from contact points to the points of the tool that they are pulled to, in the 3D view";
-        if ui.checkbox(&mut lines, text).on_hover_text(cx.keys().fill(tip)).changed() {
+        if ui.checkbox(&mut lines, text).on_hover_text(with_keys(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Lines(lines)));
         }
     });
@@ -271,7 +271,7 @@ fn transport(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         let slider = ui.add_enabled(steps > 1, slider).accessible_name("Step");
         let tip = "The step shown, 0 is the applied start. [[step_back]] and [[step_forward]] step, [[first_step]] and \
                    [[last_step]] jump to the ends";
-        if slider.on_hover_text(cx.keys().fill(tip)).changed() {
+        if slider.on_hover_text(with_keys(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Go { run, at: to }));
         }
     });

@@ -11,7 +11,7 @@ use strum::IntoEnumIterator as _;
 
 use super::images::link::Link;
 use super::images::{absent_text, bar, failed, finger_text, hover, map_of, range_of, scale_note};
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::keys::VersusKey;
 use crate::app::pane::Pane;
 use crate::app::settings::{Versus, VersusMode};
@@ -162,7 +162,7 @@ fn modes(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
         cx.action_button(ui, Action::SwapCompared, "Swap A and B");
     });
     let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
-    let tip = cx.keys().fill(&tip.replace("{}", versus.mode.tooltip()));
+    let tip = with_keys(&tip.replace("{}", versus.mode.tooltip()));
     response.response.accessible_name("Way to compare").on_hover_text(tip);
 }
 

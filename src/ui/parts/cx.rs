@@ -10,7 +10,7 @@ use super::scene_view::Device;
 use super::theme::{Palette, SMALL};
 use super::widget::image_canvas::ViewTransform;
 use super::widget::texture::Textures;
-use crate::app::action::{Action, Bindings};
+use crate::app::action::Action;
 use crate::app::command::Command;
 use crate::app::keys::ImprintSource;
 use crate::app::state::State;
@@ -37,11 +37,6 @@ impl Cx<'_> {
     /// Puts a command on the list.
     pub(crate) fn push(&mut self, command: impl Into<Command>) {
         self.out.push(command.into());
-    }
-
-    /// The keys in force.
-    pub(crate) fn keys(&self) -> &Bindings {
-        &self.state.settings.keys
     }
 
     /// Puts an action on the list, if it can do anything now.
@@ -71,7 +66,7 @@ impl Cx<'_> {
     ) -> Response {
         let command = action.command(self.state);
         let response = ui.add_enabled(command.is_some(), button).accessible_name(name);
-        let help = self.keys().help(action);
+        let help = action.help();
         let response = response.on_hover_text(&help).on_disabled_hover_text(help);
         if response.clicked()
             && let Some(command) = command
@@ -83,7 +78,7 @@ impl Cx<'_> {
 
     /// A row of a menu for an action, with its key behind the name; `on` marks what is in force.
     pub(crate) fn menu_row(&mut self, ui: &mut Ui, action: Action, on: bool) -> Response {
-        let button = egui::Button::new(action.name()).shortcut_text(self.keys().text(action)).selected(on);
+        let button = egui::Button::new(action.name()).shortcut_text(action.key_text()).selected(on);
         let response = ui.add_enabled(action.command(self.state).is_some(), button).accessible_name(action.name());
         let response = response.on_hover_text(action.tooltip());
         if response.clicked() {

@@ -94,7 +94,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
             Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
         let button = Button::new(RichText::new("Generate").size(SMALL)).small().min_size(vec2(BUTTON, 16.0));
         let button = ui.put(place, button).accessible_name(format!("Generate anew, {title}"));
-        let tip = cx.keys().behind("Predicts with the settings in force", Action::Generate);
+        let tip = Action::Generate.behind("Predicts with the settings in force");
         if button.on_hover_text(tip).clicked() {
             cx.act(Action::Generate);
         }

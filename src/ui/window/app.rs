@@ -533,10 +533,7 @@ impl eframe::App for StudioApp {
                 labeling: state.is_labeling(),
             };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
-            let keys = &state.settings.keys;
-            let pressed =
-                if self.shortcuts.waits() { Vec::new() } else { shortcuts::pressed(&ctx, keys, place, possible) };
-            for action in pressed {
+            for action in shortcuts::pressed(&ctx, place, possible) {
                 if action == Action::CancelJobs && self.panes.maximized.take().is_some() {
                     continue;
                 }

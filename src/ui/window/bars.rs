@@ -7,7 +7,7 @@ use eframe::egui::{self, Align, Layout, Panel, RichText, Sense, Stroke, Ui, pos2
 use egui_tiles::Tree;
 use strum::IntoEnumIterator as _;
 
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::command::{LibraryCommand, Pane, TasksCommand, ViewCommand};
 use crate::app::library::Place;
 use crate::app::settings::Theme;
@@ -37,10 +37,10 @@ pub(crate) fn top(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
                 let width = 190.0;
                 let text = RichText::new("Find anything").color(cx.p.weak);
                 let button = egui::Button::new(text)
-                    .right_text(caption(cx.keys().text(Action::Palette), cx.p))
+                    .right_text(caption(Action::Palette.key_text(), cx.p))
                     .min_size(vec2(width, 24.0));
                 let response = ui.add(button).accessible_name("Command palette");
-                if response.on_hover_text(cx.keys().help(Action::Palette)).clicked() {
+                if response.on_hover_text(Action::Palette.help()).clicked() {
                     cx.push(ViewCommand::SetPalette(true));
                 }
             });
@@ -58,7 +58,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Test set").on_hover_text(tip).clicked() {
             cx.push(LibraryCommand::Open(Place::Path("test-set".into())));
         }
-        let button = ui.add(egui::Button::new("Folder…").shortcut_text(cx.keys().text(Action::OpenFolder)));
+        let button = ui.add(egui::Button::new("Folder…").shortcut_text(Action::OpenFolder.key_text()));
         if button.on_hover_text(Action::OpenFolder.tooltip()).clicked() {
             cx.act(Action::OpenFolder);
         }
@@ -200,14 +200,14 @@ fn fingers(cx: &mut Cx<'_>, ui: &mut Ui) {
         let button = ui.add(egui::Button::selectable(on, RichText::new(&name).size(12.0)).min_size(vec2(44.0, 20.0)));
         let button = button.accessible_name(format!("{name} finger"));
         let tip = format!("Show the {} finger ([[other_finger]] switches)", cx.state.finger_name(finger));
-        if button.on_hover_text(cx.keys().fill(&tip)).clicked() {
+        if button.on_hover_text(with_keys(&tip)).clicked() {
             cx.push(ViewCommand::SelectFinger(finger));
         }
     }
     let both = cx.state.selection.both_fingers;
     let button = ui.add(egui::Button::selectable(both, RichText::new("Both").size(12.0)).min_size(vec2(44.0, 20.0)));
     let button = button.accessible_name("Both fingers");
-    if button.on_hover_text(cx.keys().help(Action::BothFingers)).clicked() {
+    if button.on_hover_text(Action::BothFingers.help()).clicked() {
         cx.push(ViewCommand::ShowBothFingers(!both));
     }
 }
@@ -241,7 +241,7 @@ fn jobs(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn job(cx: &mut Cx<'_>, ui: &mut Ui, ticket: Ticket, task: &Task) {
     let cancel = ui.add_enabled(!task.cancelling, egui::Button::new(RichText::new("Cancel").size(SMALL)));
     let cancel = cancel.accessible_name(format!("Cancel: {}", task.title));
-    if cancel.on_hover_text(cx.keys().behind(task.kind.kept(), Action::CancelJobs)).clicked() {
+    if cancel.on_hover_text(Action::CancelJobs.behind(task.kind.kept())).clicked() {
         cx.push(TasksCommand::Cancel(ticket));
     }
     let text = if task.cancelling { "stopping…" } else { &task.progress.text };
@@ -259,8 +259,7 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     let newest = follow.newest.as_ref().map_or(String::new(), |name| format!("Newest: {name}. "));
     let text = RichText::new(text).size(12.0).color(cx.p.accent);
     let button = ui.add(egui::Button::new(text).min_size(vec2(0.0, 20.0))).accessible_name("Stop following");
-    if button.on_hover_text(cx.keys().behind(&format!("{newest}Stops following the folder"), Action::Follow)).clicked()
-    {
+    if button.on_hover_text(Action::Follow.behind(&format!("{newest}Stops following the folder"))).clicked() {
         cx.act(Action::Follow);
     }
     ui.add_space(8.0);
@@ -303,9 +302,9 @@ pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                     ui.label(RichText::new(first).color(cx.p.strong));
                     let steps = "[[next_pair]] and [[previous_pair]] step through the pairs, [[generate]] predicts the one \
                                  on screen.";
-                    ui.label(cx.keys().fill(steps));
+                    ui.label(with_keys(steps));
                     let rest = "[[palette]] finds everything else. Drop a folder here to open your own data.";
-                    ui.label(cx.keys().fill(rest));
+                    ui.label(with_keys(rest));
                 });
                 ui.add_space(8.0);
                 if ui.button("Got it").on_hover_text("Do not show this again").clicked() {

@@ -6,7 +6,7 @@ pub(crate) mod masks;
 use eframe::egui::{self, DragValue, Rect, RichText, Sense, Stroke, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::command::{ExportCommand, Pane, UiRequest, ViewCommand};
 use crate::app::export;
 use crate::app::export::{FigureForm, FigureRows, MOST_PAIRS, Output, SCALES, StillAsked};
@@ -82,7 +82,7 @@ fn rows(cx: &Cx<'_>, ui: &mut Ui, form: &mut FigureForm) {
         }
         let ticked = cx.state.library.ticked.len();
         let radio = egui::RadioButton::new(form.rows == FigureRows::Ticked, format!("the {ticked} ticked"));
-        let tip = cx.keys().fill("Pairs ticked in the list: Ctrl+click, or [[tick_pair]] for the one on screen");
+        let tip = with_keys("Pairs ticked in the list: Ctrl+click, or [[tick_pair]] for the one on screen");
         if ui.add_enabled(ticked > 0, radio).on_hover_text(&tip).on_disabled_hover_text(&tip).clicked() {
             form.rows = FigureRows::Ticked;
         }
@@ -261,7 +261,7 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane, error_m: f32) {
         }
     }
     ui.separator();
-    let tip = cx.keys().behind("Copies this pane as it is on the screen", Action::CopyPane);
+    let tip = Action::CopyPane.behind("Copies this pane as it is on the screen");
     if ui.button("Copy as picture").on_hover_text(tip).clicked() {
         cx.push(ViewCommand::Ui(UiRequest::PictureOf(pane)));
         ui.close();

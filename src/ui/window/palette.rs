@@ -141,7 +141,7 @@ fn entry_ui(cx: &Cx<'_>, ui: &mut Ui, entry: &Entry, selected: bool) -> egui::Re
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::click());
     let (name, kind, enabled) = match entry {
         Entry::Action(action) => {
-            let keys = cx.keys().text(*action);
+            let keys = action.key_text();
             (action.name(), keys, action.command(cx.state).is_some())
         }
         Entry::Pane(pane) => (pane.title(), "pane".to_owned(), true),

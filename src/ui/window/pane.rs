@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use eframe::egui::{self, Color32, RichText, Stroke, Ui, WidgetText, vec2};
 use egui_tiles::{Behavior, SimplificationOptions, TabState, Tile, TileId, Tiles, UiResponse};
 
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::keys::ImprintSource;
 use crate::app::pane::{Kind, Pane, Workspace, panes};
 use crate::app::results;
@@ -100,7 +100,7 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
     ui.set_min_width(190.0);
     let whole = *maximized == Some(pane);
     let text = if whole { "Back to all panes" } else { "Fill the window" };
-    let fill = egui::Button::new(text).shortcut_text(cx.keys().text(Action::MaximizePane));
+    let fill = egui::Button::new(text).shortcut_text(Action::MaximizePane.key_text());
     let fill = ui.add(fill).accessible_name(format!("{text}: {}", pane.title()));
     if fill.on_hover_text("Lets this pane fill the window, or shows all again; so does a double-click").clicked() {
         *maximized = if whole { None } else { Some(pane) };
@@ -111,7 +111,7 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
     }
     let controls = controls(cx, pane);
     if !controls.is_empty() {
-        ui.menu_button("Mouse and keys", |ui| help::list(ui, pane.title(), controls, cx.keys()));
+        ui.menu_button("Mouse and keys", |ui| help::list(ui, pane.title(), controls));
     }
     ui.separator();
     super::export::menu(cx, ui, pane, cx.shared.views.error_m());
@@ -238,7 +238,7 @@ pub(crate) fn show_maximized(cx: &mut Cx<'_>, ui: &mut Ui, panes: &mut Panes, pa
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui
                     .button(RichText::new("Back to all panes").size(SMALL))
-                    .on_hover_text(cx.keys().fill("[[maximize_pane]] or [[cancel_jobs]]"))
+                    .on_hover_text(with_keys("[[maximize_pane]] or [[cancel_jobs]]"))
                     .clicked()
                 {
                     panes.maximized = None;

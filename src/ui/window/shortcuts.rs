@@ -6,7 +6,7 @@ use eframe::egui::{self, Key as EKey};
 use strum::IntoEnumIterator as _;
 
 pub(crate) use self::sheet::{Memory, sheet};
-use crate::app::action::{Action, Bindings, Key, Shortcut};
+use crate::app::action::{Action, Key, Shortcut};
 use crate::app::pane::{Kind, Pane};
 
 /// The toolkit's name of a key.
@@ -17,11 +17,6 @@ fn key_of(key: Key) -> EKey {
         // The names are the same, but for these: the toolkit parses them.
         other => EKey::from_name(&other.text()).or_else(|| EKey::from_name(&format!("{other:?}"))).unwrap_or(EKey::F35),
     }
-}
-
-/// The key that the toolkit names so, if actions can have it.
-fn key_named(key: EKey) -> Option<Key> {
-    Key::iter().find(|known| key_of(*known) == key)
 }
 
 /// The place at which keys arrive.
@@ -38,12 +33,7 @@ pub(crate) struct Place {
 /// The actions whose shortcut was pressed in this frame. Keys without Ctrl are a text's while text is being typed.
 ///
 /// The key of an action that is not `possible` now is left to what else wants it (Enter to a focused button).
-pub(crate) fn pressed(
-    ctx: &egui::Context,
-    keys: &Bindings,
-    place: Place,
-    possible: impl Fn(Action) -> bool,
-) -> Vec<Action> {
+pub(crate) fn pressed(ctx: &egui::Context, place: Place, possible: impl Fn(Action) -> bool) -> Vec<Action> {
     let pressed = |e: &egui::Event| matches!(e, egui::Event::Key { pressed: true, .. } | egui::Event::Copy);
     if !ctx.input(|input| input.events.iter().any(pressed)) {
         return Vec::new();
@@ -52,10 +42,8 @@ pub(crate) fn pressed(
     let mut actions = Vec::new();
     ctx.input_mut(|input| {
         // The most specific first: Ctrl + Shift + Z is not Ctrl + Z.
-        let mut all: Vec<(Action, Shortcut)> = Action::iter()
-            .filter(|a| possible(*a))
-            .flat_map(|a| keys.all(a).into_iter().map(move |s| (a, s)))
-            .collect();
+        let mut all: Vec<(Action, Shortcut)> =
+            Action::iter().filter(|a| possible(*a)).flat_map(|a| a.keys().iter().map(move |s| (a, *s))).collect();
         all.sort_by_key(|(_, s)| std::cmp::Reverse(u8::from(s.ctrl) + u8::from(s.shift) + u8::from(s.alt)));
         for (action, s) in all {
             if typing && !s.ctrl && !s.key.is_function() {
@@ -110,7 +98,6 @@ mod tests {
     fn every_key_is_known_to_the_toolkit() {
         for key in Key::iter() {
             assert_ne!(key_of(key), EKey::F35, "{key:?}");
-            assert_eq!(key_named(key_of(key)), Some(key));
         }
     }
 
@@ -119,16 +106,16 @@ mod tests {
         Modifiers { alt: s.alt, ctrl: s.ctrl, shift: s.shift, mac_cmd: false, command: s.ctrl }
     }
 
-    fn press(keys: &Bindings, key: EKey, modifiers: Modifiers) -> Vec<Action> {
-        press_at(Place { labeling: true, ..Place::default() }, keys, key, modifiers)
+    fn press(key: EKey, modifiers: Modifiers) -> Vec<Action> {
+        press_at(Place { labeling: true, ..Place::default() }, key, modifiers)
     }
 
-    fn press_at(place: Place, keys: &Bindings, key: EKey, modifiers: Modifiers) -> Vec<Action> {
+    fn press_at(place: Place, key: EKey, modifiers: Modifiers) -> Vec<Action> {
         let ctx = egui::Context::default();
         let mut raw = egui::RawInput::default();
         raw.events.push(egui::Event::Key { key, physical_key: None, pressed: true, repeat: false, modifiers });
         let mut got = Vec::new();
-        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), keys, place, |_| true)));
+        let mut output = ctx.run_ui(raw, |ui| got.extend(pressed(ui.ctx(), place, |_| true)));
         // No picture is made, so nobody uploads its textures.
         output.textures_delta.clear();
         got
@@ -136,13 +123,12 @@ mod tests {
 
     #[test]
     fn no_letter_changes_labels_where_no_mask_is_drawn_and_none_acts_under_a_dialog() {
-        let keys = Bindings::default();
         let mut letters = 0;
         for action in Action::iter() {
-            for s in keys.all(action).into_iter().filter(|s| !s.ctrl && !s.key.is_function()) {
-                let mut m = modifiers(s);
+            for s in action.keys().iter().filter(|s| !s.ctrl && !s.key.is_function()) {
+                let mut m = modifiers(*s);
                 m.shift |= s.key.is_shifted();
-                let at = |place| press_at(place, &keys, key_of(s.key), m);
+                let at = |place| press_at(place, key_of(s.key), m);
                 let elsewhere = if action.is_of_labeling() && !s.alt { vec![] } else { vec![action] };
                 letters += usize::from(elsewhere.is_empty());
                 assert_eq!(at(Place::default()), elsewhere, "{s}");
@@ -159,12 +145,12 @@ mod tests {
     /// Of an input method: the letters of a composition arrive as keys too on some desktops.
     #[test]
     fn letters_of_a_composition_are_the_texts_and_trigger_nothing() {
-        let (ctx, keys) = (egui::Context::default(), Bindings::default());
+        let ctx = egui::Context::default();
         let (mut text, mut got) = (String::new(), Vec::new());
         let mut frame = |events: Vec<egui::Event>| {
             let raw = egui::RawInput { events, ..egui::RawInput::default() };
             let mut output = ctx.run_ui(raw, |ui| {
-                got.extend(pressed(ui.ctx(), &keys, Place { labeling: true, ..Place::default() }, |_| true));
+                got.extend(pressed(ui.ctx(), Place { labeling: true, ..Place::default() }, |_| true));
                 ui.text_edit_singleline(&mut text).request_focus();
             });
             output.textures_delta.clear();
@@ -187,24 +173,18 @@ mod tests {
         let typed = frame(vec![ime(egui::ImeEvent::Commit("né".into()))]);
         assert_eq!((typed.as_str(), got), ("né", Vec::new()));
         // Without a text these keys are actions.
-        assert!([EKey::B, EKey::C, EKey::H].iter().all(|key| !press(&keys, *key, Modifiers::NONE).is_empty()));
+        assert!([EKey::B, EKey::C, EKey::H].iter().all(|key| !press(*key, Modifiers::NONE).is_empty()));
     }
 
     #[test]
     fn a_key_triggers_its_action_and_no_other() {
-        let mut keys = Bindings::default();
-        for changed in [false, true] {
-            for action in Action::iter() {
-                for s in keys.all(action) {
-                    let mut m = modifiers(s);
-                    m.shift |= s.key.is_shifted();
-                    assert_eq!(press(&keys, key_of(s.key), m), vec![action], "{s}");
-                }
+        for action in Action::iter() {
+            for s in action.keys() {
+                let mut m = modifiers(*s);
+                m.shift |= s.key.is_shifted();
+                assert_eq!(press(key_of(s.key), m), vec![action], "{s}");
             }
-            assert_eq!(press(&keys, EKey::Slash, Modifiers::SHIFT), vec![Action::ShortcutSheet]);
-            let generate = press(&keys, EKey::G, Modifiers::CTRL);
-            assert_eq!(generate, if changed { vec![] } else { vec![Action::Generate] });
-            keys.bind(Action::Generate, 0, Some("F9".parse().unwrap()));
         }
+        assert_eq!(press(EKey::Slash, Modifiers::SHIFT), vec![Action::ShortcutSheet]);
     }
 }

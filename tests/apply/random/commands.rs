@@ -9,7 +9,6 @@ use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
 use touch2touch::app::about::{Examine, ReadOtherwise, TryModels};
-use touch2touch::app::action::{Action, Key, Shortcut};
 use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
     AboutCommand, AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover,
@@ -212,7 +211,6 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
     let range = (number(), number(), any::<bool>());
     let range = range.prop_map(|(min_m, max_m, locked)| ColorRange { min_m, max_m, locked });
     let person = select(vec![String::new(), " Anna ".into(), "x".repeat(200)]);
-    let key = (any_of::<Action>(), 0usize..4, proptest::option::of(shortcut()));
     prop_oneof![
         1 => any_of::<Theme>().prop_map(|v| prefer(move |s| s.theme = v)),
         1 => number().prop_map(|v| prefer(move |s| s.ui_zoom = v)),
@@ -241,8 +239,6 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         1 => any_of::<GelView>().prop_map(|gel| prefer(move |s| s.gel = gel)),
         1 => versus().prop_map(|v| prefer(move |s| *s.versus_mut() = v.clone())),
         1 => any_of::<Workspace>().prop_map(|v| prefer(move |s| s.workspace = v)),
-        1 => key.prop_map(|(action, place, key)| prefer(move |s| s.keys.bind(action, place, key))),
-        1 => proptest::option::of(any_of::<Action>()).prop_map(|v| prefer(move |s| s.keys.reset(v))),
     ]
     .prop_map(|command| match command {
         SettingsCommand::Change(change) => change,
@@ -255,10 +251,6 @@ fn registration() -> impl Strategy<Value = Registration> {
         any_of::<Registration>(),
         (1e-4..0.02).prop_map(|m| Registration::DistanceField(Some(Gate::new(m).unwrap()))),
     ]
-}
-
-fn shortcut() -> impl Strategy<Value = Shortcut> {
-    (any_of::<Key>(), any::<[bool; 3]>()).prop_map(|(key, [ctrl, shift, alt])| Shortcut { ctrl, shift, alt, key })
 }
 
 fn form() -> impl Strategy<Value = FigureForm> {

@@ -23,7 +23,7 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
         return;
     }
     let text = format!("{:.1} to {:.1} mm: fit the colors", bulk.lo * 1e3, bulk.hi * 1e3);
-    let text = cx.keys().behind(&text, Action::RangeOnce);
+    let text = Action::RangeOnce.behind(&text);
     let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
     ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
         ui.vertical_centered(|ui| {
@@ -67,7 +67,7 @@ pub(crate) fn error_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogr
 /// The bar of imprints.
 pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogram>) {
     let note = scale_note(cx.state);
-    let (range, keys) = (cx.state.settings.range, cx.keys());
+    let range = cx.state.settings.range;
     let default = ColorRange::default();
     let bar = Colorbar {
         label: "Depth range",
@@ -77,7 +77,7 @@ pub(crate) fn color_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogr
         histogram,
         locked: Some(range.locked),
         note,
-        tips: [keys.behind(AUTO, Action::RangeOnce), keys.behind(LOCK, Action::LockRange)],
+        tips: [Action::RangeOnce.behind(AUTO), Action::LockRange.behind(LOCK)],
     };
     match bar.show(ui, Range { lo: range.min_m * 1e3, hi: range.max_m * 1e3 }) {
         Some(ColorbarChange::Range(r)) => {

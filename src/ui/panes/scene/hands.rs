@@ -2,7 +2,7 @@
 
 use eframe::egui::{self, Button, Color32, Rect, RichText, Ui, UiBuilder, vec2};
 
-use crate::app::action::Action;
+use crate::app::action::{Action, with_keys};
 use crate::app::keys::ImprintSource;
 use crate::app::results;
 use crate::app::state::State;
@@ -66,7 +66,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             });
             let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
                         Shift ×10 · Ctrl ÷10";
-            ui.label(caption(cx.keys().fill(keys), cx.p));
+            ui.label(caption(with_keys(keys), cx.p));
         });
     });
 }

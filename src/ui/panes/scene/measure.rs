@@ -1,5 +1,6 @@
 //! Clicks in a 3D view: a point is read, or measured to.
 
+use crate::app::action::with_keys;
 use eframe::egui::{Color32, FontId, Pos2, Rect, Stroke, Ui, UiBuilder, pos2, vec2};
 use glam::DVec3;
 
@@ -54,7 +55,7 @@ pub(super) fn marks(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: ImprintSource
     };
     if bench.tool.marks() > 0 && bench.marks.len() < bench.tool.marks() {
         let text = format!("Click point {} of {} · [[cancel_jobs]] to stop", bench.marks.len() + 1, bench.tool.marks());
-        let text = cx.keys().fill(&text);
+        let text = with_keys(&text);
         label(pos2(rect.center().x - 90.0, rect.bottom() - 34.0), text, cx.p.text);
     }
     let points: Vec<DVec3> = bench.marks.iter().filter(|(of, _)| *of == source).map(|(_, p)| *p).collect();
@@ -107,7 +108,7 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
         ("Pixel", format!("{} ({x}, {y})", state.finger_name(picked.finger))),
         ("Depth", mm(depth)),
         ("Imprint", mm(imprint)),
-        ("From the CAD", off.map_or_else(|| cx.keys().fill("[[distances]]"), units::text_mm)),
+        ("From the CAD", off.map_or_else(|| with_keys("[[distances]]"), units::text_mm)),
         ("Residual", mm(fit.map(|f| f.residual_m))),
         ("Weight", fit.map_or("–".to_owned(), |f| format!("{:.2}", f.weight))),
     ];
@@ -125,7 +126,7 @@ pub(super) fn card(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: Re
                     let close = ui.add(eframe::egui::Button::new("×").frame(false).min_size(vec2(14.0, 14.0)));
                     let close = close
                         .accessible_name("Close the read-out")
-                        .on_hover_text(cx.keys().fill("Closes it ([[cancel_jobs]])"));
+                        .on_hover_text(with_keys("Closes it ([[cancel_jobs]])"));
                     if close.clicked() {
                         cx.push(Command::Workbench(WorkbenchCommand::Pick(None)));
                     }

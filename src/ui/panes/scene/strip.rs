@@ -63,10 +63,10 @@ fn sign(ui: &mut Ui, button: icon::Button<'_>) -> egui::Response {
 }
 
 fn switch(cx: &mut Cx<'_>, ui: &mut Ui, icon: Icon, action: Action, on: bool) {
-    let key = cx.keys().text(action);
+    let key = action.key_text();
     let enabled = action.command(cx.state).is_some();
     let button = sign(ui, icon::Button { icon, key: &key, name: action.name(), enabled, on });
-    let help = format!("{}. {}", action.name(), cx.keys().help(action));
+    let help = format!("{}. {}", action.name(), action.help());
     if button.on_hover_text(help).clicked() {
         cx.act(action);
     }

@@ -1,8 +1,8 @@
 //! The mouse controls of panes.
 
+use crate::app::action::with_keys;
 use eframe::egui::{self, RichText, Ui};
 
-use crate::app::action::Bindings;
 use crate::ui::parts::theme::{Palette, SMALL, caption};
 
 /// Mouse controls of every image pane.
@@ -59,12 +59,12 @@ pub(crate) const STEPS: &[(&str, &str)] = &[
     ("[[pin_step]]", "pin the step for comparison"),
 ];
 
-/// The list of `controls`, with the keys in force.
-pub fn list(ui: &mut Ui, pane: &str, controls: &[(&str, &str)], keys: &Bindings) {
+/// The list of `controls`, with their keys.
+pub fn list(ui: &mut Ui, pane: &str, controls: &[(&str, &str)]) {
     egui::Grid::new(("help", pane)).num_columns(2).spacing([12.0, 2.0]).show(ui, |ui| {
         for (control, effect) in controls {
-            ui.label(caption(keys.fill(control), Palette::of(ui)));
-            ui.label(RichText::new(keys.fill(effect)).size(SMALL));
+            ui.label(caption(with_keys(control), Palette::of(ui)));
+            ui.label(RichText::new(with_keys(effect)).size(SMALL));
             ui.end_row();
         }
     });
