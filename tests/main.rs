@@ -11,7 +11,6 @@ mod adapt;
 mod agreement;
 mod apply;
 #[cfg(feature = "onnx")]
-mod before;
 #[cfg(feature = "onnx")]
 mod cli;
 #[cfg(feature = "onnx")]
@@ -23,6 +22,7 @@ mod kill;
 mod layers;
 mod models;
 mod pose;
+mod predictions_labeled;
 mod recovery;
 mod rigs;
 mod rules;

@@ -51,25 +51,6 @@ fn paint(mask: &mut Mask, number: u32) {
 }
 
 #[test]
-fn a_mask_of_before_provenance_opens_and_says_what_it_said() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = MaskStore::in_folder(dir.path().to_owned());
-    let old = serde_json::json!({
-        "format": "touch2touch-mask", "version": 1, "pair": PAIR, "finger": "right", "width": 4, "height": 2,
-        "base": "Threshold 5.00 mm", "person": "anna", "saved_unix_s": 7, "contact_px": 3, "runs": [2, 3, 3]
-    });
-    std::fs::write(store.mask_file(PAIR, lab::RIGHT), old.to_string()).unwrap();
-    let read = store.load(PAIR, lab::RIGHT).unwrap().unwrap();
-    assert_eq!(read.mask.as_slice(), [false, false, true, true, true, false, false, false]);
-    assert_eq!(read.marks.layers(), [(&Provenance::told("Threshold 5.00 mm"), 8)]);
-    // Written again, it says where each pixel comes from.
-    store.save(PAIR, lab::RIGHT, Some(&read)).unwrap();
-    assert_eq!(store.load(PAIR, lab::RIGHT).unwrap(), Some(read));
-    let text = std::fs::read_to_string(store.mask_file(PAIR, lab::RIGHT)).unwrap();
-    assert!(text.contains("layer_runs") && text.contains("\"version\":2"), "{text}");
-}
-
-#[test]
 fn what_is_saved_is_loaded_and_undo_changes_the_file() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().join("deep/masks"));
@@ -399,56 +380,4 @@ fn nothing_is_written_where_the_data_set_is_not_any_more() {
     std::fs::remove_dir(&root).unwrap();
     std::fs::rename(&elsewhere, &root).unwrap();
     store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
-}
-
-/// Before version 1 of [`PredictedId`] the verbs and the studio wrote the same choices in two ways.
-#[test]
-fn a_mask_filed_by_an_earlier_version_is_found_and_none_is_lost() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = MaskStore::in_folder(dir.path().join("masks"));
-    let config = GenerateConfig { steps: 2, eta: 0.1, ..GenerateConfig::default() };
-    let before = |eta: f64| {
-        let choices = serde_json::to_string(&(GenerateConfig { eta, ..config }, ShiftMode::Raw)).unwrap();
-        PredictedId::verbatim(format!("b0 {choices}"))
-    };
-    let mask = |n: usize| StoredMask {
-        saved_unix_s: 100 + n as u64,
-        ..stored(Mask::from_fn(175, 140, |x, y| x * y % (n + 7) == 0))
-    };
-    let id = PredictedId::new("b0", &config, ShiftMode::Raw);
-    // The file as an earlier version left it.
-    let written = |masks: &[(&PredictedId, usize)]| {
-        let named = |n: usize| PredictedId::verbatim(n.to_string());
-        let kept = store.load_predicted(PAIR, lab::RIGHT).unwrap();
-        kept.iter().for_each(|(of, _)| store.save_predicted(PAIR, lab::RIGHT, of, None).unwrap());
-        masks.iter().for_each(|(_, n)| store.save_predicted(PAIR, lab::RIGHT, &named(*n), Some(&mask(*n))).unwrap());
-        let entries = std::fs::read_dir(store.folder()).unwrap().map(|entry| entry.unwrap().path());
-        let file = entries.into_iter().find(|path| path.to_string_lossy().ends_with(".predicted.json")).unwrap();
-        let mut content: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
-        for mask in content["masks"].as_array_mut().unwrap() {
-            let (of, _) = masks.iter().find(|(_, n)| mask["of"].as_str() == Some(named(*n).as_str())).unwrap();
-            mask["of"] = of.as_str().into();
-        }
-        std::fs::write(&file, content.to_string()).unwrap();
-    };
-    let found = |of: &PredictedId| {
-        let all = store.load_predicted(PAIR, lab::RIGHT).unwrap();
-        (all.len(), all.into_iter().find(|(known, _)| known == of).map(|(_, mask)| mask))
-    };
-    for eta in [0.1, f64::from(0.1f32)] {
-        written(&[(&before(eta), 1)]);
-        assert_eq!(found(&id), (1, Some(mask(1))));
-        // Drawn on again it is one mask, under its new name.
-        store.save_predicted(PAIR, lab::RIGHT, &id, Some(&mask(2))).unwrap();
-        assert_eq!(found(&id), (1, Some(mask(2))));
-    }
-    // Of two the later is found; the other stays, whatever is done to the first.
-    let [verb, studio] = [before(0.1), before(f64::from(0.1f32))];
-    for (first, second) in [(&verb, &studio), (&studio, &verb)] {
-        written(&[(first, 1), (second, 2)]);
-        assert_eq!(found(&id), (2, Some(mask(2))));
-        store.save_predicted(PAIR, lab::RIGHT, &id, Some(&mask(3))).unwrap();
-        assert_eq!(found(&id), (2, Some(mask(3))));
-        assert!(store.load_predicted(PAIR, lab::RIGHT).unwrap().iter().any(|(_, kept)| *kept == mask(1)));
-    }
 }

@@ -414,7 +414,7 @@ fn leave_out(value: &mut Value, path: &str, fits: &dyn Fn(Value) -> bool) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::app::settings::{ColorMap, MaskChoice, MaskSettings, MaskSource, Versus, Workspace};
+    use crate::app::settings::{Versus, Workspace};
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
@@ -572,13 +572,6 @@ mod tests {
         want.versus.insert(Workspace::Inspect, versus(Subject::Measured));
         want.versus.insert(Workspace::Label, versus(Subject::Stored));
         assert_eq!(settings, want);
-        // What earlier versions wrote opens: the color map under its old name, the numbers of masks beside the tools.
-        let old = r#"{"version": 1, "colour_map": "gray", "mask": {"source": "top_percent", "top_percent": 3.0}}"#;
-        std::fs::write(&file, old).unwrap();
-        let (settings, problem) = services.load_settings();
-        assert_eq!((problem, settings.color_map), (None, ColorMap::Gray));
-        let choice = MaskChoice { source: MaskSource::TopPercent, top_percent: 3.0, ..MaskChoice::default() };
-        assert_eq!(settings.mask, MaskSettings { choice, ..MaskSettings::default() });
     }
 
     #[test]

@@ -54,7 +54,6 @@ pub struct Settings {
     /// The color range of imprints, shared by all panes.
     pub range: ColorRange,
     /// The color map of imprints.
-    #[serde(alias = "colour_map")]
     pub color_map: ColorMap,
     /// The mapping of predictions to meters.
     pub shift: ShiftMode,

@@ -11,27 +11,17 @@ use crate::grid::{Grid, Mask};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct PackedMask {
     /// Columns.
-    #[serde(default)]
     width: usize,
     /// Rows.
-    #[serde(default)]
     height: usize,
-    /// The size as older journals have it.
-    #[serde(default, skip_serializing)]
-    size: Option<[usize; 2]>,
     /// The contact; see [`encode_runs`].
     runs: Vec<u32>,
     /// The ignored pixels, as `runs`; empty if there are none.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     ignored: Vec<u32>,
-    /// Words for what the correction began from, in older files.
-    #[serde(default, skip_serializing)]
-    base: String,
     /// The provenances.
-    #[serde(default)]
     layers: Vec<Provenance>,
     /// Whose pixels follow each other: layer and number, row by row.
-    #[serde(default)]
     layer_runs: Vec<(u8, u32)>,
 }
 
@@ -59,10 +49,8 @@ impl PackedMask {
         Self {
             width: mask.width(),
             height: mask.height(),
-            size: None,
             runs: encode_runs(mask),
             ignored: marks.ignored().map(encode_runs).unwrap_or_default(),
-            base: String::new(),
             layers: marks.layers().into_iter().map(|(layer, _)| layer.clone()).collect(),
             layer_runs,
         }
@@ -73,13 +61,8 @@ impl PackedMask {
     /// # Errors
     /// [`PackError`] if it is damaged.
     pub fn unpack(&self) -> Result<(Mask, Marks), PackError> {
-        let [width, height] = self.size.unwrap_or([self.width, self.height]);
+        let [width, height] = [self.width, self.height];
         let mask = decode_runs(width, height, &self.runs)?;
-        if self.layers.is_empty() {
-            let base = Provenance::told(self.base.clone());
-            let marks = Marks::all(mask.size(), base);
-            return Ok((mask, marks));
-        }
         let covered: u64 = self.layer_runs.iter().map(|(_, n)| u64::from(*n)).sum();
         if covered != mask.len() as u64 {
             return Err(PackError::Layers);
@@ -107,19 +90,12 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn older_files_open_and_damaged_ones_do_not() {
-        let old: PackedMask =
-            serde_json::from_str(r#"{"size": [2, 2], "runs": [1, 3], "base": "Threshold 5.00 mm"}"#).unwrap();
-        let (mask, marks) = old.unpack().unwrap();
-        assert_eq!(mask.as_slice(), [false, true, true, true]);
-        assert_eq!(marks.base().text(), "Threshold 5.00 mm");
-        let bare: PackedMask = serde_json::from_str(r#"{"width": 2, "height": 1, "runs": [2]}"#).unwrap();
-        assert_eq!(bare.unpack().unwrap().1.base(), &Provenance::Nothing);
+    fn damaged_masks_do_not_open() {
         for wrong in [
             r#"{"width": 2, "height": 1, "runs": [2], "layers": [{"kind": "grown"}], "layer_runs": [[0, 3]]}"#,
             r#"{"width": 2, "height": 1, "runs": [2], "layers": [{"kind": "grown"}], "layer_runs": [[1, 2]]}"#,
             r#"{"width": 2, "height": 1, "runs": [2], "ignored": [1], "layers": [{"kind": "grown"}], "layer_runs": [[0, 2]]}"#,
-            r#"{"width": 2, "height": 1, "runs": [3]}"#,
+            r#"{"width": 2, "height": 1, "runs": [3], "layers": [{"kind": "grown"}], "layer_runs": [[0, 2]]}"#,
         ] {
             assert!(serde_json::from_str::<PackedMask>(wrong).unwrap().unpack().is_err(), "{wrong}");
         }

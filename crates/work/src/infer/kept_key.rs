@@ -6,8 +6,7 @@ use sha2::{Digest, Sha256};
 use super::engine::EngineKind;
 use super::recipe_id::{Named, RecipeId};
 use crate::io::digest::hex;
-use crate::io::model_id::current;
-use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
+use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::RgbGrid;
 
 /// All that decides a prediction: the picture and, in [`RecipeId`], the recipe. The shift is none of it: it is applied to
@@ -33,30 +32,6 @@ impl KeptKey {
     }
 }
 
-/// A key as builds before [`RecipeId`] wrote it.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(super) struct KeptKeyV1 {
-    input: String,
-    bundle: String,
-    engine: EngineKind,
-    seed: u64,
-    steps: u32,
-    eta_bits: u64,
-    sampler: Sampler,
-    spacing: Spacing,
-    guidance_bits: u64,
-}
-
-impl From<KeptKeyV1> for KeptKey {
-    fn from(key: KeptKeyV1) -> Self {
-        let KeptKeyV1 { input, bundle, engine, seed, steps, eta_bits, sampler, spacing, guidance_bits } = key;
-        let (eta, guidance) = (f64::from_bits(eta_bits), f64::from_bits(guidance_bits));
-        let config = GenerateConfig { steps, eta, seed, sampler, spacing, guidance };
-        Self { input, bundle: current(&bundle), engine, config }
-    }
-}
-
 /// The identity of a GelSlim difference image: SHA-256 of its size and of every value, in hex.
 pub(crate) fn input_digest(difference: &RgbGrid) -> String {
     let mut hash = Sha256::new();
@@ -75,6 +50,7 @@ pub(crate) fn input_digest(difference: &RgbGrid) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use touch2touch_core::diffusion::{Sampler, Spacing};
     use touch2touch_core::grid::Grid;
 
     #[test]

@@ -13,7 +13,7 @@ use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
 
-use super::kept_key::{KeptKey, KeptKeyV1};
+use super::kept_key::KeptKey;
 use super::sheets;
 use crate::io::digest::sha256;
 use crate::io::{files, folders};
@@ -22,8 +22,6 @@ use touch2touch_core::postprocess::RawPrediction;
 
 /// The format and its version, in every file.
 const FORMAT: &str = "touch2touch-prediction-2";
-/// The format of builds that had keys of another form.
-const FORMAT_V1: &str = "touch2touch-prediction-1";
 /// End of the files' names: nothing else in the folder is ever touched.
 const SUFFIX: &str = ".prediction";
 /// No file with a longer first line, or more values, is one of ours.
@@ -297,13 +295,10 @@ fn short(digest: &str) -> &str {
 /// A whole file, or `None`.
 fn parse(content: &[u8]) -> Option<Stored> {
     let end = content.iter().take(MAX_HEADER).position(|&b| b == b'\n')?;
-    let line = &content[..end];
-    let header = serde_json::from_slice::<Header<KeptKey>>(line).ok().filter(|header| header.format == FORMAT);
-    let header = header.or_else(|| {
-        let Header { format, recipe, width, height, channels, sha256, seconds } =
-            serde_json::from_slice::<Header<KeptKeyV1>>(line).ok().filter(|header| header.format == FORMAT_V1)?;
-        Some(Header { format, recipe: recipe.into(), width, height, channels, sha256, seconds })
-    })?;
+    let header: Header<KeptKey> = serde_json::from_slice(&content[..end]).ok()?;
+    if header.format != FORMAT {
+        return None;
+    }
     let values = &content[end + 1..];
     let plane = header.width.checked_mul(header.height).filter(|&n| n > 0)?;
     let count = plane.checked_mul(header.channels).filter(|n| (1..=MAX_VALUES).contains(n))?;

@@ -10,8 +10,8 @@
 
 mod journal;
 
-use std::cmp::Reverse;
 use std::collections::BTreeMap;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -32,7 +32,7 @@ pub const FOLDER: &str = "touch2touch_masks";
 const FORMAT: &str = "touch2touch-mask";
 const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
-/// Masks that say where each pixel comes from: an older program would lose that.
+/// Masks, which say where each pixel comes from.
 const MASK_VERSION: u32 = 2;
 /// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
 const HAND_VERSION: u32 = 2;
@@ -361,23 +361,15 @@ impl MaskStore {
         let Some((file, bytes)) = self.find(&self.predicted_name(pair, finger))? else { return Ok(Vec::new()) };
         let damaged = |reason: String| StoreError::Damaged { file: file.clone(), reason };
         let content: PredictedFile = serde_json::from_slice(&bytes).map_err(|err| damaged(err.to_string()))?;
-        check_format(&file, &content.format, PREDICTED_FORMAT, content.version, MASK_VERSION)?;
+        check_format(&file, &content.format, PREDICTED_FORMAT, content.version, MASK_VERSION..=MASK_VERSION)?;
         if content.pair != pair || content.finger != self.rig.pad_key(finger) {
             return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
         }
-        // Earlier versions wrote one prediction in several ways: of masks on the same one that saved last is found, the
-        // others stay in the file under a name of their own.
-        let mut masks: Vec<_> = content.masks.into_iter().map(|m| (PredictedId::from(m.of.clone()), m)).collect();
-        masks.sort_by_key(|(of, m)| Reverse((of.as_str() == m.of, m.saved_unix_s)));
-        let mut all: Vec<(PredictedId, StoredMask)> = Vec::new();
-        for (mut of, m) in masks {
-            while all.iter().any(|(known, _)| *known == of) {
-                of = PredictedId::verbatim(format!("{of}, earlier"));
-            }
-            let (mask, marks) = m.mask.unpack().map_err(|err| damaged(err.to_string()))?;
-            all.push((of, StoredMask { mask, marks, person: m.person, saved_unix_s: m.saved_unix_s }));
-        }
-        Ok(all)
+        let stored = |PredictedMask { of, person, saved_unix_s, mask }| {
+            let (mask, marks) = mask.unpack().map_err(|err| damaged(err.to_string()))?;
+            Ok((of.into(), StoredMask { mask, marks, person, saved_unix_s }))
+        };
+        content.masks.into_iter().map(stored).collect()
     }
 
     /// Saves the mask drawn on the prediction `of`, beside those of other predictions; `None` removes it.
@@ -551,7 +543,7 @@ fn read(file: &Path) -> Result<Vec<u8>, StoreError> {
 fn parse_mask(file: &Path, bytes: &[u8], pair: &str, finger: &str) -> Result<StoredMask, StoreError> {
     let damaged = |reason: String| StoreError::Damaged { file: file.to_owned(), reason };
     let content: MaskFile = serde_json::from_slice(bytes).map_err(|err| damaged(err.to_string()))?;
-    check_format(file, &content.format, FORMAT, content.version, MASK_VERSION)?;
+    check_format(file, &content.format, FORMAT, content.version, MASK_VERSION..=MASK_VERSION)?;
     if content.pair != pair || content.finger != finger {
         return Err(damaged(format!("it belongs to the {} finger of {}", content.finger, content.pair)));
     }
@@ -570,7 +562,7 @@ fn contact_px(mask: &Mask) -> usize {
 fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     let content: ReviewFile = serde_json::from_slice(bytes)
         .map_err(|err| StoreError::Damaged { file: file.to_owned(), reason: err.to_string() })?;
-    check_format(file, &content.format, REVIEW_FORMAT, content.version, PREDICTED_VERSION)?;
+    check_format(file, &content.format, REVIEW_FORMAT, content.version, VERSION..=PREDICTED_VERSION)?;
     if content.review.accepted.values().any(|a| !a.pose.is_finite()) {
         let reason = "an accepted pose is not a finite number".into();
         return Err(StoreError::Damaged { file: file.to_owned(), reason });
@@ -578,11 +570,17 @@ fn parse_review(file: &Path, bytes: &[u8]) -> Result<ReviewFile, StoreError> {
     Ok(content)
 }
 
-fn check_format(file: &Path, format: &str, expected: &str, version: u32, newest: u32) -> Result<(), StoreError> {
-    if format == expected && (VERSION..=newest).contains(&version) {
+fn check_format(
+    file: &Path,
+    format: &str,
+    expected: &str,
+    version: u32,
+    known: RangeInclusive<u32>,
+) -> Result<(), StoreError> {
+    if format == expected && known.contains(&version) {
         return Ok(());
     }
-    let reason = format!("it is {format} version {version}, expected {expected} up to version {newest}");
+    let reason = format!("it is {format} version {version}, expected {expected} up to version {}", known.end());
     Err(StoreError::Damaged { file: file.to_owned(), reason })
 }
 

@@ -22,7 +22,7 @@ const UNNAMED: &str = r#"{
 /// of one generation, and the shift. Masks drawn on a prediction are filed under it, so it outlives versions of the program:
 /// choices are named, and those at their defaults left out, so that a new one changes no text.
 ///
-/// A text that an earlier version wrote is read as what it means; one that none understands is kept as it is.
+/// A text that is not understood is kept as it is.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(from = "String", into = "String")]
 pub struct PredictedId(Arc<str>);
@@ -70,17 +70,10 @@ impl PredictedId {
 impl From<String> for PredictedId {
     /// Identity from the text of a file.
     fn from(text: String) -> Self {
-        let before_v1 = || {
-            let (bundle, choices) = text.split_once(' ')?;
-            let (config, shift) = serde_json::from_str::<(GenerateConfig, ShiftMode)>(choices).ok()?;
-            let config = GenerateConfig { eta: typed(config.eta), guidance: typed(config.guidance), ..config };
-            Some(Self::new(&current(bundle), &config, shift))
-        };
-        let by_identity = || {
-            let (bundle, choices) = text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION))?;
-            Some(Self(format!("{} {choices}", current(bundle)).into()))
-        };
-        before_v1().or_else(by_identity).unwrap_or_else(|| Self::verbatim(text))
+        match text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION)) {
+            Some((bundle, choices)) => Self(format!("{} {choices}", current(bundle)).into()),
+            None => Self::verbatim(text),
+        }
     }
 }
 
@@ -94,12 +87,6 @@ impl std::fmt::Display for PredictedId {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(&self.0)
     }
-}
-
-/// The number that was typed, of one that the studio took for an `f32` before version 1.
-fn typed(value: f64) -> f64 {
-    let single = value as f32;
-    if f64::from(single) == value { single.to_string().parse().unwrap_or(value) } else { value }
 }
 
 fn unnamed() -> Map<String, Value> {
@@ -161,18 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_before_means_the_same() {
-        let config = GenerateConfig { steps: 2, eta: 0.1, sampler: Sampler::Ddpm, ..GenerateConfig::default() };
-        let id = PredictedId::new("b0", &config, ShiftMode::ExactInverse);
-        // By the verbs, which had 64 bits, and by the studio, which had 32.
-        for eta in [0.1, f64::from(0.1f32)] {
-            let before = serde_json::to_string(&(GenerateConfig { eta, ..config }, ShiftMode::ExactInverse)).unwrap();
-            assert_eq!(PredictedId::from(format!("b0 {before}")), id);
-        }
-        let without_guidance = r#"b0 [{"steps":50,"eta":0.0,"seed":42,"sampler":"ddim","spacing":"trailing"},"raw"]"#;
-        let (_, config, shift) =
-            PredictedId::from(without_guidance.to_owned()).parts().map(|(b, c, s)| (b.len(), c, s)).unwrap();
-        assert_eq!((config, shift), (GenerateConfig::default(), ShiftMode::Raw));
+    fn what_is_not_understood_is_kept() {
         for odd in ["a prediction", "", "b0 v1 {\"later\":1}", "b0 v9 {}", "b0 [1,2]", "b0 v1 []"] {
             let kept = PredictedId::from(odd.to_owned());
             assert_eq!((kept.as_str(), kept.parts()), (odd, None));

@@ -11,8 +11,6 @@ use super::{atomic, files};
 
 /// Start of the folder's name.
 const PREFIX: &str = ".touch2touch-new-";
-/// Start of the folder's name in earlier versions of the program.
-const OLD_PREFIX: &str = ".touch2touch-export-";
 /// The file in it that is locked while a program works there, and names the folder whose content is being made.
 const LOCK: &str = "lock";
 const NEW: &str = "new";
@@ -153,8 +151,7 @@ pub(crate) fn sweep(parent: &Path) {
             release(&entry.path());
             continue;
         }
-        let ours = name.starts_with(PREFIX) || name.starts_with(OLD_PREFIX);
-        if !ours || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
+        if !name.starts_with(PREFIX) || !entry.file_type().is_ok_and(|kind| kind.is_dir()) {
             continue;
         }
         let left = entry.path();

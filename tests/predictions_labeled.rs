@@ -1,4 +1,5 @@
-//! What an earlier build wrote is found by this one, in the studio and by the verbs alike.
+//! What was drawn on a prediction and accepted of it is found by what decided that prediction, in the studio and by the verbs
+//! alike.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,26 +11,20 @@ use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
 use touch2touch::app::runtime::Runtime;
-use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch::app::settings::{GenerateSettings, MaskSource, Settings};
+use touch2touch::app::settings::{GenerateSettings, Settings};
 use touch2touch::app::state::State;
-use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::{GenerateConfig, Sampler};
-use touch2touch_core::postprocess::ShiftMode;
+use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::rig::lab;
 use touch2touch_work::bundles;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind};
-use touch2touch_work::infer::kept_key::KeptKey;
-use touch2touch_work::infer::store::{DEFAULT_BUDGET, Store};
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_work::infer::engine::EngineChoice;
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::run;
 
-/// A simulated pair with the labels that a build before `PredictedId` wrote: a mask on the right finger's prediction (DDIM,
+/// A simulated pair with labels: a mask on the right finger's prediction (DDIM,
 /// 2 steps, eta 0.1), an accepted pose of it, a note. And the bundle that predicted it.
-fn labeled(dir: &Path, spelled: impl Fn(&str) -> String) -> [PathBuf; 2] {
+fn labeled(dir: &Path) -> [PathBuf; 2] {
     let (set, bundle) = (dir.join("set"), full_size_bundle(dir));
     let path = set.to_str().unwrap();
     assert!(
@@ -40,12 +35,12 @@ fn labeled(dir: &Path, spelled: impl Fn(&str) -> String) -> [PathBuf; 2] {
     let id = bundles::open("test", bundle.as_path()).unwrap().id;
     let labels = set.join("touch2touch_masks");
     std::fs::create_dir(&labels).unwrap();
-    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/before/labels")).unwrap() {
+    for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/labels")).unwrap() {
         let file = entry.unwrap().path();
         let text = std::fs::read_to_string(&file).unwrap();
         // The tests' bundle has another identity wherever its manifest is written anew.
         let text = text.replace("3bba1b752350ca0aed061dfaaba2ef551efc19ed9d429e04f4e79ed7dd4a188c", &id);
-        std::fs::write(labels.join(file.file_name().unwrap()), spelled(&text)).unwrap();
+        std::fs::write(labels.join(file.file_name().unwrap()), text).unwrap();
     }
     [set, bundle]
 }
@@ -83,25 +78,20 @@ fn in_studio(home: &Path, [set, bundle]: &[PathBuf; 2]) -> usize {
 
 #[test]
 fn a_mask_on_a_prediction_is_found_by_what_decided_the_prediction() {
-    // As the verbs wrote eta, and as the studio did, which took it for 32 bits.
-    let spellings: [fn(&str) -> String; 2] =
-        [str::to_owned, |text| text.replace(r#"\"eta\":0.1"#, &format!(r#"\"eta\":{}"#, f64::from(0.1f32)))];
-    for spelled in spellings {
-        let dir = tempfile::tempdir().unwrap();
-        let places = labeled(dir.path(), spelled);
-        let [set, bundle] = places.each_ref().map(|path| path.to_str().unwrap());
-        let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
-        let pose = |more: &[&str]| -> Value {
-            let fixed = ["pose", set, "--imprint", "predicted", "--mask", "top_percent", "--bundle", bundle, "--json"];
-            let done = run(&[&fixed[..], &choices, more].concat(), dir.path());
-            serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
-        };
-        let found = pose(&[]);
-        assert_eq!(found["mask"], "hand, top_percent", "{found:#}");
-        assert_eq!(found["accepted"]["by_hand"], true, "{found:#}");
-        assert_eq!(pose(&["--seed", "7"])["mask"], "top_percent", "another prediction has its own");
-        assert_eq!(in_studio(dir.path(), &places), 0);
-    }
+    let dir = tempfile::tempdir().unwrap();
+    let places = labeled(dir.path());
+    let [set, bundle] = places.each_ref().map(|path| path.to_str().unwrap());
+    let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim"];
+    let pose = |more: &[&str]| -> Value {
+        let fixed = ["pose", set, "--imprint", "predicted", "--mask", "top_percent", "--bundle", bundle, "--json"];
+        let done = run(&[&fixed[..], &choices, more].concat(), dir.path());
+        serde_json::from_slice::<Value>(&done.stdout).unwrap()["cases"][0].clone()
+    };
+    let found = pose(&[]);
+    assert_eq!(found["mask"], "hand, top_percent", "{found:#}");
+    assert_eq!(found["accepted"]["by_hand"], true, "{found:#}");
+    assert_eq!(pose(&["--seed", "7"])["mask"], "top_percent", "another prediction has its own");
+    assert_eq!(in_studio(dir.path(), &places), 0);
 }
 
 /// A bundle of another name and note, written anew in another folder.
@@ -123,7 +113,7 @@ fn rebuilt(bundle: &Path, dir: &Path) -> PathBuf {
 #[test]
 fn what_was_drawn_and_kept_under_a_bundle_is_found_when_it_was_written_anew() {
     let dir = tempfile::tempdir().unwrap();
-    let [set, bundle] = labeled(dir.path(), str::to_owned);
+    let [set, bundle] = labeled(dir.path());
     let again = rebuilt(&bundle, dir.path());
     let pose = |bundle: &Path| -> Value {
         let fixed = ["pose", set.to_str().unwrap(), "--imprint", "predicted", "--mask", "top_percent", "--json"];
@@ -156,7 +146,7 @@ fn what_was_drawn_and_kept_under_a_bundle_is_found_when_it_was_written_anew() {
 #[test]
 fn an_accepted_pose_is_of_one_prediction() {
     let dir = tempfile::tempdir().unwrap();
-    let places = labeled(dir.path(), str::to_owned);
+    let places = labeled(dir.path());
     let [set, bundle] = places.each_ref().map(|path| path.to_str().unwrap());
     let verb = |words: &[&str], seed: &str| -> Value {
         let choices = ["--runtime", "rten", "--steps", "2", "--eta", "0.1", "--sampler", "ddim", "--seed", seed];
@@ -189,58 +179,4 @@ fn an_accepted_pose_is_of_one_prediction() {
     let refused = run(&[&withdraw[..], &["--bundle", bundle, "--steps", "2", "--seed", "9"]].concat(), dir.path());
     let why = String::from_utf8_lossy(&refused.stderr);
     assert!(!refused.status.success() && why.contains("seed 9") && why.contains("seed 7"), "{why}");
-}
-
-/// A fixture that an earlier build wrote, copied, so that nothing writes into it.
-fn fixture(name: &str, dir: &Path) -> PathBuf {
-    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/before").join(name);
-    let to = dir.join(name);
-    if from.is_file() {
-        std::fs::copy(from, &to).unwrap();
-        return to;
-    }
-    std::fs::create_dir(&to).unwrap();
-    for entry in std::fs::read_dir(from).unwrap() {
-        let file = entry.unwrap().path();
-        std::fs::copy(&file, to.join(file.file_name().unwrap())).unwrap();
-    }
-    to
-}
-
-#[test]
-fn preferences_are_read() {
-    let dir = tempfile::tempdir().unwrap();
-    fixture("settings.json", dir.path());
-    let (settings, problem) = LiveServices::with_config_folder(Some(dir.path().to_owned())).load_settings();
-    assert_eq!(problem, None);
-    let GenerateSettings { bundle, preset, steps, seed, eta, .. } = settings.generate;
-    assert_eq!((bundle.as_deref(), preset, steps, seed, eta), (Some("my generator"), None, 7, u64::MAX, 0.1));
-    assert_eq!((settings.runtime, settings.shift), (EngineChoice::Rten, ShiftMode::PaperShift));
-    assert_eq!((settings.mask.choice.source, settings.mask.choice.cad_distance_m), (MaskSource::Cad, 0.0015));
-}
-
-#[test]
-fn a_kept_prediction_is_found() {
-    let dir = tempfile::tempdir().unwrap();
-    let store = Store::new(fixture("predictions", dir.path()), DEFAULT_BUDGET);
-    let config = GenerateConfig { steps: 2, eta: 0.1, ..GenerateConfig::default() };
-    let key = |config: &GenerateConfig| KeptKey {
-        input: "ab".repeat(32),
-        bundle: "cd".repeat(32),
-        engine: EngineKind::Rten,
-        config: *config,
-    };
-    let found = store.get(&key(&config)).expect("it is found by all that decides it");
-    assert_eq!((found.raw.channels.len(), found.raw.channels[2][(3, 1)], found.seconds), (3, 213.0 / 7.0, 0.5));
-    assert!(store.get(&key(&GenerateConfig { eta: 0.2, ..config })).is_none());
-}
-
-#[test]
-fn a_fit_is_applied() {
-    let dir = tempfile::tempdir().unwrap();
-    let bundle = bundles::open("test", fixture("fitted", dir.path()).as_path()).unwrap();
-    let fit = bundle.open("test").unwrap().fit().cloned().expect("it was fitted");
-    let sample = Dataset::demo().load(PairId(0)).unwrap();
-    let correction = fit.correction(&sample, lab::RIGHT).expect("to the right finger as well");
-    assert!((correction.line[0] - 1.177).abs() < 1e-3, "{:?}", correction.line);
 }
