@@ -6,7 +6,6 @@ mod commands;
 use std::collections::BTreeMap;
 
 use proptest::prelude::*;
-use strum::IntoEnumIterator;
 use touch2touch::app::apply::apply;
 use touch2touch::app::command::{Answer, Command, LabelsCommand, LibraryCommand, Pane, SettingsCommand};
 use touch2touch::app::labels::{Document, MaskPlace, Review};
