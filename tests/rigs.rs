@@ -184,7 +184,6 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "figure --pairs a --out OUT.png",
         "export --pair a --out OUT",
         "training-data --out OUT",
-        "unit",
         "watch --once",
     ] {
         let words: Vec<&str> = verb

@@ -219,7 +219,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
         std::fs::write(store.mask_file(&entry.name, lab::LEFT), "{").unwrap();
     }
     // As a killed export leaves it: the lock is nobody's.
-    let left = dir.path().join(".touch2touch-export-killed");
+    let left = dir.path().join(".touch2touch-new-killed");
     std::fs::create_dir_all(left.join("new/train")).unwrap();
     std::fs::write(left.join("lock"), "masks").unwrap();
     let out = dir.path().join("masks");

@@ -39,7 +39,9 @@ fn metrics_say_what_is_implausible_and_only_where_they_are_seen() {
     assert_eq!(flagged(&rig), before, "out of sight nothing is computed");
     rig.take("Back to all panes");
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
-    let found = results::flags(rig.harness.state().state(), lab::RIGHT).ready().expect("those of the finger shown");
+    let found = results::flags(rig.harness.state().state(), lab::RIGHT)
+        .ready()
+        .unwrap_or_else(|| panic!("{:?}", results::flags(rig.harness.state().state(), lab::RIGHT)));
     assert_eq!(found[0].kind, FlagKind::DoubledMapping);
     let what = found[0].what.clone();
     assert!(rig.harness.query_all_by_label_contains(&what).next().is_some(), "{what}");

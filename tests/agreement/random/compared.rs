@@ -56,7 +56,7 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
             let state = &both.studio.state;
             let what = format!("{}: {} and {}, {recipe:?}", state.pair_name(), versus.a, versus.b);
             let said = both.said(Pane::Compare).unwrap_or_else(|err| panic!("{what}: {err}"));
-            for finger in said["fingers"].as_array().unwrap() {
+            for finger in said["fingers"].as_array().unwrap_or_else(|| panic!("{what}: {said}")) {
                 let pad = state.rig().pads().find(|pad| finger["finger"] == *state.finger_name(*pad)).unwrap();
                 let measured = |subject: &Subject| (*subject != Subject::Measured).then_some(Subject::Measured);
                 for (key, one, other) in [

@@ -324,7 +324,7 @@ pub fn resolve(_: EngineChoice) -> Result<EngineKind, EngineError> {
 
 /// The library of ONNX Runtime in use, loaded on the first call, or all the places that were searched in vain.
 #[cfg(feature = "onnx")]
-pub(super) fn library() -> Result<Library, Vec<super::runtime::Searched>> {
+pub(super) fn library() -> Result<Library, Vec<Searched>> {
     ort_engine::library()
 }
 
@@ -363,6 +363,15 @@ pub(super) enum NoProvider {
 #[cfg(feature = "onnx")]
 pub(super) fn try_provider(provider: Provider) -> Result<(), NoProvider> {
     ort_engine::try_provider(provider)
+}
+
+/// A place that was searched without success.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Searched {
+    /// Place that was searched.
+    pub place: String,
+    /// Fault that was met there.
+    pub outcome: String,
 }
 
 /// A loaded library of ONNX Runtime.

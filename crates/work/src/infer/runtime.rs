@@ -10,7 +10,7 @@ use serde::Serialize;
 #[cfg(feature = "onnx")]
 use strum::IntoEnumIterator as _;
 
-use super::engine::{self, EngineChoice, EngineKind, Provider};
+use super::engine::{self, EngineChoice, EngineKind, Provider, Searched};
 
 /// Engine that runs the models, and why.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -29,15 +29,6 @@ pub struct RuntimeReport {
     pub threads: usize,
     /// Providers that this system can have.
     pub providers: Vec<ProviderReport>,
-}
-
-/// A place that was searched without success.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Searched {
-    /// Place that was searched.
-    pub place: String,
-    /// Fault that was met there.
-    pub outcome: String,
 }
 
 /// A provider on this machine.

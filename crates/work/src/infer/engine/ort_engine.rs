@@ -8,9 +8,8 @@ use ort::ep::{self, ExecutionProvider as _, ExecutionProviderDispatch};
 use ort::session::{Session as OrtSession, SessionInputValue};
 use ort::value::TensorRef;
 
-use super::{Input, Library, NoProvider, Provider, Session, threads};
+use super::{Input, Library, NoProvider, Provider, Searched, Session, threads};
 use crate::infer::library::candidates;
-use crate::infer::runtime::Searched;
 use touch2touch_core::diffusion::Tensor;
 
 /// The library stays loaded once it is: ONNX Runtime cannot be unloaded safely.

@@ -5,10 +5,12 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
-use super::found::IGNORE_PNG;
 use super::{Content, ExportError};
 use crate::io::images;
 use touch2touch_core::grid::{Grid, Mask};
+
+/// End of the name of the picture of ignored pixels beside a mask.
+pub(super) const IGNORE_PNG: &str = ".ignore.png";
 
 /// A form of masks that other programs read and write.
 #[derive(

@@ -5,7 +5,6 @@ use std::path::{Path, PathBuf};
 use super::Format;
 use crate::io::images;
 use touch2touch_core::grid::Mask;
-pub(super) const IGNORE_PNG: &str = ".ignore.png";
 
 /// Why masks cannot be read.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]

@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::found::{IGNORE_PNG, Listed, Listing, ReadError};
+use super::format::IGNORE_PNG;
+use super::found::{Listed, Listing, ReadError};
 use super::{Format, IGNORED, Manifest, PARTS};
 
 /// The masks of a folder, of an export or of one of its parts, or of one file; in the form named, else in the one that lies
