@@ -49,7 +49,13 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
         both.show(&[Pane::Compare, Pane::Predicted, Pane::Scene]);
         for at in 0..2 {
             let recipe = draws.posed();
-            let versus = Versus { a: draws.one(subject()), b: draws.one(subject()), mode: VersusMode::Difference };
+            // Prediction against measurement is a column of figures, whose command the figures' test holds.
+            let versus = loop {
+                let drawn = Versus { a: draws.one(subject()), b: draws.one(subject()), mode: VersusMode::Difference };
+                if !drawn.is_error() {
+                    break drawn;
+                }
+            };
             let shown = versus.clone();
             both.studio.send(prefer(move |s| *s.versus_mut() = shown.clone()).into());
             both.predict(&recipe, 29 * at);

@@ -134,7 +134,7 @@ fn row(cx: &Cx<'_>, ui: &mut Ui, action: Action) {
         let keys: Vec<String> = action.keys().iter().map(ToString::to_string).collect();
         if !keys.is_empty() {
             let text = RichText::new(keys.join("  ")).size(SMALL).monospace().color(cx.p.weak);
-            ui.label(text).accessible_name(format!("Keys of {name}"));
+            ui.label(text);
         }
     });
 }
