@@ -9,7 +9,7 @@ cd "$(dirname "$0")"
 step() { printf '\n== %s (%ss)\n' "$*" "$SECONDS"; }
 # One set of features and the studio's profile for all: each dependency is built once.
 whole=(--locked --release --workspace --features ui-test)
-built="${CARGO_TARGET_DIR:-target}/release"
+built="$(realpath -m "${CARGO_TARGET_DIR:-target}")/release"
 
 step "packages"
 . ./setup.sh
@@ -64,7 +64,7 @@ fi
 cargo test "${whole[@]}" --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Z unstable-options --report-time
 
 step "tests of the Python package, its types"
-TOUCH2TOUCH_PROGRAM="$PWD/$built/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
+TOUCH2TOUCH_PROGRAM="$built/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
 "$python" -m mypy.stubtest touch2touch --mypy-config-file pyproject.toml
 
 step "tables of measurements and of the study of methods"
@@ -79,9 +79,10 @@ if [ "${1:-}" = --all ]; then
   cargo test --locked -p touch2touch-core -p touch2touch-tuning
   step "the wheel in a fresh environment"
   "$python" -m pip install --quiet maturin
+  rm -rf target/wheels
   "$python" -m maturin build --locked --release --interpreter "$python" --out target/wheels
   python3 -m venv --clear target/wheel-venv
-  target/wheel-venv/bin/python -m pip install --quiet --find-links target/wheels touch2touch
+  target/wheel-venv/bin/python -m pip install --quiet target/wheels/*.whl
   target/wheel-venv/bin/python -c 'import touch2touch; print(touch2touch.__version__)'
 fi
 
