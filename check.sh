@@ -9,7 +9,8 @@ cd "$(dirname "$0")"
 step() { printf '\n== %s (%ss)\n' "$*" "$SECONDS"; }
 # One set of features and the studio's profile for all: each dependency is built once.
 whole=(--locked --release --workspace --features ui-test)
-built="$(realpath -m "${CARGO_TARGET_DIR:-target}")/release"
+built="${CARGO_TARGET_DIR:-target}/release"
+[[ $built = /* ]] || built="$PWD/$built"
 
 step "packages"
 . ./setup.sh

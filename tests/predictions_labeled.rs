@@ -1,4 +1,4 @@
-//! What was drawn on a prediction and accepted of it is found by what decided that prediction, in the studio and by the verbs
+//! Masks drawn on a prediction, and poses accepted of it, are found by what decided that prediction, in the studio and by the verbs
 //! alike.
 
 use std::path::{Path, PathBuf};

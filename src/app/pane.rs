@@ -80,7 +80,7 @@ pub enum Demand {
     Comparison,
     /// The ambiguity of the GelSlim image.
     Ambiguity,
-    /// What is implausible about a prediction's way to meters.
+    /// Implausible things about a prediction's way to meters.
     Flags,
     /// Any two imprints against each other.
     Versus,

@@ -176,7 +176,7 @@ fn published() -> [Published; 5] {
     .map(|(what, hits)| Published { what, share: Share::new(hits, 30) })
 }
 
-/// What the paper tried: the unseen tools, a pencil, a cup; each with its place in the list of all, which decides its seeds.
+/// Tools that the paper tried: the unseen ones, a pencil, a cup; each with its place in the list of all, which decides its seeds.
 fn tried_tools() -> Vec<(u64, ToolSpec)> {
     let all = tools().iter().cloned().chain([tools::pencil(), tools::cup_handle()]);
     (0..).zip(all).filter(|(_, spec)| !spec.seen).collect()

@@ -116,7 +116,7 @@ impl Key for AmbiguityKey {
     }
 }
 
-/// What is implausible about the way of a prediction to meters.
+/// Flags: implausible things about the way of a prediction to meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct FlagsKey(pub PredictionKey, pub ShiftMode);
 

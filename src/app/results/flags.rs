@@ -1,4 +1,4 @@
-//! What is implausible about the way of a prediction to meters.
+//! Flags: implausible things about the way of a prediction to meters.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::FlagsKey;

@@ -46,7 +46,7 @@ macro_rules! table {
         Versus(VersusKey) in versus, 64 * MIB;
         /// The distances of the points of one cloud from another.
         Apart(CloudDifferenceKey) in apart, 16 * MIB;
-        /// What is implausible about the way of a prediction to meters.
+        /// Flags: implausible things about the way of a prediction to meters.
         Flags(FlagsKey) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.
         Ambiguity(AmbiguityKey) in ambiguities, MIB;

@@ -14,7 +14,7 @@ use touch2touch_work::tool::{set_unit, units_of};
 /// Something to say of a data set.
 #[derive(Debug, Clone)]
 pub(super) enum Setting {
-    /// How it is read otherwise than it is stored; none: as it is stored.
+    /// Readings other than as it is stored; none: as it is stored.
     ReadAs(Readings),
     /// The unit of a tool's CAD model.
     Unit { tool: String, unit: ToolUnit },

@@ -330,7 +330,7 @@ fn by_light(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
 
 /// Turns in which some images lie, read from their light.
 struct Light {
-    /// Those that are sure.
+    /// Turns that are sure.
     turns: Vec<(PadId, Turn)>,
     /// Mean share of the gel's slopes without curl, where there is a touch to read.
     consistency: f64,
