@@ -62,7 +62,9 @@ if [ -z "${VK_DRIVER_FILES:-}" ]; then
   [ -z "$driver" ] || export VK_DRIVER_FILES="$driver"
 fi
 # Each test's time is printed beside it: the switch for that asks for the environment variable, which only the tests get.
-cargo test "${whole[@]}" --config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]' -- -Z unstable-options --report-time
+timed=(--config 'target."cfg(all())".runner = ["env", "RUSTC_BOOTSTRAP=1"]')
+cargo test "${whole[@]}" --lib --bins --tests "${timed[@]}" -- -Z unstable-options --report-time
+cargo test "${whole[@]}" --doc
 
 step "tests of the Python package, its types"
 TOUCH2TOUCH_PROGRAM="$built/touch2touch" "$python" -m pytest --quiet -p no:cacheprovider
