@@ -34,7 +34,7 @@ def grasps(count):
     data = t2t.open("test-set")
     for at in np.linspace(0, len(data) - 1, count).round().astype(int):
         pair = data[int(at)]
-        yield t2t.feel(pair, stage="cloud").points, pair.tool, pair.true_angle
+        yield t2t.estimate(pair, stage="cloud").points, pair.tool, pair.true_angle
 
 
 def surface(tool, count=5000):

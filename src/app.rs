@@ -16,7 +16,6 @@
 //!   from it; [`act`] turns its rows into commands.
 //! * [`services`] joins the model to files and models; the command line calls the same functions.
 
-pub mod about;
 pub mod act;
 pub mod action;
 pub mod adapt;
@@ -24,6 +23,7 @@ pub mod answers;
 pub mod apply;
 pub mod command;
 pub mod demand;
+pub mod doctor;
 pub mod effect;
 pub mod evaluate;
 pub mod export;

@@ -43,8 +43,8 @@ pub use recipe::{ModelArgs, RuntimeArg};
 pub use simulate::condition;
 
 use touch2touch_core::rig::Rig;
-use touch2touch_work::io::dataset::ToolScale;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::io::dataset::ToolScale;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
 ///
@@ -144,8 +144,8 @@ pub fn main() -> ExitCode {
 /// A program of verbs: what it does, its exit code and what it says of errors.
 pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
     output::start_log();
-    touch2touch_work::job::bound_threads();
-    touch2touch_work::infer::sandbox::by_this_program();
+    touch2touch_pipeline::job::bound_threads();
+    touch2touch_pipeline::infer::sandbox::by_this_program();
     match run() {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::from(1),
@@ -220,7 +220,7 @@ fn is_verb(word: &std::ffi::OsStr) -> bool {
 /// Refuses what is neither a folder nor a file nor the name of a built-in data set, before a window opens: most likely it
 /// is a mistyped verb.
 fn check_studio_path(path: &Path) -> anyhow::Result<()> {
-    use touch2touch_work::io::dataset::BuiltIn;
+    use touch2touch_pipeline::io::dataset::BuiltIn;
     let word = path.to_string_lossy();
     if path.exists() || BuiltIn::named(&word).is_some() {
         return Ok(());
@@ -281,7 +281,7 @@ fn studio(_path: Option<PathBuf>, _reset_ui: bool) -> VerbResult {
 
 /// The pair called `name`, or the only one whose name has that in it.
 fn find_pair(
-    dataset: &touch2touch_work::io::dataset::Dataset,
+    dataset: &touch2touch_pipeline::io::dataset::Dataset,
     name: &str,
 ) -> anyhow::Result<touch2touch_core::dataset::PairId> {
     let pairs = &dataset.index.pairs;

@@ -1,7 +1,7 @@
 //! Touch2Touch Studio: from a GelSlim image to the Soft Bubble imprint of the same grasp,
 //! and from the imprint to the in-hand pose.
 //!
-//! The application: everything that a result depends on lies in `touch2touch_core` (the science) and `touch2touch_work`
+//! The application: everything that a result depends on lies in `touch2touch_core` (the science) and `touch2touch_pipeline`
 //! (the job, from a touch to a pose); see `ARCHITECTURE.md`.
 //!
 //! * [`app`]: the application model (state, commands, jobs), without a window.

@@ -15,8 +15,8 @@ pub use focus::{FILLED, focus};
 #[cfg(feature = "gui")]
 mod focus;
 
-use touch2touch_work::error::TaskError;
-use touch2touch_work::space::DrawSpace;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::space::DrawSpace;
 
 /// The renderer of stills, on the best graphics device that there is; a software one will do.
 ///

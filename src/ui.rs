@@ -19,7 +19,7 @@ use eframe::egui_wgpu::WgpuSetup;
 
 use crate::app::services::live::LiveServices;
 use crate::gpu::Gpu;
-use touch2touch_work::io::caught::caught;
+use touch2touch_pipeline::io::caught::caught;
 use window::lost::start_again;
 
 /// Size of the window on the first start, points. eframe makes it smaller where the screen is.

@@ -21,7 +21,7 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AboutCommand, AdaptCommand, Command, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
+    AdaptCommand, Command, DoctorCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
     PredictCommand, ViewCommand,
 };
 use touch2touch::app::export::{FigureForm, FigureRows, Output};
@@ -39,14 +39,14 @@ use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CleanKind;
 use touch2touch_core::postprocess::{CorrectionParts, ShiftMode};
 use touch2touch_core::rig::lab;
-use touch2touch_work::about::{Cure, Fact};
-use touch2touch_work::export::{ExportChoice, Which};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::images;
-use touch2touch_work::labels::Labels;
-use touch2touch_work::queue::QueueBy;
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::doctor::{Cure, Fact};
+use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::masks::queue::QueueBy;
 
 use crate::support::run;
 
@@ -164,12 +164,12 @@ pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_ver
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
     let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
-    for command in [AboutCommand::Show(true), AboutCommand::Try, AboutCommand::Cure(Cure::Examine { pairs: 0 })] {
+    for command in [DoctorCommand::Show(true), DoctorCommand::Try, DoctorCommand::Cure(Cure::Examine { pairs: 0 })] {
         studio.send(command.into());
     }
     let state = &studio.state;
     let (_, facts) = state.results.abouts.iter().next().expect("the panel is open");
-    let worth = state.about.worth.as_ref().expect("the models were tried");
+    let worth = state.doctor.worth.as_ref().expect("the models were tried");
     let lines: Vec<Fact> = facts.iter().cloned().chain(worth.facts()).collect();
     let said = json(&["doctor", folder.to_str().unwrap()], home.path());
     assert!(lines.len() >= 10, "{lines:?}");
@@ -181,7 +181,7 @@ pub(crate) fn what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_ver
         assert_eq!((&line["topic"], &line["grade"], &line["cures"]), (&said["topic"], &said["grade"], &said["cures"]));
     }
     assert_eq!(said["about"].as_array().unwrap().len(), lines.len());
-    let examined = state.about.examined.as_ref().expect("every pair was examined");
+    let examined = state.doctor.examined.as_ref().expect("every pair was examined");
     assert_eq!(said["problems"], serde_json::to_value(&examined.report.problems).unwrap());
     // Every cure of a verb is one that the program knows.
     for cure in lines.iter().flat_map(|line| &line.cures) {

@@ -170,7 +170,10 @@ fn progress_is_the_latest() {
     bench.send(PredictCommand::Generate);
     let (ticket, _) = bench.state.tasks.running.iter().next().unwrap();
     let ticket = *ticket;
-    bench.send(Answer::Progressed(ticket, touch2touch_work::job::Progress { done: 3, total: 4, ..Default::default() }));
+    bench.send(Answer::Progressed(
+        ticket,
+        touch2touch_pipeline::job::Progress { done: 3, total: 4, ..Default::default() },
+    ));
     assert_eq!(bench.state.tasks.running[&ticket].progress.fraction(), Some(0.75));
     bench.settle();
     assert!(bench.state.tasks.running.is_empty());

@@ -8,8 +8,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::Registration;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{ByImprint, MaskStore, StoredReview};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{ByImprint, MaskStore, StoredReview};
 
 use crate::support::{self, run};
 
@@ -135,7 +135,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let counts = json(&exported);
     let total: i64 = ["train", "val", "test"].iter().map(|k| counts[k].as_i64().unwrap()).sum();
     assert_eq!(total, 8, "two fingers of four pairs");
-    assert!(touch2touch_work::io::exchange::check_folder(&masks).problems.is_empty());
+    assert!(touch2touch_pipeline::io::exchange::check_folder(&masks).problems.is_empty());
 }
 
 #[test]
@@ -147,9 +147,9 @@ fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     assert!(run(&["simulate", "--out", set_text, "--tools", tool, "--grasps", "1"], dir.path()).status.success());
     let meters = json(&run(&["pose", set_text, "--mask", "cad", "--json"], dir.path()));
     let file = set.join("tools_stls").join(format!("{tool}.stl"));
-    let mut mesh = touch2touch_work::io::stl::read(&file).unwrap().mesh;
+    let mut mesh = touch2touch_pipeline::io::stl::read(&file).unwrap().mesh;
     mesh.vertices.iter_mut().for_each(|v| *v *= 1e3);
-    touch2touch_work::io::stl::write(&file, &mesh).unwrap();
+    touch2touch_pipeline::io::stl::write(&file, &mesh).unwrap();
 
     let refused = run(&["pose", set_text, "--mask", "cad", "--json"], dir.path());
     assert_eq!(refused.status.code(), Some(1));
@@ -370,7 +370,7 @@ fn stored_predictions_get_a_row() {
 fn write_spoilt(root: &Path, number: u64, spoil: impl Fn(&mut touch2touch_core::sample::DepthTouch)) {
     use touch2touch_core::catalog;
     use touch2touch_core::sim;
-    use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+    use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
     let tool = &catalog::tools()[0];
     let grasp = sim::Grasp { theta_rad: 0.2, x_m: 0.001, y_m: -0.001 };
     let mut sample = sim::simulate(tool, grasp, 7, &sim::SimConfig::default());

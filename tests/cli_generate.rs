@@ -72,7 +72,7 @@ fn predictions_are_kept_found_again_and_cleared() {
 #[test]
 fn lengths_of_pictures_are_in_the_assumed_meters() {
     use touch2touch_core::grid::Grid;
-    use touch2touch_work::io::images;
+    use touch2touch_pipeline::io::images;
     let dir = tempfile::tempdir().unwrap();
     let (home, set) = (dir.path().join("home"), dir.path().join("set"));
     std::fs::create_dir(&set).unwrap();

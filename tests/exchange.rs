@@ -11,14 +11,14 @@ use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::label::{Marks, Provenance};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sim;
-use touch2touch_work::export::{DrawnMasks, ExportChoice, ExportSetup, Which, export_masks};
-use touch2touch_work::import::{Import, ImportSetup, import_masks, plan_import};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::exchange::{Format, MANIFEST, PARTS};
-use touch2touch_work::io::images;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
+use touch2touch_pipeline::export::import::{Import, ImportSetup, import_masks, plan_import};
+use touch2touch_pipeline::export::{DrawnMasks, ExportChoice, ExportSetup, Which, export_masks};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::exchange::{Format, MANIFEST, PARTS};
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
 use crate::support::run;
 
@@ -243,7 +243,7 @@ fn what_does_not_fit_is_said_with_its_file_and_changes_nothing() {
     }
     let before = all(&dataset);
     let found = import(&dataset, &from(&folder));
-    let why = |list: &[touch2touch_work::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
+    let why = |list: &[touch2touch_pipeline::error::Remark]| list.iter().map(|r| r.why.clone()).collect::<Vec<_>>();
     assert_eq!((found.same, found.total(), found.complete), (2, 0, false), "{found:?}");
     assert_eq!(found.unmatched.len(), 1);
     assert!(why(&found.unmatched)[0].contains("no pair and finger"), "{found:?}");

@@ -19,7 +19,7 @@ use std::time::{Duration, Instant};
 
 use rand::SeedableRng as _;
 use rand_chacha::ChaCha8Rng;
-use touch2touch_work::io::caught::caught;
+use touch2touch_pipeline::io::caught::caught;
 
 use targets::Target;
 

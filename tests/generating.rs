@@ -14,12 +14,12 @@ use touch2touch_core::diffusion::{GenerateConfig, Progress, Sampler, Spacing};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::RawPrediction;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::infer::generator::{GenerateError, Generator, Item, Observer};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::models::{GenerateInput, Models};
+use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::generator::{GenerateError, Generator, Item, Observer};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::models::{GenerateInput, Models};
 
 fn fixture() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles/generator")

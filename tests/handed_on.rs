@@ -6,10 +6,10 @@ use std::process::{Command, Output};
 use serde_json::Value;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
-use touch2touch_work::infer::bundle::{Bundle, Origin};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::infer::generator::Generator;
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_pipeline::infer::bundle::{Bundle, Origin};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::generator::Generator;
+use touch2touch_pipeline::io::dataset::Dataset;
 
 /// Runs a copy of the program that lies alone in `home`, with nothing of this machine's settings.
 fn alone(home: &Path, args: &[&str]) -> Output {

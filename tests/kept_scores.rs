@@ -16,16 +16,16 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate, export, kept, known};
-use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::store::Store;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::job::{Cancel, JobCx};
-use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Revision};
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::models::Models;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::infer::bundle::Origin;
+use touch2touch_pipeline::infer::store::Store;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::job::{Cancel, JobCx};
+use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Revision};
+use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, evaluate, export, kept, known};
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 fn write(root: &Path, grasps: std::ops::Range<u64>) {
     let tools = &catalog::tools()[..2];
@@ -62,7 +62,7 @@ fn models(folder: &Path) -> Models {
 fn run(data: &Path, setup: &Setup, cache: &Path) -> (Evaluation, u64) {
     let first = Arc::new(Mutex::new(None));
     let seen = first.clone();
-    let sink = move |progress: touch2touch_work::job::Progress| {
+    let sink = move |progress: touch2touch_pipeline::job::Progress| {
         if progress.total > 0 {
             seen.lock().unwrap().get_or_insert(progress.total - progress.done);
         }

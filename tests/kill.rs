@@ -41,17 +41,17 @@ use touch2touch_core::label::{CleanKind, CleanUp, PackedMask, Paint};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::{ExportChoice, Plan, Which};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::exchange::{Format, MANIFEST, list};
-use touch2touch_work::io::images;
-use touch2touch_work::io::masks::{FOLDER, MaskStore};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{Operation, Recovered};
-use touch2touch_work::models::GenerateInput;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::{ExportChoice, Plan, Which};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::exchange::{Format, MANIFEST, list};
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{Operation, Recovered};
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::models::GenerateInput;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";

@@ -11,7 +11,7 @@ use super::support::rust_files;
 /// manifest does not list it.
 const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ("crates/core/src", &["std::fs", "std::thread", "std::time", "std::env"], "the science is pure"),
-    ("crates/work/src", &["clap"], "the job knows no command line"),
+    ("crates/pipeline/src", &["clap"], "the job knows no command line"),
     (
         "src/app",
         &["eframe", "egui", "wgpu", "crate::gpu", "crate::ui", "crate::headless"],
@@ -19,7 +19,7 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
     ),
     (
         "src/gpu",
-        &["egui::", "rfd", "crate::app", "crate::ui", "touch2touch_work", "crate::headless"],
+        &["egui::", "rfd", "crate::app", "crate::ui", "touch2touch_pipeline", "crate::headless"],
         "the renderer knows domain types only",
     ),
     (
@@ -33,8 +33,8 @@ const FORBIDDEN: &[(&str, &[&str], &str)] = &[
 
 /// What the layers of the crate of the job may name of it, each with the reason.
 const MAY_NAME: &[(&str, &[&str], &str)] = &[
-    ("crates/work/src/io", &["io"], "files know no model"),
-    ("crates/work/src/infer", &["io", "infer"], "models know nothing of the way from a touch to a pose"),
+    ("crates/pipeline/src/io", &["io"], "files know no model"),
+    ("crates/pipeline/src/infer", &["io", "infer"], "models know nothing of the way from a touch to a pose"),
 ];
 
 /// The engines, which only `infer` runs.
@@ -129,7 +129,8 @@ fn layers_only_point_downwards() {
             }
         }
     }
-    for (file, code) in layer("crates/work/src").iter().filter(|(file, _)| !file.iter().any(|part| part == "infer")) {
+    for (file, code) in layer("crates/pipeline/src").iter().filter(|(file, _)| !file.iter().any(|part| part == "infer"))
+    {
         for name in ENGINES.iter().filter(|name| is_named(code, name)) {
             broken.push(format!("{} names {name}: only `infer` runs engines", file.display()));
         }
@@ -156,7 +157,7 @@ const MAY_OPEN: &[&str] = &["io/files.rs", "io/atomic.rs"];
 #[test]
 fn readers_open_ordinary_files_only() {
     let mut files = Vec::new();
-    for layer in ["crates/work/src", "src/app"] {
+    for layer in ["crates/pipeline/src", "src/app"] {
         rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(layer), &mut files);
     }
     let mut broken = Vec::new();

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use touch2touch_work::infer::bundle::{Bundle, MANIFEST, find};
+use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST, find};
 
 fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bundles").join(name)
@@ -219,11 +219,11 @@ mod running {
     use touch2touch_core::diffusion::{GenerateConfig, Progress, Tensor};
     use touch2touch_core::grid::{Grid, RgbGrid};
     use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
-    use touch2touch_work::infer::bundle::Role;
-    use touch2touch_work::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
-    use touch2touch_work::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
-    use touch2touch_work::infer::generator::{GenerateError, Generator};
-    use touch2touch_work::infer::mask::{MaskError, MaskModel};
+    use touch2touch_pipeline::infer::bundle::Role;
+    use touch2touch_pipeline::infer::classifier::{ClassifyError, ToolClassifier, Verdict};
+    use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, Graph, Input, resolve};
+    use touch2touch_pipeline::infer::generator::{GenerateError, Generator};
+    use touch2touch_pipeline::infer::mask::{MaskError, MaskModel};
 
     use super::*;
     use crate::support::left_out;

@@ -16,10 +16,10 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::pose::{Registration, ToolModel, register};
 use touch2touch_core::rig::{PerPad, lab};
 use touch2touch_core::units::angle_error;
-use touch2touch_work::cloud::contact_points;
-use touch2touch_work::imprint::measured;
-use touch2touch_work::io::cases::{Case, CaseSet};
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_pipeline::io::cases::{Case, CaseSet};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::steps::cloud::contact_points;
+use touch2touch_pipeline::steps::imprint::measured;
 
 use crate::support::shared;
 
@@ -154,7 +154,8 @@ fn the_labs_files_with_the_mask_from_the_cad_give_the_stored_angle() {
         let masks: PerPad<Mask> = masks.collect();
         let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
         let registration = Registration::DistanceField(None).method();
-        let pose = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth)).unwrap();
+        let pose = touch2touch_pipeline::steps::pose::pose(&points, &tool, &*registration, Ask::default(), Some(truth))
+            .unwrap();
         let error = pose.error_rad.unwrap().to_degrees();
         eprintln!(
             "{}: {:.2} deg, error {error:.2} deg, {} points",
@@ -186,7 +187,7 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
     let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();
     let (registration, truth) = (Registration::DistanceField(None).method(), sample.grasp_from_object);
-    let pose = touch2touch_work::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
+    let pose = touch2touch_pipeline::steps::pose::pose(&points, &tool, &*registration, Ask::default(), truth);
     pose.map_or((f64::NAN, 0), |pose| (pose.error_rad.unwrap().to_degrees(), pose.num_points))
 }
 

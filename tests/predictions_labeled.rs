@@ -16,8 +16,8 @@ use touch2touch::app::settings::{GenerateSettings, Settings};
 use touch2touch::app::state::State;
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::rig::lab;
-use touch2touch_work::bundles;
-use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::steps::bundles;
 
 use crate::cli_generate::full_size_bundle;
 use crate::support::run;

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Output;
 
 use serde_json::Value;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind};
+use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind};
 
 use crate::support::{self, command};
 

@@ -11,11 +11,11 @@ use touch2touch::app::services::live::LiveServices;
 use touch2touch_core::grid::{Grid, Mask, RgbGrid};
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
-use touch2touch_work::error::TaskErrorKind;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::images;
-use touch2touch_work::io::masks::{FOLDER, MaskStore};
-use touch2touch_work::labels::{
+use touch2touch_pipeline::error::TaskErrorKind;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
+use touch2touch_pipeline::labels::{
     DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review, Unsaved, recover, take_in,
 };
 

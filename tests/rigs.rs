@@ -8,8 +8,8 @@ use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::Rig;
-use touch2touch_work::io::dataset::{Dataset, OpenError, RIG_JSON};
-use touch2touch_work::io::images;
+use touch2touch_pipeline::io::dataset::{Dataset, OpenError, RIG_JSON};
+use touch2touch_pipeline::io::images;
 
 use crate::support::run;
 

@@ -8,9 +8,9 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
 use super::support::rust_files;
 

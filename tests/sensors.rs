@@ -18,12 +18,12 @@ use touch2touch::app::{recipe, results};
 use touch2touch_core::grid::{Grid, RgbGrid};
 use touch2touch_core::postprocess::Picture;
 use touch2touch_core::rig::{PadId, Rig, SensorKind, lab};
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::infer::bundle::{Bundle, Ends};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::infer::generator::Generator;
-use touch2touch_work::io::dataset::{Dataset, RIG_JSON};
-use touch2touch_work::io::images;
+use touch2touch_pipeline::infer::bundle::{Bundle, Ends};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::generator::Generator;
+use touch2touch_pipeline::io::dataset::{Dataset, RIG_JSON};
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 use crate::support::run;
 

@@ -101,8 +101,8 @@ fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
         gel.base.iter().chain(&gel.led_gain).all(|v| *v > 0.0) && 2.0 * gel.marker_radius_m < gel.marker_pitch_m
     }));
     // The same grasp: what the bubble feels stays to the last bit.
-    let felt = |sensors: Sensors| sim::simulate(&catalog::tools()[4], sim::grid_grasp(7), 3, &sensors.config());
-    let (a, b) = (felt(Sensors::Nominal), felt(Sensors::OtherGelslims(5)));
+    let estimate = |sensors: Sensors| sim::simulate(&catalog::tools()[4], sim::grid_grasp(7), 3, &sensors.config());
+    let (a, b) = (estimate(Sensors::Nominal), estimate(Sensors::OtherGelslims(5)));
     let pads = |s: &Sample| {
         (
             s.pad(lab::RIGHT).unwrap().depth().unwrap().imprint.clone(),
@@ -119,7 +119,7 @@ fn the_tools_are_the_labs_own() {
     let Some(folder) = shared("lab-meshes") else { return };
     for tool in catalog::tools() {
         let ours = tool.mesh();
-        let labs = touch2touch_work::io::stl::read(&folder.join(format!("{}.stl", tool.name))).unwrap().mesh;
+        let labs = touch2touch_pipeline::io::stl::read(&folder.join(format!("{}.stl", tool.name))).unwrap().mesh;
         let farthest = |from: &TriMesh, to: &TriMesh| {
             let distance = MeshDistance::new(to).unwrap();
             let points = from.sample_surface(20_000, 1).into_iter().chain(from.vertices.iter().copied());

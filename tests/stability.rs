@@ -22,7 +22,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, register};
 use touch2touch_core::tool::{ToolError, ToolModel};
 use touch2touch_core::units::{angle_error, scale_to_meters};
-use touch2touch_work::io::cases::{Case, Suite};
+use touch2touch_pipeline::io::cases::{Case, Suite};
 
 /// A box with the given half sizes about `center`, closed, facing outwards.
 fn cuboid(center: DVec3, half: DVec3) -> TriMesh {

@@ -12,17 +12,17 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Paint, Provenance};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::sim;
-use touch2touch_work::bundles::{self, BundleKind, find};
-use touch2touch_work::error::TaskErrorKind;
-use touch2touch_work::export::{DrawnMasks, LeftOut};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::labels::{DrawnMask, ImprintOf, Labels, MaskPlace, Operation, Review};
-use touch2touch_work::models::Models;
-use touch2touch_work::train::{TrainChoice, TrainSetup, Trained, plan, train};
-use touch2touch_work::tuning::Tuning;
+use touch2touch_pipeline::error::TaskErrorKind;
+use touch2touch_pipeline::export::{DrawnMasks, LeftOut};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::labels::{DrawnMask, ImprintOf, Labels, MaskPlace, Operation, Review};
+use touch2touch_pipeline::learn::train::{TrainChoice, TrainSetup, Trained, plan, train};
+use touch2touch_pipeline::learn::tuning::Tuning;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind, find};
+use touch2touch_pipeline::steps::models::Models;
 
 use crate::support::{command, run};
 
@@ -55,7 +55,7 @@ pub(crate) fn corrected(root: &Path, grasps: u64) {
 fn review(dataset: &Dataset, at: usize, review: Review) {
     let (labels, name) = (Labels::of(dataset), &dataset.index.pairs[at].name);
     let stored = labels.load(name).unwrap();
-    labels.save(name, &touch2touch_work::labels::PairLabels { review, ..stored }, &Operation::default()).unwrap();
+    labels.save(name, &touch2touch_pipeline::labels::PairLabels { review, ..stored }, &Operation::default()).unwrap();
 }
 
 fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainSetup {
@@ -72,7 +72,7 @@ fn setup(dataset: &Dataset, out: PathBuf, unfinished: Option<PathBuf>) -> TrainS
     }
 }
 
-fn go(dataset: &Dataset, setup: &TrainSetup, cx: &JobCx) -> Result<Trained, touch2touch_work::error::TaskError> {
+fn go(dataset: &Dataset, setup: &TrainSetup, cx: &JobCx) -> Result<Trained, touch2touch_pipeline::error::TaskError> {
     let masks = DrawnMasks { labels: &Labels::of(dataset), changed: &BTreeMap::new() };
     train(dataset, &masks, setup, &Models::new(None), cx)
 }
@@ -256,8 +256,10 @@ fn masks_on_predictions_are_learned_from_where_the_prediction_can_be_made_again(
     assert!(made.unusable.len() == 1 && made.unusable[0].why.contains("not among the bundles"), "{:?}", made.unusable);
     assert!(made.warnings.iter().any(|warning| warning.starts_with("nothing is left out")));
     // What was changed since and is not on the disk counts too.
-    let changed =
-        BTreeMap::from([(name.clone(), touch2touch_work::labels::PairLabels { review: Review::Flagged, ..stored })]);
+    let changed = BTreeMap::from([(
+        name.clone(),
+        touch2touch_pipeline::labels::PairLabels { review: Review::Flagged, ..stored },
+    )]);
     let planned = plan(&dataset, &DrawnMasks { labels: &labels, changed: &changed }, choice).unwrap();
     assert_eq!((planned.masks(), planned.left_out), (2, BTreeMap::from([(LeftOut::Flagged, 1)])));
 }

@@ -8,12 +8,12 @@ mod layout;
 mod look;
 mod rig;
 
-mod about;
 mod adapt;
 mod calm;
 mod chain;
 mod compare;
 mod daily;
+mod doctor;
 mod export;
 mod follow;
 mod frames;

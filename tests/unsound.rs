@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 use touch2touch_core::dataset::PairId;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::pt::{PtItem, Tensor, read_dict, write_dict};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::pt::{PtItem, Tensor, read_dict, write_dict};
 
 use crate::support::run;
 

@@ -71,45 +71,45 @@ def test_arrays_have_the_shapes_and_units_that_they_say(pair):
 
 
 def test_contact_points_are_what_camera_and_pose_say(pair):
-    """The arrays fit together: lifted by K and the camera's place, the mask's pixels are the points of `feel`."""
-    felt = t2t.feel(pair, t2t.Recipe(mask="truth"), stage="cloud")
+    """The arrays fit together: lifted by K and the camera's place, the mask's pixels are the points of `estimate`."""
+    result = t2t.estimate(pair, t2t.Recipe(mask="truth"), stage="cloud")
     points = []
     for finger in range(2):
-        rows, columns = np.nonzero(felt.mask[finger])
-        depth = (pair.depth_reference - felt.imprint)[finger][rows, columns].astype(float)
+        rows, columns = np.nonzero(result.mask[finger])
+        depth = (pair.depth_reference - result.imprint)[finger][rows, columns].astype(float)
         pixels = np.stack([columns, rows, np.ones_like(rows)]).astype(float)
         camera = np.linalg.inv(pair.K[finger]) @ pixels * depth
         place = pair.grasp_from_camera[finger]
         points.append((place[:3, :3] @ camera + place[:3, 3:]).T)
-    assert np.allclose(np.concatenate(points), felt.points, atol=1e-9)
+    assert np.allclose(np.concatenate(points), result.points, atol=1e-9)
 
 
 def test_from_a_touch_to_its_pose(pair):
-    felt = t2t.feel(pair)
-    pose = felt.pose
-    assert felt.why_not is None and np.degrees(pose.error) < 3
+    result = t2t.estimate(pair)
+    pose = result.pose
+    assert result.why_not is None and np.degrees(pose.error) < 3
     assert pose.matrix.shape == (4, 4) and pose.sigma.shape == (3,) and pose.covariance.shape == (3, 3)
     assert np.allclose(pose.sigma**2, np.diag(pose.covariance)) and (pose.sigma > 0).all()
-    assert felt.verdict == pose.verdict in ("good", "check", "wrong") and pose.why
+    assert result.verdict == pose.verdict in ("good", "check", "wrong") and pose.why
     assert np.isclose(abs(pose.angle - pair.true_angle), pose.error)
-    assert felt.pair.name == pair.name and "°" in repr(felt)
-    early = t2t.feel(pair, stage="imprint")
+    assert result.pair.name == pair.name and "°" in repr(result)
+    early = t2t.estimate(pair, stage="imprint")
     assert early.mask is None and early.pose is None and early.why_not is None
     assert np.array_equal(early.imprint, pair.imprint, equal_nan=True)
-    predicted = t2t.feel(pair, t2t.Recipe("predicted"))
-    assert predicted.pose is not None and not np.array_equal(predicted.imprint, felt.imprint)
+    predicted = t2t.estimate(pair, t2t.Recipe("predicted"))
+    assert predicted.pose is not None and not np.array_equal(predicted.imprint, result.imprint)
     assert np.array_equal(t2t.predict(pair), predicted.imprint)
-    another = t2t.feel(pair, t2t.Recipe("predicted", seed=7), stage="imprint")
+    another = t2t.estimate(pair, t2t.Recipe("predicted", seed=7), stage="imprint")
     assert not np.array_equal(another.imprint, predicted.imprint)
 
 
 def test_without_contact_there_is_no_pose_and_it_is_said_why(pair):
-    felt = t2t.feel(pair, t2t.Recipe(mask="threshold", threshold_mm=40.0, engine="distance_field"))
-    assert felt.pose is None and felt.verdict is None and len(felt.why_not) > 10 and "no pose" in repr(felt)
+    result = t2t.estimate(pair, t2t.Recipe(mask="threshold", threshold_mm=40.0, engine="distance_field"))
+    assert result.pose is None and result.verdict is None and len(result.why_not) > 10 and "no pose" in repr(result)
 
 
 def test_points_alone_are_registered(pair):
-    points, tool = t2t.feel(pair, stage="cloud").points, pair.tool
+    points, tool = t2t.estimate(pair, stage="cloud").points, pair.tool
     pose = t2t.register(points, tool)
     assert pose.num_points == len(points) and pose.error is None
     assert abs(np.degrees(pose.angle - pair.true_angle)) < 3
@@ -147,7 +147,7 @@ def test_what_is_not_known_is_refused_in_words(pair):
         (lambda: t2t.Recipe(mask="best"), "threshold"),
         (lambda: t2t.Recipe(colour="red"), "no choice colour"),
         (lambda: t2t.Recipe("predicted", bundle="/nowhere"), "nowhere"),
-        (lambda: t2t.feel(pair, stage="end"), "no stage"),
+        (lambda: t2t.estimate(pair, stage="end"), "no stage"),
         (lambda: t2t.simulate("hammer"), "pattern_36"),
         (lambda: t2t.simulate("pattern_36", float("nan")), "finite"),
         (lambda: t2t.ssim(np.zeros((9, 9), np.float32), np.zeros((9, 8), np.float32)), "9x9"),
@@ -168,14 +168,14 @@ def test_everything_pickles_by_what_it_is_made_of(demo, pair):
     assert recipe != t2t.Recipe("predicted", seed=4, mask="threshold")
     again = pickle.loads(pickle.dumps(made))
     assert np.array_equal(again.gelslim, made.gelslim)
-    points = t2t.feel(pair, stage="cloud").points
+    points = t2t.estimate(pair, stage="cloud").points
     tool = pickle.loads(pickle.dumps(pair.tool))
     assert np.allclose(t2t.register(points, tool).matrix, t2t.register(points, pair.tool).matrix, rtol=0, atol=1e-9)
 
 
 def felt_angle(given):
     pair, recipe = given
-    return t2t.feel(pair, recipe).pose.angle
+    return t2t.estimate(pair, recipe).pose.angle
 
 
 def test_other_processes_feel_the_same(demo):
@@ -183,7 +183,7 @@ def test_other_processes_feel_the_same(demo):
     pairs = [demo[at] for at in range(3)]
     for way, recipe in (("spawn", t2t.Recipe()), ("fork", t2t.Recipe(mask="threshold"))):
         here = [felt_angle((pair, recipe)) for pair in pairs]
-        assert [felt.pose.angle for felt in t2t.feel_many(pairs, recipe)] == here
+        assert [result.pose.angle for result in t2t.estimate_many(pairs, recipe)] == here
         with multiprocessing.get_context(way).Pool(2) as pool:
             assert pool.map(felt_angle, [(pair, recipe) for pair in pairs]) == here, way
     # The built-in engine ran here, so it cannot in a fork, and says so instead of waiting for ever.
@@ -210,7 +210,7 @@ def test_a_map_style_data_set_for_pytorch(demo):
 def test_progress_is_told_and_ctrl_c_stops(demo):
     pairs = [demo[at] for at in range(6)]
     news = []
-    t2t.feel_many(pairs, t2t.Recipe("predicted"), progress=lambda done, total, text: news.append((done, total)))
+    t2t.estimate_many(pairs, t2t.Recipe("predicted"), progress=lambda done, total, text: news.append((done, total)))
     assert all(total == 6 and done <= 6 for done, total in news)
 
     class Bar:
@@ -252,7 +252,7 @@ def test_python_goes_on_while_the_program_works(demo):
 
     thread = threading.Thread(target=count)
     thread.start()
-    t2t.feel_many([demo[at] for at in range(8)], t2t.Recipe("predicted"))
+    t2t.estimate_many([demo[at] for at in range(8)], t2t.Recipe("predicted"))
     stop.set()
     thread.join()
     assert counted[0] > 20
@@ -295,7 +295,7 @@ def written(tmp_path):
 
 def test_masks_are_drawn_by_gestures_and_exported(written, tmp_path):
     pair = written[0]
-    automatic = t2t.feel(pair, stage="mask").mask
+    automatic = t2t.estimate(pair, stage="mask").mask
     assert pair.drawn_mask is None and pair.review == "todo" and pair.note == ""
     square = {"tool": "rectangle", "paint": "contact", "points": [[10, 20], [29, 39]]}
     t2t.label(pair, draw=[square], finger="right", note="a corner", person="Ada")
@@ -305,8 +305,8 @@ def test_masks_are_drawn_by_gestures_and_exported(written, tmp_path):
     outside[20:40, 10:30] = False
     assert np.array_equal(right[outside], automatic[0][outside])
     # A mask that was drawn is what is felt from then on, unless it is not to be.
-    assert np.array_equal(t2t.feel(pair, stage="mask").mask[0], right)
-    assert np.array_equal(t2t.feel(pair, t2t.Recipe(hand=False), stage="mask").mask, automatic)
+    assert np.array_equal(t2t.estimate(pair, stage="mask").mask[0], right)
+    assert np.array_equal(t2t.estimate(pair, t2t.Recipe(hand=False), stage="mask").mask, automatic)
     t2t.label(pair, clean=["fill_holes", "grow=1.5"], finger="right")
     assert pair.drawn_mask[0].sum() > right.sum()
     t2t.label(pair, begin="cad_truth", over_drawn=True, accept=True, review="done")
@@ -345,8 +345,8 @@ def test_labels_are_the_verbs(written, tmp_path):
 
 def test_pictures_draw_themselves(pair):
     assert pair._repr_svg_().startswith("<svg") or "<svg" in pair._repr_svg_()[:200]
-    felt = t2t.feel(pair, t2t.Recipe("predicted"))
-    assert "Predicted" in felt._repr_svg_() and felt.pose.verdict in felt.pose._repr_html_()
+    result = t2t.estimate(pair, t2t.Recipe("predicted"))
+    assert "Predicted" in result._repr_svg_() and result.pose.verdict in result.pose._repr_html_()
 
 
 def test_the_numbers_are_the_verbs(demo):
@@ -358,7 +358,7 @@ def test_the_numbers_are_the_verbs(demo):
     ]:
         said = verb("pose", "demo", "--limit", "4", "--no-cache", *words)
         for case in said["cases"]:
-            pose = t2t.feel(demo[case["name"]], recipe).pose
+            pose = t2t.estimate(demo[case["name"]], recipe).pose
             if pose is None:
                 assert case["angle_deg"] is None
                 continue
@@ -383,7 +383,7 @@ def test_the_notebook_runs():
     for cell in book["cells"]:
         if cell["cell_type"] == "code":
             exec(compile("".join(cell["source"]), "touch2touch.ipynb", "exec"), names)
-    assert names["felt"].pose is not None
+    assert names["result"].pose is not None
 
 
 def test_the_page_runs():

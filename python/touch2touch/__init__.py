@@ -2,8 +2,8 @@
 
 >>> import touch2touch as t2t
 >>> pair = t2t.open("demo")[0]
->>> felt = t2t.feel(pair, t2t.Recipe("predicted"))
->>> felt.pose.matrix, felt.pose.sigma, felt.verdict
+>>> result = t2t.estimate(pair, t2t.Recipe("predicted"))
+>>> result.pose.matrix, result.pose.sigma, result.verdict
 
 Lengths are meters and angles radians; images are (fingers, height, width), right finger first, in the cameras' own
 orientation; poses are float64 matrices that map columns, named `dst_from_src`. Everything is computed by the functions
@@ -14,7 +14,7 @@ from . import _native
 from ._native import (
     Cancelled,
     Dataset,
-    Felt,
+    Estimate,
     Pair,
     Pose,
     Recipe,
@@ -26,8 +26,8 @@ from ._native import (
     bundles,
     evaluate,
     export_masks,
-    feel,
-    feel_many,
+    estimate,
+    estimate_many,
     figure,
     frechet,
     label,
@@ -41,8 +41,8 @@ from ._native import (
 from ._many import predict, predict_many, table
 
 __all__ = [
-    "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
-    "evaluate", "export_masks", "feel", "feel_many", "figure", "frechet", "label", "open", "predict", "predict_many", "psnr",
+    "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
+    "estimate", "estimate_many", "evaluate", "export_masks", "figure", "frechet", "label", "open", "predict", "predict_many", "psnr",
     "register", "register_many", "simulate", "ssim", "table",
 ]
 

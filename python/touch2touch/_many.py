@@ -2,18 +2,18 @@
 
 import numpy as np
 
-from ._native import Recipe, feel, feel_many
+from ._native import Recipe, estimate, estimate_many
 
 
 def predict(pair, recipe=None):
     """The imprint that the Soft Bubbles would have felt: (2, 140, 175) float32, meters."""
-    return feel(pair, recipe or Recipe("predicted"), stage="imprint").imprint
+    return estimate(pair, recipe or Recipe("predicted"), stage="imprint").imprint
 
 
 def predict_many(pairs, recipe=None, *, progress=None):
     """`predict` for many pairs on all cores: (N, 2, 140, 175) float32, meters."""
-    felt = feel_many(list(pairs), recipe or Recipe("predicted"), stage="imprint", progress=progress)
-    return np.stack([each.imprint for each in felt]) if felt else np.empty((0, 2, 140, 175), np.float32)
+    result = estimate_many(list(pairs), recipe or Recipe("predicted"), stage="imprint", progress=progress)
+    return np.stack([each.imprint for each in result]) if result else np.empty((0, 2, 140, 175), np.float32)
 
 
 def table(scores, *, paper=False):

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "Cancelled", "Dataset", "Felt", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
-    "bundles", "evaluate", "export_masks", "feel", "feel_many", "figure", "frechet", "label", "open", "psnr", "register",
+    "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
+    "bundles", "estimate", "estimate_many", "evaluate", "export_masks", "figure", "frechet", "label", "open", "psnr", "register",
     "register_many", "simulate", "ssim",
 ]
 __version__: str
@@ -129,7 +129,7 @@ class Pose:
     def _repr_html_(self) -> str: ...
 
 @final
-class Felt:
+class Estimate:
     @property
     def imprint(self) -> NDArray[np.float32] | None: ...
     @property
@@ -163,10 +163,10 @@ def simulate(
     sensors: int | None = None,
     gelslims: int | None = None,
 ) -> Pair: ...
-def feel(pair: Pair, recipe: Recipe | None = None, *, stage: str = "pose", tool: Tool | None = None) -> Felt: ...
-def feel_many(
+def estimate(pair: Pair, recipe: Recipe | None = None, *, stage: str = "pose", tool: Tool | None = None) -> Estimate: ...
+def estimate_many(
     pairs: Sequence[Pair], recipe: Recipe | None = None, *, stage: str = "pose", progress: _Progress = None
-) -> list[Felt]: ...
+) -> list[Estimate]: ...
 def register(points: NDArray[np.float64], tool: Tool, *, engine: str = "joint", evidence: bool = True) -> Pose: ...
 def register_many(
     clouds: Sequence[NDArray[np.float64]],

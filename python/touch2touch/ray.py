@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from . import Dataset, Recipe, Refused, feel, psnr, ssim
+from . import Dataset, Recipe, Refused, estimate, psnr, ssim
 
 # One thread for each worker: there are as many workers as cores.
 THREADS = {"RAYON_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -35,17 +35,17 @@ def row(pair, recipe, identity):
     for finger in ("right", "left"):
         found |= {f"psnr_{finger}_db": nan, f"ssim_{finger}": nan}
     try:
-        felt = feel(pair, recipe)
+        result = estimate(pair, recipe)
     except Refused as why:
         return found | {"why": str(why)}
     measured = pair.imprint
     if measured is not None and recipe.choices["imprint"] == "predicted":
-        for finger, made, true in zip(("right", "left"), felt.imprint, measured):
+        for finger, made, true in zip(("right", "left"), result.imprint, measured):
             if np.isfinite(made).any() and np.isfinite(true).any():
                 found |= {f"psnr_{finger}_db": psnr(made, true), f"ssim_{finger}": ssim(made, true, data_range=RANGE_M)}
-    pose = felt.pose
+    pose = result.pose
     if pose is None:
-        return found | {"why": felt.why_not}
+        return found | {"why": result.why_not}
     (y, z), (angle_sd, y_sd, z_sd) = pose.place, pose.sigma
     error = nan if pose.error is None else pose.error
     return found | {"angle_rad": pose.angle, "y_m": y, "z_m": z, "angle_sd_rad": float(angle_sd), "y_sd_m": float(y_sd),

@@ -4,7 +4,7 @@ use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
 use super::command::{
-    AboutCommand, AdaptCommand, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
+    AdaptCommand, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
     LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand, UiRequest,
     ViewCommand, WorkbenchCommand,
 };
@@ -165,8 +165,8 @@ fn cancel(state: &State) -> Option<Command> {
         does(ViewCommand::Propose(false))
     } else if let Some(command) = escape(state) {
         does(command)
-    } else if state.about.shown {
-        does(AboutCommand::Show(false))
+    } else if state.doctor.shown {
+        does(DoctorCommand::Show(false))
     } else {
         when(!state.tasks.running.is_empty(), TasksCommand::CancelAll)
     }

@@ -62,7 +62,7 @@ macro_rules! actions {
         Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
             state => opened(state, LibraryCommand::Reload);
         AboutData, File, "About this data", "Says what the open data set is, what the models are worth on it, and what would better that", [],
-            state => opened(state, AboutCommand::Show(!state.about.shown));
+            state => opened(state, DoctorCommand::Show(!state.doctor.shown));
         Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
         Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],

@@ -14,14 +14,14 @@ use super::state::adapt::FOLDS;
 use super::state::tasks::{Level, TaskKind};
 use super::{predict, recipe, results, tasks};
 use touch2touch_core::dataset::PairId;
-use touch2touch_work::adapt::{self, AdaptSetup, Adapted, HeldBack};
-use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::names;
-use touch2touch_work::job::{Curve, JobCx};
-use touch2touch_work::labels::Review;
-use touch2touch_work::recipe::Recipe;
-use touch2touch_work::tuning::Tuning;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::names;
+use touch2touch_pipeline::job::{Curve, JobCx};
+use touch2touch_pipeline::labels::Review;
+use touch2touch_pipeline::learn::adapt::{self, AdaptSetup, Adapted, HeldBack};
+use touch2touch_pipeline::learn::tuning::Tuning;
+use touch2touch_pipeline::steps::bundles::{self, BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// A command to the fit.
 #[derive(Clone, Copy, Debug)]

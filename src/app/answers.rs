@@ -13,9 +13,9 @@ use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
 use super::{evaluate, follow, labels, library, results, settings, tasks, workbench};
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::error::{TaskError, TaskErrorKind};
-use touch2touch_work::job::Progress;
+use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
+use touch2touch_pipeline::job::Progress;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
 
 /// An answer of the runtime.
 #[derive(Clone, Debug)]

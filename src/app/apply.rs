@@ -4,10 +4,10 @@ use super::command::{Command, rooms};
 use super::effect::Effect;
 use super::state::State;
 use super::{
-    about, adapt, answers, evaluate, export, follow, inspect, labels, library, predict, settings, tasks, train, view,
+    adapt, answers, doctor, evaluate, export, follow, inspect, labels, library, predict, settings, tasks, train, view,
     workbench,
 };
-use touch2touch_work::progress::Progress;
+use touch2touch_pipeline::labels::progress::Progress;
 
 macro_rules! dispatch {
     ($( #[doc = $doc:literal] $room:ident($command:ident) in $module:ident, )*) => {

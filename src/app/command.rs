@@ -1,8 +1,8 @@
 //! [`Command`]: everything that can happen to the state, as data, by room.
 
-pub use super::about::AboutCommand;
 pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
+pub use super::doctor::DoctorCommand;
 pub use super::evaluate::EvaluateCommand;
 pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
@@ -42,7 +42,7 @@ macro_rules! rooms {
             /// To figures and other things that are taken away.
             Export(ExportCommand) in export,
             /// To the panel about the open data set.
-            About(AboutCommand) in about,
+            Doctor(DoctorCommand) in doctor,
             /// The fit to one's own pairs.
             Adapt(AdaptCommand) in adapt,
             /// The training of the mask model.

@@ -22,7 +22,7 @@ pub fn demands(state: &State) -> Vec<Request> {
     results::want_thumbnails(&mut wants);
     results::want_scores(&mut wants);
     results::want_table(&mut wants);
-    results::want_about(&mut wants);
+    results::want_doctor(&mut wants);
     neighbors(&mut wants);
     results::want_mask_plan(&mut wants);
     results::want_import_plan(&mut wants);

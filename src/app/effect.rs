@@ -13,9 +13,9 @@ use super::state::labels::PairLabels;
 use super::state::settings::Settings;
 use super::state::tasks::{TaskKind, Ticket};
 use super::state::view::UiRequest;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{Operation, Unsaved};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{Operation, Unsaved};
 
 /// A pair whose labels are to be written.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,10 +12,10 @@ use super::source::DataSource;
 use super::state::State;
 use super::state::tasks::{Level, TaskKind};
 use super::{results, tasks};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::evaluate::{self, Evaluation, Setup};
-use touch2touch_work::job::{JobCx, Progress};
-use touch2touch_work::queue::measured_only;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::{JobCx, Progress};
+use touch2touch_pipeline::masks::queue::measured_only;
+use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
 
 /// The grasps after which the scores so far are looked up while all pairs are scored.
 const LOOKS: u64 = 24;

@@ -28,15 +28,15 @@ use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::depict::apart;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::ExportChoice;
-use touch2touch_work::figure::{FigureMakers, FigurePane, FigureSetup, figure};
-use touch2touch_work::infer::bundle::Ends;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::PairLabels;
-use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
-use touch2touch_work::still::still;
+use touch2touch_pipeline::compare::depict::apart;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::ExportChoice;
+use touch2touch_pipeline::images::figure::{FigureMakers, FigurePane, FigureSetup, figure};
+use touch2touch_pipeline::images::space::{SpaceInput, SpaceView, pictured};
+use touch2touch_pipeline::images::still::still;
+use touch2touch_pipeline::infer::bundle::Ends;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::PairLabels;
 
 /// A command to what is taken away.
 #[derive(Clone, Debug)]

@@ -7,7 +7,7 @@ use super::state::library::Follow;
 use super::state::results::{Request, Results};
 use super::state::tasks::Ticket;
 use super::{library, predict};
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 /// A command to the following of a folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

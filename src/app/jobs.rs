@@ -1,7 +1,7 @@
 //! Jobs of the studio: where they run, and what one is.
 
-use touch2touch_work::error::TaskError;
-use touch2touch_work::job::JobCx;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::JobCx;
 
 /// A lane, on which jobs run. Each has its own threads, so that none waits for another kind of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]

@@ -1,7 +1,7 @@
 //! Names of what is open and looked at, and the keys of results: plain values that say what a result is of and how it is
 //! made.
 //!
-//! A key is a [`touch2touch_work::recipe::Recipe`] as far as it decides the result, with the touch. [`super::results`] says
+//! A key is a [`touch2touch_pipeline::steps::recipe::Recipe`] as far as it decides the result, with the touch. [`super::results`] says
 //! how each result is computed.
 
 pub mod dataset;
@@ -17,8 +17,8 @@ pub use touch2touch_core::bits::Bits;
 pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
 pub use touch2touch_core::pose::Registration;
 pub use touch2touch_core::postprocess::ShiftMode;
-pub use touch2touch_work::labels::{ImprintSource, Revision};
-pub use touch2touch_work::mask::MaskRecipe;
+pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
+pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
 pub use dataset::{
     AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey, ToolKey,

@@ -25,9 +25,9 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanUp, DrawTool, Drawing, Paint, Provenance, Sight, VisiblePixels};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::label_edit::{self, Edited, LabelEdit, TakenUp};
-use touch2touch_work::labels::{Act, Operation};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::{Act, Operation};
+use touch2touch_pipeline::masks::label_edit::{self, Edited, LabelEdit, TakenUp};
 
 /// A command to the document.
 #[derive(Clone, Debug)]
@@ -620,5 +620,5 @@ fn seen(state: &State, source: ImprintSource, finger: PadId, sight: &Sight) -> R
     let sample =
         results::sample(state).ready().ok_or_else(|| TaskError::new("Draw in 3D", "the pair is not read yet"))?;
     let imprints = sample.rig.pads().map(|pad| results::imprint(state, source, pad).ready()).collect();
-    touch2touch_work::cloud::seen(sample, &imprints, finger, sight)
+    touch2touch_pipeline::steps::cloud::seen(sample, &imprints, finger, sight)
 }

@@ -12,7 +12,7 @@ use super::keys::DatasetSeq;
 use super::services::Opened;
 use super::source::DataSource;
 use super::state::State;
-use super::state::about::AboutState;
+use super::state::doctor::DoctorState;
 use super::state::evaluate::ScoreChoice;
 use super::state::export::FigureRows;
 use super::state::labels::{Document, Review};
@@ -23,12 +23,12 @@ use super::train::TrainState;
 use super::{inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::dataset::ToolUnit;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::queue::QueueBy;
-use touch2touch_work::tool::UnitSet;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::dataset::ToolUnit;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::masks::queue::QueueBy;
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::tool::UnitSet;
 
 /// A command to the data set and its list.
 #[derive(Clone, Debug)]
@@ -356,8 +356,8 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
     let own = opened.source.root().is_some() && !resumed;
-    let shown = if same_place { state.about.shown } else { own && state.settings.about_own_data };
-    state.about = AboutState { shown, ..AboutState::default() };
+    let shown = if same_place { state.doctor.shown } else { own && state.settings.about_own_data };
+    state.doctor = DoctorState { shown, ..DoctorState::default() };
     state.train = TrainState { form: state.train.form, ..TrainState::default() };
     state.history.clear();
     state.tasks.failed.clear();

@@ -15,9 +15,9 @@ use super::state::{Absent, State};
 use super::{recipe, results, settings, tasks};
 use touch2touch_core::rig::{PadId, Text};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::job::JobCx;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
 /// A command to predictions.
 #[derive(Clone, Debug)]

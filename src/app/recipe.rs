@@ -2,8 +2,8 @@
 
 use super::keys::{ImprintSource, MaskRecipe, PredictionKey, TouchKey};
 use super::state::{Absent, State};
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::recipe::{Model, Recipe};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::recipe::{Model, Recipe};
 
 /// The recipe of the automatic masks that the settings ask for, of whatever pair.
 ///

@@ -25,8 +25,8 @@ use super::state::results::Request;
 use super::state::tasks::Ticket;
 use super::state::view::UiRequest;
 use super::{demand, labels, results};
-use touch2touch_work::io::caught::caught;
-use touch2touch_work::job::{Cancel, Progress};
+use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::job::{Cancel, Progress};
 
 /// The latest picture on the way of each touch, with the job that made it.
 type LatestPreviews = BTreeMap<TouchKey, (Ticket, Arc<Preview>)>;

@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{GraspScore, Metric, Scores};
-use touch2touch_work::queue::Queue;
+use touch2touch_pipeline::masks::queue::Queue;
 
 /// The scores of the pairs of a data set by each source.
 #[derive(Debug, Default)]

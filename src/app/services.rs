@@ -17,14 +17,14 @@ use super::state::settings::Settings;
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::Recovered;
-use touch2touch_work::models::{GenerateInput, Models};
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::Recovered;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::models::{GenerateInput, Models};
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// A data set that was opened.
 #[derive(Clone)]

@@ -8,13 +8,13 @@ use touch2touch_core::dataset::{Index, PairId, Problem};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::{ExportChoice, Plan};
-use touch2touch_work::follow::Following;
-use touch2touch_work::io::dataset::{Dataset, ToolUnit};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{JournalHistory, Operation, PairLabels, Unsaved};
-use touch2touch_work::tool::{UnitSet, set_unit};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::{ExportChoice, Plan};
+use touch2touch_pipeline::follow::Following;
+use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{JournalHistory, Operation, PairLabels, Unsaved};
+use touch2touch_pipeline::steps::tool::{UnitSet, set_unit};
 
 /// An open data set: its index is in memory, samples and labels are read on demand, from any thread.
 pub trait DataSource: Send + Sync {

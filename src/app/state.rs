@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-pub mod about;
 pub mod adapt;
 pub mod cache;
+pub mod doctor;
 pub mod evaluate;
 pub mod export;
 pub mod history;
@@ -21,8 +21,8 @@ pub mod workbench;
 
 use super::keys::{ImprintSource, PairKey, TouchKey};
 use super::pane::{Demand, Pane, Workspace};
-use about::AboutState;
 use adapt::AdaptState;
+use doctor::DoctorState;
 use evaluate::TableState;
 use export::ExportState;
 use history::History;
@@ -34,7 +34,7 @@ use settings::Settings;
 use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
 use touch2touch_core::rig::{PadId, Rig, Text};
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 use train::TrainState;
 use view::Selection;
 use workbench::Workbench;
@@ -59,7 +59,7 @@ pub struct State {
     /// The choices of the next figure and of what else is taken away.
     pub export: ExportState,
     /// The panel about the open data set.
-    pub about: AboutState,
+    pub doctor: DoctorState,
     /// The fit to the open pairs.
     pub adapt: AdaptState,
     /// The training of the mask model.

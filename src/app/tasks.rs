@@ -8,8 +8,8 @@ pub use super::state::tasks::{Entry, Level, Log, TaskKind, Tasks, Ticket};
 use super::effect::{Access, Effect, Errand, Started};
 use super::jobs::Lane;
 use super::state::State;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::job::{JobCx, Progress};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::{JobCx, Progress};
 
 /// A command to jobs and log.
 #[derive(Clone, Debug)]

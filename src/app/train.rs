@@ -14,12 +14,12 @@ use super::state::State;
 use super::state::labels::PairLabels;
 use super::state::tasks::{Level, TaskKind};
 use super::{recipe, tasks};
-use touch2touch_work::bundles::{self, BundleInfo, BundleKind};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::DrawnMasks;
-use touch2touch_work::job::{Curve, JobCx};
-use touch2touch_work::labels::Labels;
-use touch2touch_work::train::{self, TrainSetup, Trained};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::DrawnMasks;
+use touch2touch_pipeline::job::{Curve, JobCx};
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::learn::train::{self, TrainSetup, Trained};
+use touch2touch_pipeline::steps::bundles::{self, BundleInfo, BundleKind};
 
 /// A command to the training.
 #[derive(Clone, Copy, Debug)]

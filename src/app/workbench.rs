@@ -11,7 +11,7 @@ use super::state::State;
 use super::state::results::Request;
 use super::{inspect, labels, results};
 use touch2touch_core::manual::{self, AcceptedPose, ManualCost, ManualPose, PoseAxis};
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
 const KERNEL_M: f64 = 1e-3;

@@ -12,8 +12,8 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
-use touch2touch_work::labels::ImprintSource;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::learn::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 
 /// Arguments of `adapt`.
 #[derive(Debug, Args)]

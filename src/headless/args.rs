@@ -15,9 +15,9 @@ use super::Common;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_work::io::atomic;
-use touch2touch_work::io::dataset::{Dataset, OpenError, ToolScale};
-use touch2touch_work::pairs;
+use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::io::dataset::{Dataset, OpenError, ToolScale};
+use touch2touch_pipeline::pairs;
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]

@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::{Common, Output, VerbResult};
 use crate::app::services::Services as _;
 use crate::app::services::live::LiveServices;
-use touch2touch_work::infer::store::{Store, user_folder};
+use touch2touch_pipeline::infer::store::{Store, user_folder};
 
 /// Arguments of `cache`.
 #[derive(Debug, Args)]

@@ -18,17 +18,17 @@ use touch2touch_core::picture::colored;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Text;
 use touch2touch_core::units::{fixed, mm};
-use touch2touch_work::compare::{Comparison, Depicted, between};
-use touch2touch_work::depict::{SubjectImprints, depict};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::feel::Touch;
-use touch2touch_work::io::{images, npz};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::{Recipe, Stage};
-use touch2touch_work::subject::{MadeFrom, Subject};
-use touch2touch_work::tool::load_tool;
+use touch2touch_pipeline::compare::depict::{SubjectImprints, depict};
+use touch2touch_pipeline::compare::subject::{MadeFrom, Subject};
+use touch2touch_pipeline::compare::{Comparison, Depicted, between};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::{images, npz};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::steps::estimate::Touch;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
+use touch2touch_pipeline::steps::tool::load_tool;
 
 /// Half the range of the difference's colors in a written picture, meters.
 const DIFFERENCE_M: f32 = 0.004;
@@ -187,8 +187,8 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let mut poses = None;
     if tool.is_some() {
         let [a, b] = found.map(|found| -> Result<PoseResult, TaskError> {
-            let felt = found.felt.reach(touch, Stage::Pose, &models, &JobCx::unwatched())?;
-            felt.pose().map_err(Clone::clone).cloned()
+            let estimate = found.estimate.reach(touch, Stage::Pose, &models, &JobCx::unwatched())?;
+            estimate.pose().map_err(Clone::clone).cloned()
         });
         match (a, b) {
             (Ok(a), Ok(b)) => poses = Some(apart(&a, &b)),

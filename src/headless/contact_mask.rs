@@ -7,10 +7,10 @@ use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use strum::IntoEnumIterator as _;
 
 use super::Output;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::{Labels, PairLabels};
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::recipe::{meters, millimeters};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::{Labels, PairLabels};
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
+use touch2touch_pipeline::steps::recipe::{meters, millimeters};
 
 /// Source of contact masks, with its numbers.
 #[derive(Debug, Clone, Copy, Args)]

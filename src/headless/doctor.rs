@@ -13,17 +13,17 @@ use super::args::DatasetArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
-use touch2touch_work::about::{self, Cure, Examined, Fact, Worth, WorthSetup};
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::doubts;
-use touch2touch_work::export::DrawnMasks;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::dataset::{Dataset, OpenError};
-use touch2touch_work::io::doctor::{DoctorReport, MOST_PAIRS};
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::models::Models;
-use touch2touch_work::predict::Generating;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::doctor::{self, Cure, Examined, Fact, Worth, WorthSetup};
+use touch2touch_pipeline::doubts;
+use touch2touch_pipeline::export::DrawnMasks;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::dataset::{Dataset, OpenError};
+use touch2touch_pipeline::io::doctor::{DoctorReport, MOST_PAIRS};
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::steps::bundles::{self, BundleKind};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::predict::Generating;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Arguments of `doctor`. Findings that differ only in file, finger or numbers are one entry, in the text and in the JSON
 /// (`problems`: `file`, `what`, `hint` of the first, `count`, `examples`).
@@ -40,7 +40,7 @@ pub(super) struct DoctorArgs {
     tried: usize,
     /// Pairs on which the models are tried, spread over the data set: the generator's score, what a fit would make of it,
     /// and the mask model's poses where the true ones are known. 0 tries nothing.
-    #[arg(long, value_name = "N", default_value_t = about::SAMPLE)]
+    #[arg(long, value_name = "N", default_value_t = doctor::SAMPLE)]
     sample: usize,
     /// Compare no predictions with what was measured and try no models: faster, but swapped GelSlims are not seen.
     #[arg(long)]
@@ -84,7 +84,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     // Without knowing the sensors, none of its pairs can be examined.
     let (title, report, read_as, opened) = match args.dataset.open_unsaid() {
         Ok(dataset) => {
-            about = about::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
+            about = doctor::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
             worth = tried_models(args, &dataset, &output)?;
             about.extend(worth.iter().flat_map(Worth::facts));
             let Examined { report, read_as } = examined(args, &dataset, &output)?;
@@ -150,7 +150,7 @@ fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow
         ..Recipe::default()
     };
     let models = Models::new(super::cache::store());
-    Ok(about::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
+    Ok(doctor::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
 }
 
 /// The pairs examined; predictions are compared where a generator for these sensors is there.
@@ -161,11 +161,11 @@ fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Re
         .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
         .flatten();
     let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return Ok(about::examined(dataset, most, args.tried, None, &cx)?);
+        return Ok(doctor::examined(dataset, most, args.tried, None, &cx)?);
     };
     let models = Models::new(super::cache::store());
     let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    Ok(about::examined(dataset, most, args.tried, Some((&models, generating)), &cx)?)
+    Ok(doctor::examined(dataset, most, args.tried, Some((&models, generating)), &cx)?)
 }
 
 /// The other examples, by the names of their files.

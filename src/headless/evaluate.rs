@@ -1,7 +1,7 @@
 //! `touch2touch evaluate`: the paper's results table of a data set.
 
 use std::path::{Path, PathBuf};
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_pipeline::io::dataset::Dataset;
 
 use clap::Args;
 
@@ -12,11 +12,11 @@ use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_core::pose::Registration;
-use touch2touch_work::evaluate::{self, Evaluation, Report, Setup, evaluate, export, rows};
-use touch2touch_work::infer::bundle::{Bundle, Found, Origin, find_all};
-use touch2touch_work::infer::features::Preparation;
-use touch2touch_work::io::atomic;
-use touch2touch_work::models::Models;
+use touch2touch_pipeline::infer::bundle::{Bundle, Found, Origin, find_all};
+use touch2touch_pipeline::infer::features::Preparation;
+use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Report, Setup, evaluate, export, rows};
+use touch2touch_pipeline::steps::models::Models;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]

@@ -14,14 +14,14 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::feel::{Touch, feel};
-use touch2touch_work::figure::note;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::pair_files::{PairFile, PairParts, write};
-use touch2touch_work::recipe::Stage;
-use touch2touch_work::tool::load_tool;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::pair_files::{PairFile, PairParts, write};
+use touch2touch_pipeline::images::figure::note;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::recipe::Stage;
+use touch2touch_pipeline::steps::tool::load_tool;
 
 /// Arguments of `export`.
 #[derive(Debug, Args)]
@@ -98,10 +98,10 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
     let lacks = TaskError::new("Export", "there is no CAD model");
     let touch =
         Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.as_ref().ok_or(&lacks), labels: &labels };
-    let felt = feel(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
-    let contact = felt.contact();
+    let estimate = estimate(touch, &recipe, Stage::Pose, &models, &JobCx::unwatched())?;
+    let contact = estimate.contact();
     let (clouds, truth) = (contact.clouds(&sample)?, sample.grasp_from_object);
-    let found = match felt.pose() {
+    let found = match estimate.pose() {
         _ if tool.is_none() => None,
         Err(err) if args.what == [PairFile::Cloud] => {
             output.note(&err.to_string());

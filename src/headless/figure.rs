@@ -19,15 +19,15 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::depict::{Compared, apart};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{
+use touch2touch_pipeline::compare::depict::{Compared, apart};
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::figure::{
     FigureFile, FigureLook, FigureMakers, FigurePane, FigureSetup, FigureTheme, figure, kind, note,
 };
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::space::{SpaceInput, SpaceView, pictured};
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::images::space::{SpaceInput, SpaceView, pictured};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
 
 /// Arguments of `figure`.
 #[derive(Debug, Args)]

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use touch2touch_work::io::caught::caught;
-use touch2touch_work::io::files::listed;
+use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::files::listed;
 
 /// A panic on a pair's files.
 #[derive(Debug, thiserror::Error)]

@@ -6,10 +6,10 @@ mod report;
 use strum::IntoEnumIterator as _;
 
 use super::{Output, VerbResult, find_pair};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::label_pair::{Begin, LabelSetup, label_pair};
-use touch2touch_work::labels::{Labels, Review, take_in};
-use touch2touch_work::progress::Progress;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::labels::progress::Progress;
+use touch2touch_pipeline::labels::{Labels, Review, take_in};
+use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
 
 pub(super) use args::LabelArgs;
 use report::{Report, Stored};

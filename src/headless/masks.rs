@@ -17,10 +17,12 @@ use super::recipe::ModelArgs;
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::export::{Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan};
-use touch2touch_work::io::exchange::{ExportReport, Format};
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::export::{
+    Automatic, DrawnMasks, ExportChoice, ExportSetup, LeftOut, Which, export_masks, plan,
+};
+use touch2touch_pipeline::io::exchange::{ExportReport, Format};
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Verbs of masks.
 #[derive(Debug, Subcommand)]

@@ -6,9 +6,9 @@ use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::{Common, Output, VerbResult};
-use touch2touch_work::infer::bundle::Bundle;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
-use touch2touch_work::infer::{runtime, sandbox};
+use touch2touch_pipeline::infer::bundle::Bundle;
+use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_pipeline::infer::{runtime, sandbox};
 
 /// Verbs of a bundle.
 #[derive(Debug, Subcommand)]

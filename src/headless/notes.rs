@@ -4,7 +4,7 @@
 use super::{Output, output};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::findings::{Finding, Findings};
-use touch2touch_work::io::dataset::Dataset;
+use touch2touch_pipeline::io::dataset::Dataset;
 
 /// The notes of the data set, its pairs and CAD models that a verb answers from.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use serde::Serialize;
 
 use super::Common;
 use touch2touch_core::text::printable;
-use touch2touch_work::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
 
 /// Reporter of a verb.
 pub struct Output {
@@ -152,7 +152,7 @@ pub(super) fn note(text: &str) {
 
 /// An error with its causes, each said once.
 pub fn says(err: &anyhow::Error) -> String {
-    touch2touch_work::error::says(err.as_ref())
+    touch2touch_pipeline::error::says(err.as_ref())
 }
 
 /// Sends warnings and errors of the libraries and of our own layers to standard error.
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn a_cause_is_said_once() {
         let io = || io::Error::from(io::ErrorKind::NotFound);
-        let open = touch2touch_work::io::dataset::OpenError::Io { path: "/x".into(), source: io() };
+        let open = touch2touch_pipeline::io::dataset::OpenError::Io { path: "/x".into(), source: io() };
         let text = says(&open.into());
         assert_eq!(text.matches(&io().to_string()).count(), 1, "{text}");
         let chained = anyhow::Error::from(io()).context("cannot begin");

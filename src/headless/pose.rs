@@ -16,16 +16,16 @@ use touch2touch_core::ambiguity::ambiguity;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::{Registration, ToolModel};
-use touch2touch_work::doubts;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::feel::{Touch, feel};
-use touch2touch_work::io::dataset::SourceKind;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::models::Models;
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::{Recipe, Stage};
-use touch2touch_work::tool::load_tool;
+use touch2touch_pipeline::doubts;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::dataset::SourceKind;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
+use touch2touch_pipeline::steps::tool::load_tool;
 
 use args::{Imprints, registration};
 pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
@@ -150,8 +150,8 @@ struct PairInput<'a> {
 fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow::Result<Vec<PoseRow>> {
     let PairInput { name, touch, tried, recipe, accepted } = *asked;
     let (sample, imprint) = (touch.sample, recipe.imprint);
-    let felt = feel(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
-    let contact = felt.contact();
+    let estimate = estimate(touch, recipe, Stage::Cloud, models, &JobCx::unwatched())?;
+    let contact = estimate.contact();
     let truth = sample.grasp_from_object;
     let predicted = imprint == ImprintSource::Predicted;
     // What was measured is as it is; what was predicted may have had nothing to go by.
@@ -162,14 +162,14 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
     let one = |&by: &Registration| {
         let ranked = match touch.tool {
             Ok(_) => None,
-            Err(_) => Some(felt.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),
+            Err(_) => Some(estimate.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),
         };
         let likeliest = ranked.iter().flatten().next().map(|first| first.tool.as_str());
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
         let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
-        let found = felt.pose_by(touch, &*registration(args, by), ask);
+        let found = estimate.pose_by(touch, &*registration(args, by), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
         Ok(PoseRow {

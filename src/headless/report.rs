@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::json;
 
-use touch2touch_work::io::atomic;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::names::Outputs;
+use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::names::Outputs;
 
 /// Paths of the pairs' files, without an ending, each pair's its own; the folder is made if it is not there. A run that
 /// would write two pairs to one file ends here, before it wrote anything.

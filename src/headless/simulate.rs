@@ -13,7 +13,7 @@ use super::args::at_least_one;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::sim::{self, Condition, Fault, Sensors};
-use touch2touch_work::io::simulated::{Layout, Writing};
+use touch2touch_pipeline::io::simulated::{Layout, Writing};
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]

@@ -12,15 +12,15 @@ use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::units::{fixed, mm};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::imprint::chain_of;
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::models::GenerateInput;
-use touch2touch_work::pairs;
-use touch2touch_work::predict::Generating;
-use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::pairs;
+use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
+use touch2touch_pipeline::steps::imprint::chain_of;
+use touch2touch_pipeline::steps::models::GenerateInput;
+use touch2touch_pipeline::steps::predict::Generating;
 
 /// Arguments of `stats`.
 #[derive(Debug, Args)]

@@ -12,10 +12,10 @@ use super::{Common, Output, VerbResult};
 use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
-use touch2touch_work::still::{StillFiles, StillSetup, WIDTH_PX, still};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::space::{Ground, SpacePane, ViewAngles};
+use touch2touch_pipeline::images::still::{StillFiles, StillSetup, WIDTH_PX, still};
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
 
 /// Arguments of `still`.
 #[derive(Debug, Args)]

@@ -10,8 +10,8 @@ use super::args::{DatasetArgs, LimitArgs, at_least_one, keyed};
 use super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim::{Condition, Mix};
-use touch2touch_work::labels::Labels;
-use touch2touch_work::training_data::{ShardSetup, TouchSource, WrittenShards, write_shards};
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::learn::training_data::{ShardSetup, TouchSource, WrittenShards, write_shards};
 
 /// The PATH that means the simulator.
 const SIMULATOR: &str = "simulator";

@@ -4,8 +4,8 @@
 use std::{sync::mpsc, thread, time::Duration};
 
 use super::{Common, Output, VerbResult};
-use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::runtime::runtime_report;
+use touch2touch_pipeline::infer::bundle::Origin;
+use touch2touch_pipeline::infer::runtime::runtime_report;
 
 /// Name and version.
 const SHORT: &str = concat!("touch2touch ", env!("CARGO_PKG_VERSION"));
@@ -81,7 +81,8 @@ mod tests {
             lock.contains(&format!("name = \"rten\"\nversion = \"{RTEN}\"")),
             "set RTEN to the version in Cargo.lock"
         );
-        let manifest = std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/work/Cargo.toml")).unwrap();
+        let manifest =
+            std::fs::read_to_string(concat!(env!("CARGO_MANIFEST_DIR"), "/crates/pipeline/Cargo.toml")).unwrap();
         assert!(
             manifest.contains(&format!("rten = {{ version = \"={RTEN}\"")),
             "Cargo.toml must demand exactly {RTEN}"

@@ -28,14 +28,14 @@ use summary::Summary;
 use touch2touch_core::dataset::{PairId, Problem};
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::DepthCamera;
-use touch2touch_work::feel::Touch;
-use touch2touch_work::follow::{FollowEvent, Following};
-use touch2touch_work::io::dataset::{Dataset, cameras_of, rig_of};
-use touch2touch_work::io::follow::{Arrival, FollowConfig, PERIOD, Ready, Stamp};
-use touch2touch_work::io::names::Outputs;
-use touch2touch_work::job::Cancel;
-use touch2touch_work::labels::PairLabels;
-use touch2touch_work::mask::MaskSource;
+use touch2touch_pipeline::follow::{FollowEvent, Following};
+use touch2touch_pipeline::io::dataset::{Dataset, cameras_of, rig_of};
+use touch2touch_pipeline::io::follow::{Arrival, FollowConfig, PERIOD, Ready, Stamp};
+use touch2touch_pipeline::io::names::Outputs;
+use touch2touch_pipeline::job::Cancel;
+use touch2touch_pipeline::labels::PairLabels;
+use touch2touch_pipeline::steps::estimate::Touch;
+use touch2touch_pipeline::steps::mask::MaskSource;
 use write::Save;
 
 /// Arguments of `watch`.

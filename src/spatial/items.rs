@@ -12,7 +12,7 @@ use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_work::deviation::DISTANCE_MAP;
+use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 
 /// The names of contact points begin so.
 pub(crate) const CONTACT: &str = "contact ";

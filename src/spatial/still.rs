@@ -12,10 +12,10 @@ use crate::gpu::{Gpu, GpuError};
 use crate::spatial::{FILLED, focus, items};
 use touch2touch_core::colormap::Range;
 use touch2touch_core::grid::Grid;
-use touch2touch_work::deviation::DISTANCE_MAP;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::space::{DrawSpace, Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
+use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::space::{DrawSpace, Ground, InSpace, SpacePicture, SpaceSide, SpaceView};
+use touch2touch_pipeline::labels::ImprintSource;
 
 /// The smaller side of a 3D pane on a screen, pixels: lines, dashes and points of a still are as wide in relation to it.
 const SCREEN_PX: f32 = 460.0;

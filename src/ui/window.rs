@@ -1,8 +1,8 @@
 //! The window around the panes: a frame, bars, the arrangement, keys, and what covers the panes.
 
-pub(crate) mod about;
 pub mod app;
 pub(crate) mod bars;
+pub(crate) mod doctor;
 pub(crate) mod export;
 pub(crate) mod fuzzy;
 pub(crate) mod layout;

@@ -1,6 +1,6 @@
 //! Edits of labels: the same masks and the same journal by hand and by verb.
 
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::*;
 

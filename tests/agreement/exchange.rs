@@ -2,7 +2,7 @@
 
 use touch2touch::app::labels::Review;
 use touch2touch::app::results;
-use touch2touch_work::io::exchange::Format;
+use touch2touch_pipeline::io::exchange::Format;
 
 use super::*;
 
@@ -23,7 +23,7 @@ pub(super) fn masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_
     studio.send(ExportCommand::Write(Output::Masks, exported.clone()).into());
     let by_verb = home.path().join("by_verb");
     json(&["masks", "export", &path, "--out", &text(&by_verb), "--format", "png"], home.path());
-    let list = |folder: &Path| std::fs::read(folder.join(touch2touch_work::io::exchange::MANIFEST)).unwrap();
+    let list = |folder: &Path| std::fs::read(folder.join(touch2touch_pipeline::io::exchange::MANIFEST)).unwrap();
     assert!(list(&exported) == list(&by_verb), "the hashes of all files are in it");
     drop(studio);
 

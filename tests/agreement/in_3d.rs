@@ -5,7 +5,7 @@ use touch2touch::app::labels::StrokeIn3d;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch_core::label::{Layers, Sight};
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::*;
 

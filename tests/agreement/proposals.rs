@@ -6,10 +6,10 @@ use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
-use touch2touch_work::job::{Cancel, JobCx};
-use touch2touch_work::models::Models;
-use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::job::{Cancel, JobCx};
+use touch2touch_pipeline::masks::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 use super::*;
 

@@ -7,22 +7,22 @@ use std::process::{Command, Stdio};
 use serde_json::{Value, json};
 use touch2touch_core::diffusion::Spacing;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
-use touch2touch_work::recipe::{Recipe, Stage, millimeters};
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage, millimeters};
 
 use super::random::Draws;
 use super::{json, lab_folder};
 use crate::support;
 
-/// Feels pairs as told on standard input, and prints what the verb `pose` says of them.
-const FEEL: &str = r#"
+/// Estimates pairs as told on standard input, and prints what the verb `pose` says of them.
+const ESTIMATE: &str = r#"
 import json, sys
 import numpy as np
 import touch2touch as t2t
 
 rows = []
 for path, name, choices in json.load(sys.stdin):
-    felt = t2t.feel(t2t.open(path)[name], t2t.Recipe(**choices))
-    pose = felt.pose
+    result = t2t.estimate(t2t.open(path)[name], t2t.Recipe(**choices))
+    pose = result.pose
     rows.append(pose and {
         "angle_deg": float(np.degrees(pose.angle)), "error_deg": pose.error and float(np.degrees(pose.error)),
         "angle_sd_deg": None if pose.sigma is None else float(np.degrees(pose.sigma[0])), "verdict": pose.verdict,
@@ -33,7 +33,7 @@ json.dump(rows, sys.stdout)
 /// A recipe as the keywords of `touch2touch.Recipe`.
 fn keywords(recipe: &Recipe) -> Value {
     let (model, config) = recipe.generator.as_ref().unwrap();
-    let path = |model: &touch2touch_work::recipe::Model| model.origin.path().display().to_string();
+    let path = |model: &touch2touch_pipeline::steps::recipe::Model| model.origin.path().display().to_string();
     let number = |meters: f32| millimeters(meters).parse::<f64>().unwrap();
     let mask = recipe.mask;
     let mut all = json!({
@@ -57,9 +57,9 @@ fn keywords(recipe: &Recipe) -> Value {
 }
 
 /// Rows of the package, in order.
-fn felt(python: &Path, asked: &[(String, String, Value)]) -> Vec<Value> {
+fn estimate(python: &Path, asked: &[(String, String, Value)]) -> Vec<Value> {
     let mut child =
-        Command::new(python).args(["-c", FEEL]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+        Command::new(python).args(["-c", ESTIMATE]).stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
     child.stdin.take().unwrap().write_all(&serde_json::to_vec(asked).unwrap()).unwrap();
     let done = child.wait_with_output().unwrap();
     assert!(done.status.success());
@@ -76,7 +76,7 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
     for at in 0..6 {
         let path = if at % 2 == 0 { "demo" } else { &lab };
         let recipe = draws.posed();
-        let recipe = Recipe { engine: touch2touch_work::infer::engine::EngineChoice::Rten, ..recipe };
+        let recipe = Recipe { engine: touch2touch_pipeline::infer::engine::EngineChoice::Rten, ..recipe };
         let words = recipe.words(Stage::Pose).list();
         let begin = ["pose", path, "--imprint", "predicted", "--limit", "2", "--no-cache"];
         let words: Vec<&str> = begin.into_iter().chain(words.iter().map(String::as_str)).collect();
@@ -86,7 +86,7 @@ pub(super) fn a_random_recipe_gives_the_same_poses_from_python_and_by_the_verb()
         }
     }
     let mut poses = 0;
-    for ((row, case), asked) in felt(&python, &asked).iter().zip(&said).zip(&asked) {
+    for ((row, case), asked) in estimate(&python, &asked).iter().zip(&said).zip(&asked) {
         assert_eq!(row.is_null(), case["angle_deg"].is_null(), "{asked:?}: {case}");
         if row.is_null() {
             continue;

@@ -24,10 +24,10 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::io::npz;
-use touch2touch_work::io::pt::Values;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::io::npz;
+use touch2touch_pipeline::io::pt::Values;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 use super::recipes::{put, recipe};
 use super::{Studio, lab_folder, pictures_folder};

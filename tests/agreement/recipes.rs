@@ -20,11 +20,11 @@ use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::pose::{Gate, Registration};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::recipe::{Model, Recipe, Stage};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::steps::bundles;
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
+use touch2touch_pipeline::steps::recipe::{Model, Recipe, Stage};
 
 use super::{Studio, json, lab_folder, number, optional, pictures_folder};
 

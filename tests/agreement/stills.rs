@@ -3,8 +3,8 @@
 use touch2touch::app::command::WorkbenchCommand;
 use touch2touch::app::export::{FigureRows, StillAsked};
 use touch2touch::app::workbench::Layer;
-use touch2touch_work::figure::FigurePane;
-use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
+use touch2touch_pipeline::images::figure::FigurePane;
+use touch2touch_pipeline::images::space::{Ground, SpacePane, ViewAngles};
 
 use super::*;
 #[cfg(feature = "gui")]

@@ -2,8 +2,8 @@
 
 use std::path::PathBuf;
 
-use touch2touch_work::adapt::{Adapted, Scored};
-use touch2touch_work::train::Trained;
+use touch2touch_pipeline::learn::adapt::{Adapted, Scored};
+use touch2touch_pipeline::learn::train::Trained;
 
 pub(super) fn adapted() -> Adapted {
     Adapted {

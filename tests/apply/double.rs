@@ -26,16 +26,16 @@ use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch_core::sim;
-use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch_work::error::{TaskError, TaskErrorKind};
-use touch2touch_work::export::{ExportChoice, Plan};
-use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::bundle::SensorPair;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{Operation, Recovered, Unsaved};
-use touch2touch_work::models::GenerateInput;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
+use touch2touch_pipeline::export::{ExportChoice, Plan};
+use touch2touch_pipeline::infer::bundle::Origin;
+use touch2touch_pipeline::infer::bundle::SensorPair;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{Operation, Recovered, Unsaved};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch_pipeline::steps::models::GenerateInput;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// `[width, height]` of the imprints of [`Source`].
 pub(crate) const IMPRINT_SIZE: [usize; 2] = [24, 16];

@@ -18,14 +18,14 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::infer::bundle::{Origin, SensorPair};
+use touch2touch_pipeline::infer::bundle::{Origin, SensorPair};
 
 use super::double::{Bench, SIMULATED};
 use super::panes;
 use touch2touch::app::results::Onlooker;
-use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch_work::job::{JobCx, PreviewPicture};
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::job::{JobCx, PreviewPicture};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 const RIGHT: PadId = lab::RIGHT;
 const LEFT: PadId = lab::LEFT;

@@ -12,7 +12,7 @@ use touch2touch::app::state::State;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::engine::EngineChoice;
 
 use super::double::Bench;
 use super::panes;

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use touch2touch::headless::check_command;
 use touch2touch_core::label::{Marks, Provenance};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
 
 use super::pages::{self, fenced, repository};
 use super::{error_text, run};

@@ -6,9 +6,9 @@ use std::process::{Command, Stdio};
 
 use serde_json::Value;
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::MaskStore;
-use touch2touch_work::io::simulated::MANIFEST;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::MaskStore;
+use touch2touch_pipeline::io::simulated::MANIFEST;
 
 use super::{error_text, json, run};
 
@@ -238,7 +238,7 @@ fn all_damaged_masks_are_listed_and_leftovers_of_killed_exports_go() {
     assert!(done.status.success(), "{}", error_text(&done));
     assert!(!left.exists() && out.join("train/imgs").is_dir());
     // The stems say whose they are in the manifest.
-    let manifest = std::fs::read(out.join(touch2touch_work::io::exchange::MANIFEST)).unwrap();
+    let manifest = std::fs::read(out.join(touch2touch_pipeline::io::exchange::MANIFEST)).unwrap();
     let manifest: Value = serde_json::from_slice(&manifest).unwrap();
     let named: Vec<&str> = manifest["stems"].as_object().unwrap().values().map(|v| v[0].as_str().unwrap()).collect();
     assert!(dataset.index.pairs.iter().all(|entry| named.contains(&entry.name.as_str())), "{named:?}");

@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::names;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::names;
 
 use super::{error_text, json, run};
 use crate::cli_generate::full_size_bundle;

@@ -1,7 +1,7 @@
 //! A data set of masks: notes, and which to look at first.
 
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::{error_text, json, run};
 

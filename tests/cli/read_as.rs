@@ -5,8 +5,8 @@ use std::path::Path;
 
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::read_as::{Depths, ReadAs};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::simulated::{Layout, write_pair};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair};
 
 use super::{error_text, json};
 use crate::support::{run, shared};

@@ -6,8 +6,8 @@ use serde_json::Value;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::label::{Marks, Provenance};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{MaskStore, StoredMask};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{MaskStore, StoredMask};
 
 use super::{error_text, json, run};
 

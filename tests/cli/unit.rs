@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use touch2touch_work::io::stl;
+use touch2touch_pipeline::io::stl;
 
 use super::{error_text, json};
 use crate::support::run;

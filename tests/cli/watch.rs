@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
-use touch2touch_work::io::npz;
+use touch2touch_pipeline::io::npz;
 
 use super::{error_text, run};
 
@@ -206,7 +206,7 @@ fn without_tool_or_camera_it_says_so_and_existing_files_are_taken_once() {
     let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(out.join(name)).unwrap()).unwrap() };
     assert!(read("a_1.t2t.json")["no_pose"].as_str().unwrap().contains("--tool"));
     assert!(read("pattern_36_data_2.t2t.json")["no_pose"].as_str().unwrap().contains("--camera"));
-    let dict = touch2touch_work::io::pt::read_dict(&out.join("a_1.t2t.pt")).unwrap();
+    let dict = touch2touch_pipeline::io::pt::read_dict(&out.join("a_1.t2t.pt")).unwrap();
     assert_eq!(dict.shape("prediction").unwrap(), [2, 1, 140, 175]);
     eprintln!("two touches once: {:.1} s with loading", start.elapsed().as_secs_f64());
     // Another recipe is another result.

@@ -3,7 +3,7 @@
 use std::io::Read as _;
 use std::path::Path;
 
-use touch2touch_work::io::pt::{PtItem, Tensor, Values, write_dict};
+use touch2touch_pipeline::io::pt::{PtItem, Tensor, Values, write_dict};
 
 use super::mutate::{png_checksums, zip};
 
@@ -188,7 +188,7 @@ pub(super) fn npz() -> Vec<Seed> {
     let one = |entry: Vec<u8>| Content::Zip(vec![("x.npy".to_owned(), entry)]);
     let bomb = npy("4194305, 4, ", &vec![0; 4 * 4 * 4_194_305]);
     vec![
-        good("arrays", opened(&written(|file| touch2touch_work::io::npz::write(file, &tensors).unwrap()))),
+        good("arrays", opened(&written(|file| touch2touch_pipeline::io::npz::write(file, &tensors).unwrap()))),
         good("another order", one(npy("2, 2", &[0; 16]))),
         bad("a product that wraps", one(npy("4294967296, 4294967296", &[])), "do not fit"),
         bad("a product that wraps to nothing", one(npy("0, 4294967296, 4294967296", &[])), "do not fit"),

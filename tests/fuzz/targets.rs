@@ -15,16 +15,16 @@ use touch2touch_core::postprocess::{RawPrediction, ShiftFit};
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sensor::Intrinsics;
-use touch2touch_work::infer::bundle::{Bundle, MANIFEST};
-use touch2touch_work::infer::engine::EngineKind;
-use touch2touch_work::infer::kept_key::KeptKey;
-use touch2touch_work::infer::store::Store;
-use touch2touch_work::io::cases::{Case, Stratum};
-use touch2touch_work::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
-use touch2touch_work::io::masks::{MaskStore, StoredMask, StoredReview};
-use touch2touch_work::io::pt::Tensor;
-use touch2touch_work::io::statistics::{Provenance, ShiftStatistics};
-use touch2touch_work::io::{cases, images, npz, pt, stl};
+use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
+use touch2touch_pipeline::infer::engine::EngineKind;
+use touch2touch_pipeline::infer::kept_key::KeptKey;
+use touch2touch_pipeline::infer::store::Store;
+use touch2touch_pipeline::io::cases::{Case, Stratum};
+use touch2touch_pipeline::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
+use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
+use touch2touch_pipeline::io::pt::Tensor;
+use touch2touch_pipeline::io::statistics::{Provenance, ShiftStatistics};
+use touch2touch_pipeline::io::{cases, images, npz, pt, stl};
 
 use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
 

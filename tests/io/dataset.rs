@@ -7,10 +7,10 @@ use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::rig::lab;
 use touch2touch_core::turn::Turn;
-use touch2touch_work::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
-use touch2touch_work::io::images;
-use touch2touch_work::io::pt::{PtItem, Tensor, read_dict, write_dict};
-use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair};
+use touch2touch_pipeline::io::dataset::{Dataset, LoadError, OpenError, SourceKind};
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::io::pt::{PtItem, Tensor, read_dict, write_dict};
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair};
 
 use super::pt::with_pickle;
 use super::{touch, touch_file};

@@ -11,11 +11,11 @@ use touch2touch_core::resample;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{self, SimConfig};
-use touch2touch_work::io::dataset::{Dataset, ToolUnit};
-use touch2touch_work::io::doctor::{DoctorReport, MOST_PAIRS, examine};
-use touch2touch_work::io::images;
-use touch2touch_work::io::pt::read_text_lists;
-use touch2touch_work::io::simulated::{Layout, WriteError, write_pair, write_tools};
+use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
+use touch2touch_pipeline::io::doctor::{DoctorReport, MOST_PAIRS, examine};
+use touch2touch_pipeline::io::images;
+use touch2touch_pipeline::io::pt::read_text_lists;
+use touch2touch_pipeline::io::simulated::{Layout, WriteError, write_pair, write_tools};
 
 use super::touch;
 use crate::support;

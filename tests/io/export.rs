@@ -4,10 +4,10 @@ use std::path::Path;
 
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::exchange::{
+use touch2touch_pipeline::io::exchange::{
     Content, ExportConfig, ExportEntry, ExportError, IGNORED, MANIFEST, PARTS, check_folder, export,
 };
-use touch2touch_work::io::images;
+use touch2touch_pipeline::io::images;
 
 fn entries(n: usize) -> Vec<ExportEntry> {
     (0..n)

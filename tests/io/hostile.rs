@@ -6,10 +6,10 @@ use std::time::Duration;
 
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
-use touch2touch_work::infer::bundle::Bundle;
-use touch2touch_work::io::dataset::{Dataset, read_in_meters};
-use touch2touch_work::io::masks::MaskStore;
-use touch2touch_work::io::{cases, images, npz, pt, statistics, stl};
+use touch2touch_pipeline::infer::bundle::Bundle;
+use touch2touch_pipeline::io::dataset::{Dataset, read_in_meters};
+use touch2touch_pipeline::io::masks::MaskStore;
+use touch2touch_pipeline::io::{cases, images, npz, pt, statistics, stl};
 
 /// A pipe that nobody writes to, and a link to a device that never ends.
 fn not_files(dir: &Path, name: &str) -> [PathBuf; 2] {

@@ -3,8 +3,8 @@
 use glam::DVec3;
 use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::{Dataset, SourceKind};
-use touch2touch_work::io::{npz, stl};
+use touch2touch_pipeline::io::dataset::{Dataset, SourceKind};
+use touch2touch_pipeline::io::{npz, stl};
 
 use crate::support;
 

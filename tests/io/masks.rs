@@ -12,9 +12,9 @@ use touch2touch_core::label::{Marks, Provenance, paint_where};
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{ByImprint, FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
-use touch2touch_work::io::predicted_id::PredictedId;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{ByImprint, FOLDER, MaskStore, StoreError, StoredMask, StoredReview};
+use touch2touch_pipeline::io::predicted_id::PredictedId;
 
 use super::touch_file;
 
@@ -347,9 +347,9 @@ fn nothing_is_written_where_the_data_set_is_not_any_more() {
     let (root, elsewhere) = (dir.path().join("set"), dir.path().join("renamed"));
     let tool = touch2touch_core::catalog::tools().first().unwrap();
     let sample = touch2touch_core::sim::simulate(tool, Default::default(), 1, &Default::default());
-    touch2touch_work::io::simulated::write_pair(
+    touch2touch_pipeline::io::simulated::write_pair(
         &root,
-        touch2touch_work::io::simulated::Layout::Train,
+        touch2touch_pipeline::io::simulated::Layout::Train,
         &tool.name,
         0,
         &sample,

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::support;
-use touch2touch_work::io::pt::{PtError, PtItem, Tensor, Values, read_dict, read_text_lists, write_dict};
+use touch2touch_pipeline::io::pt::{PtError, PtItem, Tensor, Values, read_dict, read_text_lists, write_dict};
 
 fn data(name: &str) -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(name)

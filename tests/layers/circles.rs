@@ -16,10 +16,10 @@ use super::code;
 use crate::support::rust_files;
 
 /// The crates below the application; in names, a crate is the root of its modules.
-const CRATES: &[&str] = &["core", "work"];
+const CRATES: &[&str] = &["core", "pipeline"];
 
 /// The crates and layers without a circle. A layer that has become free of them is added here and stays so.
-const LAYERS: &[&str] = &["core", "work", "gpu", "spatial", "headless", "app", "ui"];
+const LAYERS: &[&str] = &["core", "pipeline", "gpu", "spatial", "headless", "app", "ui"];
 
 /// A path in the crate, such as `["domain", "align", "icp"]`.
 type Name = Vec<String>;

@@ -8,7 +8,7 @@ use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::pose::{Registration, register};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::units::angle_error;
-use touch2touch_work::io::cases::Case;
+use touch2touch_pipeline::io::cases::Case;
 
 use super::{case, lifted, suite};
 

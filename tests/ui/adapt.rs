@@ -7,7 +7,7 @@ use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::{adapt, recipe};
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 use super::rig::{Rig, write_dataset};
 

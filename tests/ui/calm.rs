@@ -11,7 +11,7 @@ use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, MaskTool, SpacePane, Workspace, prefer};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::images;
+use touch2touch_pipeline::io::images;
 
 use super::rig::Rig;
 

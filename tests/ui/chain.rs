@@ -11,7 +11,7 @@ use touch2touch_core::catalog;
 use touch2touch_core::postprocess::FlagKind;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
 

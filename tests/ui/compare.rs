@@ -10,7 +10,7 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
 
 use super::rig::Rig;
 

@@ -11,7 +11,7 @@ use touch2touch::app::state::{Lookup, State};
 use touch2touch::app::tasks::Level;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::lab;
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 use super::rig::Rig;
 

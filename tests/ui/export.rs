@@ -8,7 +8,7 @@ use touch2touch::app::command::{LabelsCommand, Pane, PredictCommand};
 use touch2touch::app::export;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Theme, Workspace};
-use touch2touch_work::io::images;
+use touch2touch_pipeline::io::images;
 
 use super::rig::Rig;
 

@@ -10,7 +10,7 @@ use touch2touch::app::state::{Absent, Lookup};
 use touch2touch_core::catalog;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair};
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair};
 
 use super::rig::Rig;
 

@@ -16,8 +16,8 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{GelView, Theme, Workspace};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::rig::Rig;
 

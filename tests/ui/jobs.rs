@@ -9,9 +9,9 @@ use touch2touch::app::results;
 use touch2touch::app::settings::{Workspace, prefer};
 use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::labels::Labels;
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::labels::Labels;
 
 use super::rig::Rig;
 

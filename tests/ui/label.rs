@@ -12,9 +12,9 @@ use touch2touch::app::workbench::SceneTool;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{CleanKind, Layers};
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::exchange::check_folder;
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::exchange::check_folder;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::rig::Rig;
 

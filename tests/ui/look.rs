@@ -18,8 +18,8 @@ use touch2touch_core::label::Paint;
 use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim::Fault;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
 

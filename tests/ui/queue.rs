@@ -9,9 +9,9 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
 use touch2touch_core::label::{CleanKind, CleanUp};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::MaskStore;
-use touch2touch_work::queue::QueueBy;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::MaskStore;
+use touch2touch_pipeline::masks::queue::QueueBy;
 
 use super::rig::{Rig, write_dataset};
 

@@ -24,17 +24,17 @@ use touch2touch_core::postprocess::{
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim;
-use touch2touch_work::bundles::{BundleInfo, BundleKind, GeneratorInfo};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::imprint::in_meters;
-use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::infer::bundle::SensorPair;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::simulated::{Layout, pair_paths, write_pair, write_tools};
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::job::{JobCx, PreviewPicture};
-use touch2touch_work::models::GenerateInput;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::infer::bundle::Origin;
+use touch2touch_pipeline::infer::bundle::SensorPair;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::simulated::{Layout, pair_paths, write_pair, write_tools};
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::job::{JobCx, PreviewPicture};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, GeneratorInfo};
+use touch2touch_pipeline::steps::imprint::in_meters;
+use touch2touch_pipeline::steps::models::GenerateInput;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// The program's services with a generator that answers at once.
 struct QuickGenerator {

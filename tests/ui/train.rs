@@ -14,11 +14,11 @@ use touch2touch::app::{recipe, train};
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::simulated::{Layout, write_pair, write_tools};
-use touch2touch_work::labels::{Labels, Review};
-use touch2touch_work::train::TrainChoice;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
+use touch2touch_pipeline::labels::{Labels, Review};
+use touch2touch_pipeline::learn::train::TrainChoice;
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 use super::rig::Rig;
 use crate::support::run;

@@ -8,8 +8,8 @@ use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
 use touch2touch::app::tasks::Level;
-use touch2touch_work::io::dataset::ToolUnit;
-use touch2touch_work::io::stl;
+use touch2touch_pipeline::io::dataset::ToolUnit;
+use touch2touch_pipeline::io::stl;
 
 use super::rig::Rig;
 

@@ -10,9 +10,9 @@ use touch2touch::app::library::Place;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
 use touch2touch::app::settings::Workspace;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::{FOLDER, MaskStore};
-use touch2touch_work::labels::{Labels, recover};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::{FOLDER, MaskStore};
+use touch2touch_pipeline::labels::{Labels, recover};
 
 use super::rig::Rig;
 

@@ -13,8 +13,8 @@ use touch2touch::app::workbench::{Layer, ManualTry, SceneTool, WorkbenchCommand}
 use touch2touch_core::align::reason::Reason;
 use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::MaskStore;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::MaskStore;
 
 use super::rig::Rig;
 

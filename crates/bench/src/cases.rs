@@ -11,12 +11,12 @@ use super::generator::timed_run;
 use touch2touch::headless::{Common, Output, VerbResult, condition};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sim::Condition;
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::infer::generator::Generator;
-use touch2touch_work::io::cases::{self, Suite};
-use touch2touch_work::io::stl;
-use touch2touch_work::models::outside_of_pools;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::generator::Generator;
+use touch2touch_pipeline::io::cases::{self, Suite};
+use touch2touch_pipeline::io::stl;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind};
+use touch2touch_pipeline::steps::models::outside_of_pools;
 
 /// Arguments of `bench cases`.
 #[derive(Debug, Args)]

@@ -17,18 +17,18 @@ use touch2touch::headless::JsonArgs;
 use touch2touch::headless::RuntimeArg;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::catalog::{ToolSpec, tools};
-use touch2touch_core::doubt::{Doubt, Felt, judge, worth};
+use touch2touch_core::doubt::{Doubt, PairInput, judge, worth};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::read_as::ReadAs;
 use touch2touch_core::rig::{Rig, lab};
 use touch2touch_core::sample::{DepthTouch, Sample};
 use touch2touch_core::sim::{Condition, SimConfig, random_grasp};
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::doubts::{Generator, PAIRS, placed};
-use touch2touch_work::io::cases::{Case, CaseSet};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::models::Models;
-use touch2touch_work::predict::Generating;
+use touch2touch_pipeline::doubts::{Generator, PAIRS, placed};
+use touch2touch_pipeline::io::cases::{Case, CaseSet};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::predict::Generating;
 
 /// Arguments of `bench doctor`.
 #[derive(Debug, Args)]
@@ -236,13 +236,13 @@ fn doubts(set: &Set, generator: Option<Generator<'_>>) -> Vec<Doubt> {
     })
 }
 
-fn with_felt<T>(set: &Set, then: impl FnOnce(&[Felt<'_>]) -> T) -> T {
+fn with_felt<T>(set: &Set, then: impl FnOnce(&[PairInput<'_>]) -> T) -> T {
     let count = set.pairs.len() as isize;
     let beside: Vec<_> = (0..count)
         .map(|at| move |on: isize| set.pairs[(at + on).rem_euclid(count) as usize].1.grasp_from_object)
         .collect();
     let felt = set.pairs.iter().zip(&beside);
-    let felt = felt.map(|((tool, sample), beside)| Felt { tool: Some(tool), sample, beside: Some(beside) });
+    let felt = felt.map(|((tool, sample), beside)| PairInput { tool: Some(tool), sample, beside: Some(beside) });
     then(&felt.collect::<Vec<_>>())
 }
 

@@ -5,7 +5,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
 use super::rows::EngineRow;
-use touch2touch_work::canvas::{Drawing, Drawn, Paper};
+use touch2touch_pipeline::images::canvas::{Drawing, Drawn, Paper};
 
 /// An engine as a point of the picture.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -267,7 +267,7 @@ mod tests {
         }
         let text = |points: &[FrontPoint]| {
             let axis = Axis { title: "t", time: "ms", unit: " mm", legend: &PEERS };
-            touch2touch_work::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
+            touch2touch_pipeline::images::canvas::svg(&Picture { axis, points, default: "one" }).unwrap()
         };
         let svg = text(&pareto(vec![point("one", 0.1, 0.7), point("two", 200.0, 5.0)]));
         assert_eq!(labels.place([50, 12], (100, 100))[1], 94, "beside its point, where nothing is in the way");

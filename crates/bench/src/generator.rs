@@ -22,12 +22,12 @@ use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::canvas;
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
-use touch2touch_work::infer::generator::Generator;
-use touch2touch_work::infer::mask::MaskModel;
-use touch2touch_work::io::atomic;
+use touch2touch_pipeline::images::canvas;
+use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_pipeline::infer::generator::Generator;
+use touch2touch_pipeline::infer::mask::MaskModel;
+use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind};
 
 /// Sampler and steps that everything is measured against.
 const REFERENCE: (Sampler, u32) = (Sampler::Ddim, 200);

@@ -13,8 +13,8 @@ use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::units::angle_error;
-use touch2touch_work::io::pt::Tensor;
-use touch2touch_work::io::{files, npz};
+use touch2touch_pipeline::io::pt::Tensor;
+use touch2touch_pipeline::io::{files, npz};
 
 const SCRIPT: &str = include_str!("../../../benches/peers.py");
 /// Surface points of a tool: as many as the lab's loop compares with.

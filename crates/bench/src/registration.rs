@@ -26,12 +26,12 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
-use touch2touch_work::canvas;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::atomic;
-use touch2touch_work::io::cases::{Case, CaseSet};
-use touch2touch_work::mask::MaskSource;
-use touch2touch_work::pairs;
+use touch2touch_pipeline::images::canvas;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::atomic;
+use touch2touch_pipeline::io::cases::{Case, CaseSet};
+use touch2touch_pipeline::pairs;
+use touch2touch_pipeline::steps::mask::MaskSource;
 
 /// Repetitions of one case go on until this much time is spent, milliseconds, or there are [`MAX_REPETITIONS`].
 const REPEAT_MS: f64 = 8.0;

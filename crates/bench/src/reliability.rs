@@ -8,7 +8,7 @@ use super::front::{FAINT, FRONT, INK, OURS, PEER};
 use touch2touch_core::align::Evidence;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::units::wrap_angle;
-use touch2touch_work::canvas::{Drawing, Drawn, Paper};
+use touch2touch_pipeline::images::canvas::{Drawing, Drawn, Paper};
 
 /// Errors in standard deviations: angle, y, z.
 pub(super) type Scores = [f64; 3];
@@ -143,7 +143,8 @@ mod tests {
         assert!((found.rms[0] - 1.0).abs() < 0.01 && (found.within_2[2] - 95.4).abs() < 0.1, "{found:?}");
         assert!(found.curve.iter().all(|[foretold, seen]| (foretold - seen).abs() < 0.1), "{found:?}");
         assert!(Reliability::of(&[]).is_none());
-        let svg = touch2touch_work::canvas::svg(&Picture { title: "t", lines: vec![("joint", &found)] }).unwrap();
+        let svg =
+            touch2touch_pipeline::images::canvas::svg(&Picture { title: "t", lines: vec![("joint", &found)] }).unwrap();
         assert!(svg.contains("joint: angle 1.00 (95 %)"), "{svg}");
     }
 }

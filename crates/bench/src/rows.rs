@@ -7,7 +7,7 @@ use super::figures::Summary;
 use super::reliability::Reliability;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::PoseDifference;
-use touch2touch_work::io::cases::Stratum;
+use touch2touch_pipeline::io::cases::Stratum;
 
 /// A case ready to be registered.
 pub(super) struct Prepared {

@@ -39,13 +39,13 @@ use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{Sensors, random_grasp, simulate};
 use touch2touch_core::units::{angle_error, fixed, mm};
 use touch2touch_core::verdict::Verdict;
-use touch2touch_work::feel::{Touch, feel};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{ImprintSource, PairLabels};
-use touch2touch_work::mask::MaskChoice;
-use touch2touch_work::models::Models;
-use touch2touch_work::recipe::{Recipe, Stage};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{ImprintSource, PairLabels};
+use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::mask::MaskChoice;
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 
 /// Seeds of the grasps: apart from those of the demo, of the test sets and of the training.
 const TRIAL_SEED: u64 = 0x7e1a_1000_0000_0000 + 1_000_003;
@@ -265,8 +265,8 @@ impl Hand<'_> {
         };
         let labels = PairLabels::default();
         let touch = Touch { dataset: self.dataset, pair: PairId(0), sample, tool: Ok(self.model), labels: &labels };
-        let felt = feel(touch, recipe, Stage::Pose, self.models, &JobCx::unwatched())?;
-        Ok(match felt.pose() {
+        let estimate = estimate(touch, recipe, Stage::Pose, self.models, &JobCx::unwatched())?;
+        Ok(match estimate.pose() {
             Ok(found) => {
                 let grasp = grasp(found.grasp_from_object);
                 // Where a tool is along its own axis is no fault: it is let down along it until it meets something.

@@ -23,7 +23,7 @@ use touch2touch_core::pose::{Registration, ToolModel, register_with};
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::which_tool;
-use touch2touch_work::io::cases::{Case, CaseSet, Suite};
+use touch2touch_pipeline::io::cases::{Case, CaseSet, Suite};
 
 /// Arguments of `bench verdict`.
 #[derive(Debug, Args)]

@@ -37,7 +37,7 @@ pub type Beside<'a> = &'a dyn Fn(isize) -> Option<PlanarPose>;
 
 /// A pair that is looked at.
 #[derive(Clone, Copy)]
-pub struct Felt<'a> {
+pub struct PairInput<'a> {
     /// Name of its tool, where known.
     pub tool: Option<&'a str>,
     /// Sample as it is stored.
@@ -154,10 +154,11 @@ pub type Predict<'a> = &'a mut dyn FnMut(&[&Sample]) -> Option<Vec<Placed>>;
 /// Doubts about data of which these pairs are a handful. `tools` has the CAD models by tool, in meters.
 ///
 /// A doubt of the imprints is taken for true before the images are looked at, and so on.
-pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
+pub fn judge(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>, predict: Option<Predict<'_>>) -> Vec<Doubt> {
     let mut doubts = Vec::new();
     let depths: Vec<Sample> = felt.iter().map(|felt| only(felt.sample, false)).collect();
-    let depths: Vec<Felt<'_>> = felt.iter().zip(&depths).map(|(felt, sample)| Felt { sample, ..*felt }).collect();
+    let depths: Vec<PairInput<'_>> =
+        felt.iter().zip(&depths).map(|(felt, sample)| PairInput { sample, ..*felt }).collect();
     doubts.extend(of_imprints(&depths, tools));
     let images = images::judge(felt);
     let sound = images.is_none();
@@ -174,12 +175,12 @@ pub fn judge(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, predict: Opti
 }
 
 /// Figures of the registrations of some pairs: before and after a cure they tell what the cure is worth.
-pub fn worth(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
+pub fn worth(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Worth {
     poses::Registered::of(felt, &poses::models(felt, tools)).worth()
 }
 
 /// Doubt about imprints, CAD models and true poses, which are judged together: each of the three may be what is wrong.
-fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
+fn of_imprints(felt: &[PairInput<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<Doubt> {
     let models = poses::models(felt, tools);
     let registered = poses::Registered::of(felt, &models);
     let of_all = of_all_imprints(felt, tools, &models, &registered);
@@ -192,7 +193,7 @@ fn of_imprints(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>) -> Option<D
 
 /// Doubt about the imprints of all pairs and both fingers together.
 fn of_all_imprints(
-    felt: &[Felt<'_>],
+    felt: &[PairInput<'_>],
     tools: &BTreeMap<String, TriMesh>,
     models: &poses::Models<'_>,
     registered: &poses::Registered<'_, '_>,
@@ -217,7 +218,8 @@ fn of_all_imprints(
     let cured = match &doubt.cause {
         Cause::Stored(read_as) => {
             let read: Vec<Sample> = samples.iter().map(|sample| ReadAs::all(&[*read_as], sample)).collect();
-            let read: Vec<Felt<'_>> = felt.iter().zip(&read).map(|(felt, sample)| Felt { sample, ..*felt }).collect();
+            let read: Vec<PairInput<'_>> =
+                felt.iter().zip(&read).map(|(felt, sample)| PairInput { sample, ..*felt }).collect();
             registered.is_cured_by(&poses::Registered::of(&read, models))
         }
         Cause::Axes(tools_of, axes) => {

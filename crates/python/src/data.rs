@@ -14,13 +14,13 @@ use touch2touch_core::read_as::parse_list;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
 use touch2touch_core::sim::{self, Grasp, Sensors};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::feel::Touch;
-use touch2touch_work::filter::Filter;
-use touch2touch_work::io::dataset::{Dataset as Source, ToolScale};
-use touch2touch_work::labels::{Labels, PairLabels, Review};
-use touch2touch_work::recipe::Recipe;
-use touch2touch_work::tool::load_tool;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::dataset::{Dataset as Source, ToolScale};
+use touch2touch_pipeline::labels::filter::Filter;
+use touch2touch_pipeline::labels::{Labels, PairLabels, Review};
+use touch2touch_pipeline::steps::estimate::Touch;
+use touch2touch_pipeline::steps::recipe::Recipe;
+use touch2touch_pipeline::steps::tool::load_tool;
 
 use crate::arrays::{Array, array, stack, stack_rgb, transform, transforms};
 use crate::picture;
@@ -502,7 +502,8 @@ pub(crate) fn simulate(
     })?;
     let grasp = Grasp { theta_rad: angle, x_m: x, y_m: y };
     let sample = away(py, |_| Ok(sim::simulate(spec, grasp, seed, &chosen.config())))?;
-    let model = touch2touch_work::tool::named_tool(&spec.name, spec.mesh()).map_err(|err| failed(&err))?.model;
+    let model =
+        touch2touch_pipeline::steps::tool::named_tool(&spec.name, spec.mesh()).map_err(|err| failed(&err))?.model;
     let made = Arc::new(Tool::of(&spec.name, Arc::new(model)));
     Ok(Pair {
         of: Of::Simulated(made, Simulation { grasp, seed, sensors, gelslims }),

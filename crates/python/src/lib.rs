@@ -6,7 +6,7 @@
 
 mod arrays;
 mod data;
-mod felt;
+mod estimate;
 mod masks;
 mod measures;
 mod picture;
@@ -22,7 +22,7 @@ mod _native {
     #[pymodule_export]
     use crate::data::{Dataset, Pair, open, simulate};
     #[pymodule_export]
-    use crate::felt::{Felt, Pose, feel, feel_many, register, register_many};
+    use crate::estimate::{Estimate, Pose, estimate, estimate_many, register, register_many};
     #[pymodule_export]
     use crate::masks::{export_masks, label};
     #[pymodule_export]

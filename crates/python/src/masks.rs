@@ -10,11 +10,11 @@ use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_work::export::{self, Automatic, DrawnMasks, ExportChoice, ExportSetup, Which};
-use touch2touch_work::io::exchange::Format;
-use touch2touch_work::label_pair::{Begin, LabelSetup, label_pair};
-use touch2touch_work::labels::{ImprintSource, Review};
-use touch2touch_work::propose::ProposalSource;
+use touch2touch_pipeline::export::{self, Automatic, DrawnMasks, ExportChoice, ExportSetup, Which};
+use touch2touch_pipeline::io::exchange::Format;
+use touch2touch_pipeline::labels::{ImprintSource, Review};
+use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
+use touch2touch_pipeline::masks::propose::ProposalSource;
 
 use crate::data::{Pair, dataset_of};
 use crate::process::{refused, watched};

@@ -6,10 +6,10 @@ use pyo3::prelude::*;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigureLook, FigureMakers, FigurePane, FigureSetup, figure as draw, note};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::recipe::Recipe as Whole;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::figure::{FigureLook, FigureMakers, FigurePane, FigureSetup, figure as draw, note};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::steps::recipe::Recipe as Whole;
 
 use crate::data::Pair;
 use crate::process::{refused, watched};

@@ -9,10 +9,10 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use touch2touch_work::error::{TaskError, TaskErrorKind};
-use touch2touch_work::infer::engine::{EngineChoice, EngineKind, resolve};
-use touch2touch_work::job::{Cancel, JobCx, Progress};
-use touch2touch_work::models::Models;
+use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
+use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, resolve};
+use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
+use touch2touch_pipeline::steps::models::Models;
 
 create_exception!(touch2touch, Refused, PyValueError, "Something cannot be done: what, why, and what to do about it.");
 create_exception!(touch2touch, Cancelled, PyRuntimeError, "A job was told to stop before there was a result.");

@@ -9,10 +9,10 @@ use strum::IntoEnumIterator as _;
 use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::recipe::{GeneratorChoice, Model, Recipe as Whole, ShiftChoice, Stage, meters};
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::steps::bundles;
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
+use touch2touch_pipeline::steps::recipe::{GeneratorChoice, Model, Recipe as Whole, ShiftChoice, Stage, meters};
 
 use crate::process::{failed, refused};
 

@@ -8,12 +8,12 @@ use serde::Serialize;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{self, GraspScore, paper_rows};
 use touch2touch_core::rig::Rig;
-use touch2touch_work::adapt::{AdaptSetup, Tuning, adapt as fit};
-use touch2touch_work::bundles::{self as found, BundleKind};
-use touch2touch_work::evaluate::{Evaluation, Report, Setup, evaluate as score, rows};
-use touch2touch_work::infer::bundle::Origin;
-use touch2touch_work::recipe::Recipe as Whole;
-use touch2touch_work::tuning::unfinished_folder;
+use touch2touch_pipeline::infer::bundle::Origin;
+use touch2touch_pipeline::learn::adapt::{AdaptSetup, Tuning, adapt as fit};
+use touch2touch_pipeline::learn::tuning::unfinished_folder;
+use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, evaluate as score, rows};
+use touch2touch_pipeline::steps::bundles::{self as found, BundleKind};
+use touch2touch_pipeline::steps::recipe::Recipe as Whole;
 
 use crate::data::dataset_of;
 use crate::process::{refused, watched};
@@ -75,7 +75,7 @@ impl Scores {
     }
 }
 
-fn take(kind: BundleKind, all: &[touch2touch_work::bundles::BundleInfo]) -> Option<Origin> {
+fn take(kind: BundleKind, all: &[touch2touch_pipeline::steps::bundles::BundleInfo]) -> Option<Origin> {
     all.iter().find(|bundle| bundle.kind == kind && !bundle.is_own()).map(|bundle| bundle.origin.clone())
 }
 
@@ -166,7 +166,7 @@ pub(crate) fn adapt<'py>(
 #[pyfunction]
 pub(crate) fn bundles(py: Python<'_>) -> PyResult<Vec<Bound<'_, PyDict>>> {
     let all = py.detach(|| found::find(&[]).bundles);
-    let one = |bundle: &touch2touch_work::bundles::BundleInfo| {
+    let one = |bundle: &touch2touch_pipeline::steps::bundles::BundleInfo| {
         let row = PyDict::new(py);
         row.set_item("name", &bundle.name)?;
         row.set_item("kind", bundle.kind.name())?;

@@ -9,8 +9,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::ToolModel;
-use touch2touch_work::io::dataset::{ToolScale, read_in_meters};
-use touch2touch_work::tool::named_tool;
+use touch2touch_pipeline::io::dataset::{ToolScale, read_in_meters};
+use touch2touch_pipeline::steps::tool::named_tool;
 
 use crate::arrays::{Array, array, points, points_of};
 use crate::process::{failed, refused};

@@ -5,7 +5,7 @@ use super::super::pane::{Kind, Pane};
 use super::super::state::State;
 use super::super::state::settings::GelView;
 use super::super::state::settings::versus::VersusMode;
-use touch2touch_work::figure::FigurePane;
+use touch2touch_pipeline::images::figure::FigurePane;
 
 /// The column of a figure that shows the same as a pane; `None` of panes that are no pictures.
 pub(crate) fn in_figure(state: &State, pane: Pane) -> Option<FigurePane> {

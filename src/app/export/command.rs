@@ -11,11 +11,11 @@ use super::column::in_figure;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::figure::FigurePane;
-use touch2touch_work::recipe::{Recipe, Stage, Words, quoted};
-use touch2touch_work::subject::{RecipeChange, Subject};
-use touch2touch_work::train::MasksFrom;
+use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
+use touch2touch_pipeline::images::figure::FigurePane;
+use touch2touch_pipeline::learn::train::MasksFrom;
+use touch2touch_pipeline::steps::bundles::BundleKind;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage, Words, quoted};
 
 fn command(verb: &str) -> Words {
     Words::default().word("touch2touch").word(verb)

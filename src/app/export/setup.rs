@@ -17,19 +17,19 @@ use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::Rig;
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::cloud::Clouds;
-use touch2touch_work::depict::Compared;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::figure::{FigurePane, FigureSetup, FigureTheme, note};
-use touch2touch_work::labels::PairLabels;
-use touch2touch_work::mask::made_of;
-use touch2touch_work::pair_files::{PairFile, PairParts, write};
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::Recipe;
-use touch2touch_work::still::StillSetup;
-use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
-use touch2touch_work::tool::NamedTool;
+use touch2touch_pipeline::compare::depict::Compared;
+use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::pair_files::{PairFile, PairParts, write};
+use touch2touch_pipeline::images::figure::{FigurePane, FigureSetup, FigureTheme, note};
+use touch2touch_pipeline::images::still::StillSetup;
+use touch2touch_pipeline::labels::PairLabels;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::mask::made_of;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::recipe::Recipe;
+use touch2touch_pipeline::steps::tool::NamedTool;
 
 /// The export of the selected pair for other programs, gathered for a job.
 #[derive(Clone, Debug)]

@@ -7,13 +7,13 @@ use super::super::keys::{DatasetSeq, Key, PairKey, Revision};
 use super::super::scores::ScoreTable;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::about::Fact;
-use touch2touch_work::evaluate::Evaluation;
-use touch2touch_work::export::{ExportChoice, Plan};
-use touch2touch_work::import::Import;
-use touch2touch_work::labels::{JournalHistory, PairLabels};
-use touch2touch_work::tool::NamedTool;
-use touch2touch_work::train::{TrainChoice, TrainPlan};
+use touch2touch_pipeline::doctor::Fact;
+use touch2touch_pipeline::export::import::Import;
+use touch2touch_pipeline::export::{ExportChoice, Plan};
+use touch2touch_pipeline::labels::{JournalHistory, PairLabels};
+use touch2touch_pipeline::learn::train::{TrainChoice, TrainPlan};
+use touch2touch_pipeline::scores::evaluate::Evaluation;
+use touch2touch_pipeline::steps::tool::NamedTool;
 
 impl Key for PairKey {
     type Value = Sample;

@@ -4,8 +4,8 @@ use super::super::keys::{ImprintSource, Key, PredictionKey, ShiftMode, TouchKey}
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::Flag;
-use touch2touch_work::compare::Beside;
-use touch2touch_work::labels::ImprintOf;
+use touch2touch_pipeline::compare::Beside;
+use touch2touch_pipeline::labels::ImprintOf;
 
 /// One imprint in meters.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -9,7 +9,7 @@ use touch2touch_core::align::{AlignReport, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::Counterparts;
 use touch2touch_core::pose::ToolModel;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// The steps of a recorded registration.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

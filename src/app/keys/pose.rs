@@ -6,11 +6,11 @@ use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, R
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_work::cloud::Clouds;
-use touch2touch_work::deviation::Deviation;
-use touch2touch_work::layers::LayerResult;
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::compare::deviation::Deviation;
+use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::layers::LayerResult;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use super::super::keys::{Key, TouchKey};
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::job::PreviewPicture;
-use touch2touch_work::prediction::Prediction;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::job::PreviewPicture;
+use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Everything that decides a prediction.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

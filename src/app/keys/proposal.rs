@@ -4,7 +4,7 @@ use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, MaskVersion
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
-use touch2touch_work::propose::Proposal;
+use touch2touch_pipeline::masks::propose::Proposal;
 
 /// The place where the CAD model lies.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -45,7 +45,7 @@ impl Key for DistancesKey {
 /// The distances, and where the model was.
 #[derive(Clone, Debug)]
 pub struct Distances {
-    /// Meters, negative inside; see [`touch2touch_work::propose::cad_distances`].
+    /// Meters, negative inside; see [`touch2touch_pipeline::masks::propose::cad_distances`].
     pub grid: Grid<f64>,
     /// The pose of the model.
     pub at: CadPose,

@@ -1,8 +1,8 @@
 //! Keys of comparisons of any two imprints.
 
 use super::super::keys::{CloudKey, ImprintKey, Key, PredictionKey, ShiftMode};
-use touch2touch_work::compare::Comparison;
-use touch2touch_work::deviation::CloudDifference;
+use touch2touch_pipeline::compare::Comparison;
+use touch2touch_pipeline::compare::deviation::CloudDifference;
 
 /// One imprint against another of the same touch.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]

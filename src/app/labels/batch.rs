@@ -8,12 +8,12 @@ use super::super::state::State;
 use super::super::state::tasks::{Level, TaskKind};
 use super::super::{recipe, results, tasks};
 use super::end_stroke;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::import::{Import, ImportSetup, import_masks};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::propose::{self, Batch, BatchSetup, ProposeSetup};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::{Import, ImportSetup, import_masks};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::masks::propose::{self, Batch, BatchSetup, ProposeSetup};
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 /// Starts it.
 pub(super) fn propose_all(state: &mut State, effects: &mut Vec<Effect>) {

@@ -7,8 +7,8 @@ use super::super::results;
 use super::super::state::State;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::cloud::Clouds;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// Mask, pose and cloud before the last change of a mask. Nothing of it is computed: pose and cloud are those that were
 /// there, and are missing where none was.

@@ -9,8 +9,8 @@ use crate::app::keys::Revision;
 use crate::app::state::State;
 use crate::app::state::tasks::Level;
 use crate::app::state::view::UiRequest;
-use touch2touch_work::error::TaskErrorKind;
-use touch2touch_work::labels::{Operation, Unsaved};
+use touch2touch_pipeline::error::TaskErrorKind;
+use touch2touch_pipeline::labels::{Operation, Unsaved};
 
 /// A command to labels that are not on the disk.
 #[derive(Clone, Debug)]

@@ -10,15 +10,15 @@ use super::super::state::State;
 use super::super::state::tasks::TaskKind;
 use super::super::{recipe, results, settings, tasks};
 use touch2touch_core::dataset::PairId;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::models::GenerateInput;
-use touch2touch_work::pairs;
-use touch2touch_work::predict::Generating;
-use touch2touch_work::recipe::Recipe;
-use touch2touch_work::statistics::{PAIRS, StatisticsSetup, statistics};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::pairs;
+use touch2touch_pipeline::scores::statistics::{PAIRS, StatisticsSetup, statistics};
+use touch2touch_pipeline::steps::bundles::BundleKind;
+use touch2touch_pipeline::steps::models::GenerateInput;
+use touch2touch_pipeline::steps::predict::Generating;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// The job on screen.
 const TITLE: &str = "Shift statistics";

@@ -11,7 +11,7 @@ use super::super::state::results::Latest;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_work::cloud::{Clouds, clouds};
+use touch2touch_pipeline::steps::cloud::{Clouds, clouds};
 
 impl Computes for CloudKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Clouds>> {

@@ -5,7 +5,7 @@ use super::super::results;
 use super::super::results::Demands;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::rig::PadId;
-use touch2touch_work::compare::Comparison;
+use touch2touch_pipeline::compare::Comparison;
 
 /// Prediction against measurement of one finger.
 pub fn comparison(state: &State, finger: PadId) -> Lookup<'_, Comparison> {

@@ -6,14 +6,14 @@ use super::super::results;
 use super::super::results::{Computes, Demands, Registered};
 use super::super::services::SharedServices;
 use super::super::state::{Lookup, State};
-use touch2touch_work::deviation::Deviation;
+use touch2touch_pipeline::compare::deviation::Deviation;
 
 impl Computes for DeviationKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Deviation>> {
         let Registered { clouds, tool, .. } = results::registered(state, &self.0)?;
         let pose = state.results.poses.get(&self.0)?.grasp_from_object;
         Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
-            Ok(touch2touch_work::deviation::deviation(&clouds, &tool.model, pose))
+            Ok(touch2touch_pipeline::compare::deviation::deviation(&clouds, &tool.model, pose))
         }))
     }
 }

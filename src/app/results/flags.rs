@@ -9,7 +9,7 @@ use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::postprocess::Flag;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::imprint::flags_of;
+use touch2touch_pipeline::steps::imprint::flags_of;
 
 impl Computes for FlagsKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Flag>>> {

@@ -5,8 +5,8 @@ use super::super::keys::{ImportPlanKey, Revision};
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::import::{Import, ImportSetup, plan_import};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::{Import, ImportSetup, plan_import};
 
 impl Computes for ImportPlanKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Import>> {

@@ -11,9 +11,9 @@ use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::compare::Beside;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::imprint;
+use touch2touch_pipeline::compare::Beside;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::imprint;
 
 impl Computes for MetersKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {

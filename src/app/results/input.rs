@@ -4,7 +4,7 @@ use super::super::state::{Absent, State};
 use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::BundleKind;
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 /// `Ok` where something can be generated for the selected pair.
 ///

@@ -10,7 +10,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::super::state::labels::Stored;
 use super::super::state::tasks::Level;
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 /// The name of the pair.
 fn name(state: &State, key: LabelsKey) -> Option<String> {

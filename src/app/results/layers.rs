@@ -10,7 +10,7 @@ use super::super::services::SharedServices;
 use super::super::state::{Lookup, State};
 use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::PerPad;
-use touch2touch_work::layers::LayerResult;
+use touch2touch_pipeline::steps::layers::LayerResult;
 
 impl Computes for LayersKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LayerResult>> {
@@ -21,7 +21,11 @@ impl Computes for LayersKey {
             results::mask_pixels(state, version.as_ref()?, imprint)
         });
         Some(Job::new(Lane::Compute, "Layers of the registration", move |_| {
-            touch2touch_work::layers::layers(&clouds, &masks.as_ref().map(|mask| mask.map(|mask| &**mask)), &run)
+            touch2touch_pipeline::steps::layers::layers(
+                &clouds,
+                &masks.as_ref().map(|mask| mask.map(|mask| &**mask)),
+                &run,
+            )
         }))
     }
 }

@@ -4,8 +4,8 @@ use super::super::keys::ImprintSource;
 use super::super::results;
 use super::super::state::State;
 use touch2touch_core::manual::{AcceptedPose, ManualPose, PoseDifference};
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::propose::hand_pose;
+use touch2touch_pipeline::labels::ImprintOf;
+use touch2touch_pipeline::masks::propose::hand_pose;
 
 /// The imprint that a pose is made from, where all fingers show the same.
 pub(crate) fn shown_imprint(state: &State, source: ImprintSource) -> Option<ImprintOf> {

@@ -18,8 +18,8 @@ use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::labels::{DrawnMask, MaskPlace};
-use touch2touch_work::mask::{self, MaskInputs};
+use touch2touch_pipeline::labels::{DrawnMask, MaskPlace};
+use touch2touch_pipeline::steps::mask::{self, MaskInputs};
 
 /// The pixels of a mask of an imprint; `None` if they are not there.
 pub(crate) fn mask_pixels(state: &State, version: &MaskVersion, imprint: &ImprintKey) -> Option<Arc<Mask>> {

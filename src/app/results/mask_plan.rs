@@ -5,7 +5,7 @@ use super::super::keys::{MaskPlanKey, Revision};
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use touch2touch_work::export::Plan;
+use touch2touch_pipeline::export::Plan;
 
 impl Computes for MaskPlanKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
@@ -15,7 +15,7 @@ impl Computes for MaskPlanKey {
     }
 
     /// The form says it.
-    fn failed(&self, _: &mut State, _: &touch2touch_work::error::TaskError) -> bool {
+    fn failed(&self, _: &mut State, _: &touch2touch_pipeline::error::TaskError) -> bool {
         false
     }
 }

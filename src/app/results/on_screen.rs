@@ -6,7 +6,7 @@ use super::super::results;
 use super::super::state::State;
 use super::super::state::workbench::Layer;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::propose::{CadAt, Takes};
+use touch2touch_pipeline::masks::propose::{CadAt, Takes};
 
 /// The need of the cloud of an imprint: true where the 3D views and what lies beside them need it (with its pose), and
 /// whether it is needed at all.

@@ -5,8 +5,8 @@ use super::super::keys::PictureKey;
 use super::super::results::{Computes, gone};
 use super::super::services::SharedServices;
 use super::super::state::State;
-use touch2touch_work::compare::{Beside, beside};
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::compare::{Beside, beside};
+use touch2touch_pipeline::error::TaskError;
 
 impl Computes for PictureKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {

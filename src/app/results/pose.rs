@@ -16,10 +16,10 @@ use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::which_tool::{Candidate, which_tool};
-use touch2touch_work::cloud::{Clouds, images};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::pose::{self, PoseResult};
-use touch2touch_work::tool::NamedTool;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::cloud::{Clouds, images};
+use touch2touch_pipeline::steps::pose::{self, PoseResult};
+use touch2touch_pipeline::steps::tool::NamedTool;
 
 /// The inputs of every job about a pose: what is registered.
 pub(crate) struct Registered {

@@ -15,11 +15,11 @@ use super::super::state::State;
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::job::JobCx;
-use touch2touch_work::models;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::models;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for PredictionKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {

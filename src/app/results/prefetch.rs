@@ -11,7 +11,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::super::{recipe, results};
 use touch2touch_core::rig::PadId;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// The highest cost of a prediction that is made without being asked for, seconds.
 pub(crate) const CHEAP_S: f64 = 1.0;

@@ -7,7 +7,7 @@ use super::super::keys::{ImprintSource, PredictionKey, Preview, ShiftMode, Touch
 use super::super::pane::Demand;
 use super::super::state::State;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::job::{PreviewPicture, Previews};
+use touch2touch_pipeline::job::{PreviewPicture, Previews};
 
 /// Receives pictures on the way.
 pub(crate) type PreviewSink = Arc<dyn Fn(Preview) + Send + Sync>;

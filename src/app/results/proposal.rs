@@ -16,10 +16,10 @@ use touch2touch_core::contact::ContactMask;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::labels::MaskPlace;
-use touch2touch_work::on_pad::OnPad;
-use touch2touch_work::propose::{self, CadAt, OtherPair, Proposal, Side, Takes, hand_pose};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::MaskPlace;
+use touch2touch_pipeline::masks::propose::{self, CadAt, OtherPair, Proposal, Side, Takes, hand_pose};
+use touch2touch_pipeline::steps::on_pad::OnPad;
 
 const WHAT: &str = "Propose a mask";
 

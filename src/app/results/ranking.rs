@@ -11,8 +11,8 @@ use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Lookup, State};
 use touch2touch_core::which_tool::Candidate;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::tool::{NamedTool, named_tool};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
 
 impl Computes for RankingKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Candidate>>> {

@@ -7,7 +7,7 @@ use super::super::results::Computes;
 use super::super::services::SharedServices;
 use super::super::state::State;
 use touch2touch_core::align::Ask;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 impl Computes for RunKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {

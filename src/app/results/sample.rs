@@ -8,7 +8,7 @@ use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 impl Computes for PairKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Sample>> {

@@ -10,9 +10,9 @@ use super::super::results::{Computes, Demands};
 use super::super::scores::ScoreTable;
 use super::super::services::SharedServices;
 use super::super::state::State;
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
-use touch2touch_work::evaluate::{self, Setup};
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::scores::evaluate::{self, Setup};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 impl Computes for ScoresKey {
     fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ScoreTable>> {

@@ -10,7 +10,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use super::super::state::tasks::TaskKind;
 use super::scores::{evaluation_setup, key_of};
-use touch2touch_work::evaluate::{self, Evaluation};
+use touch2touch_pipeline::scores::evaluate::{self, Evaluation};
 
 /// The recipe of the table, as the choices are now.
 fn table_key(state: &State) -> Option<TableKey> {

@@ -8,7 +8,7 @@ use super::super::services::SharedServices;
 use super::super::state::State;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
-use touch2touch_work::imprint;
+use touch2touch_pipeline::steps::imprint;
 
 impl Computes for ThumbnailKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {

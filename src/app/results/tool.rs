@@ -5,8 +5,8 @@ use super::super::keys::ToolKey;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::tool::{NamedTool, named_tool};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
 
 impl Computes for ToolKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<NamedTool>> {

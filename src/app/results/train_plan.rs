@@ -7,10 +7,10 @@ use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
 use super::super::state::tasks::TaskKind;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::DrawnMasks;
-use touch2touch_work::labels::Labels;
-use touch2touch_work::train::{TrainPlan, plan};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::DrawnMasks;
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::learn::train::{TrainPlan, plan};
 
 impl Computes for TrainPlanKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<TrainPlan>> {

@@ -17,14 +17,14 @@ use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::cloud::Clouds;
-use touch2touch_work::compare::{Comparison, Depicted, between, tile_of};
-use touch2touch_work::depict::mean;
-use touch2touch_work::deviation::{CloudDifference, cloud_difference};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::prediction::Prediction;
-use touch2touch_work::subject::{MadeFrom, RecipeChange, Subject};
+use touch2touch_pipeline::compare::depict::mean;
+use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
+use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
+use touch2touch_pipeline::compare::{Comparison, Depicted, between, tile_of};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 impl Computes for MeanKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {

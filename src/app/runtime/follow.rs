@@ -9,11 +9,11 @@ use super::super::keys::DatasetSeq;
 use super::super::source::{DataSource, Followed};
 use super::lanes::Event;
 use super::{JobId, Runtime, Wake};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::follow::{FollowEvent, Following};
-use touch2touch_work::io::caught::caught;
-use touch2touch_work::io::follow::Arrival;
-use touch2touch_work::job::Cancel;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::follow::{FollowEvent, Following};
+use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::follow::Arrival;
+use touch2touch_pipeline::job::Cancel;
 
 /// A followed folder.
 pub(super) enum FollowTask {

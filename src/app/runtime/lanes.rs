@@ -12,9 +12,9 @@ use super::super::jobs::{self, Body, Lane};
 use super::super::keys::DatasetSeq;
 use super::super::state::results::{Computed, Request};
 use super::{JobId, Wake, lock};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::caught::caught;
-use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::job::{Cancel, JobCx};
 
 /// The end of a job.
 pub(super) struct Event {

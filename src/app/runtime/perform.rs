@@ -14,9 +14,9 @@ use super::super::state::tasks::Ticket;
 use super::super::state::view::UiRequest;
 use super::lanes::{Event, Job};
 use super::{JobId, Runtime, lock};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::folders;
-use touch2touch_work::job::{Cancel, JobCx};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::folders;
+use touch2touch_pipeline::job::{Cancel, JobCx};
 
 impl Runtime {
     pub(super) fn perform(&mut self, effect: Effect, ui: &mut Vec<UiRequest>) {

@@ -22,24 +22,24 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sample::Sample;
-use touch2touch_work::bundles::{self, BundleInfo};
-use touch2touch_work::doubts;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
-use touch2touch_work::follow::Following;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::infer::store::{self, Store};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::io::masks::FOLDER;
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::io::{atomic, files, folders};
-use touch2touch_work::job::JobCx;
-use touch2touch_work::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
-use touch2touch_work::models::{GenerateInput, KeptPrediction, Models};
-use touch2touch_work::new_bundle::models_folder;
-use touch2touch_work::prediction::Prediction;
-use touch2touch_work::tool::tool_file;
-use touch2touch_work::tuning::unfinished_folder;
+use touch2touch_pipeline::doubts;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::{self, DrawnMasks, ExportChoice, ExportSetup, Plan};
+use touch2touch_pipeline::follow::Following;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::infer::store::{self, Store};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::masks::FOLDER;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::io::{atomic, files, folders};
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{JournalHistory, Labels, Operation, Recovered, Reviews, Unsaved, recover};
+use touch2touch_pipeline::learn::new_bundle::models_folder;
+use touch2touch_pipeline::learn::tuning::unfinished_folder;
+use touch2touch_pipeline::steps::bundles::{self, BundleInfo};
+use touch2touch_pipeline::steps::models::{GenerateInput, KeptPrediction, Models};
+use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::steps::tool::tool_file;
 
 /// Longer than a key that is held down leaves a pair on screen.
 const PATIENCE: Duration = Duration::from_millis(150);
@@ -421,19 +421,19 @@ mod tests {
     use touch2touch_core::manual::{AcceptedPose, ManualPose};
     use touch2touch_core::postprocess::ShiftMode;
     use touch2touch_core::rig::lab;
-    use touch2touch_work::export::{LeftOut, Which};
-    use touch2touch_work::io::masks::MaskStore;
-    use touch2touch_work::labels::ImprintOf;
-    use touch2touch_work::labels::Review;
-    use touch2touch_work::labels::{DrawnMask, MaskPlace, Revision};
-    use touch2touch_work::subject::Subject;
+    use touch2touch_pipeline::compare::subject::Subject;
+    use touch2touch_pipeline::export::{LeftOut, Which};
+    use touch2touch_pipeline::io::masks::MaskStore;
+    use touch2touch_pipeline::labels::ImprintOf;
+    use touch2touch_pipeline::labels::Review;
+    use touch2touch_pipeline::labels::{DrawnMask, MaskPlace, Revision};
 
     /// A folder with one pair of pictures.
     fn pictures(folder: &Path) {
         let gray = touch2touch_core::grid::Grid::from_fn(32, 32, |x, y| (x * 4 + y) as u8);
         let rgb = RgbGrid::from_fn(32, 32, |x, y| [x as f32, y as f32, 9.0]);
-        touch2touch_work::io::images::write_gray8(&folder.join("a_bubble.png"), &gray).unwrap();
-        touch2touch_work::io::images::write_rgb8(&folder.join("a_gelslim.png"), &rgb).unwrap();
+        touch2touch_pipeline::io::images::write_gray8(&folder.join("a_bubble.png"), &gray).unwrap();
+        touch2touch_pipeline::io::images::write_rgb8(&folder.join("a_gelslim.png"), &rgb).unwrap();
     }
 
     fn labels() -> PairLabels {

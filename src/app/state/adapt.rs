@@ -3,7 +3,7 @@
 use std::ops::RangeInclusive;
 use std::sync::Arc;
 
-use touch2touch_work::adapt::Adapted;
+use touch2touch_pipeline::learn::adapt::Adapted;
 
 /// Parts in which pairs are left out in turn.
 pub(in crate::app) const FOLDS: usize = 3;

@@ -7,8 +7,8 @@ use super::super::keys::TableKey;
 use super::super::scores::{ScoreTable, SourceScores};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Condition, Metric, Row, paper_rows};
-use touch2touch_work::evaluate::Evaluation;
-use touch2touch_work::queue::QueueBy;
+use touch2touch_pipeline::masks::queue::QueueBy;
+use touch2touch_pipeline::scores::evaluate::Evaluation;
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];

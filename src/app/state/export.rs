@@ -2,9 +2,9 @@
 
 use super::super::keys::{ImportForm, ImprintSource};
 use super::super::pane::Pane;
-use touch2touch_work::export::ExportChoice;
-use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
-use touch2touch_work::space::{Ground, SpacePane, ViewAngles};
+use touch2touch_pipeline::export::ExportChoice;
+use touch2touch_pipeline::images::figure::{FigureLook, FigurePane, FigureTheme};
+use touch2touch_pipeline::images::space::{Ground, SpacePane, ViewAngles};
 
 /// Pairs of the list that a figure may take.
 pub(crate) const MOST_PAIRS: usize = 50;

@@ -6,7 +6,7 @@ use super::super::keys::Revision;
 use super::labels::{Document, DrawnMask, MaskPlace, Review};
 use touch2touch_core::label::PackedMask;
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_work::labels::{Change, ImprintOf, Past};
+use touch2touch_pipeline::labels::{Change, ImprintOf, Past};
 
 /// A corrected mask in few bytes.
 #[derive(Clone, Debug, PartialEq)]
@@ -288,8 +288,8 @@ mod tests {
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
     use touch2touch_core::rig::{PadId, lab};
-    use touch2touch_work::io::predicted_id::PredictedId;
-    use touch2touch_work::labels::ImprintOf;
+    use touch2touch_pipeline::io::predicted_id::PredictedId;
+    use touch2touch_pipeline::labels::ImprintOf;
 
     fn hand(doc: &mut Document, pair: &str, finger: PadId) -> DrawnMask {
         let hand = DrawnMask::new(Mask::filled(8, 4, false), Provenance::Nothing);

@@ -8,10 +8,10 @@ use super::super::keys::{ImprintSource, PoseKey, Revision};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, VisiblePixels};
 use touch2touch_core::rig::PadId;
-use touch2touch_work::error::TaskError;
-pub use touch2touch_work::labels::{DrawnMask, MaskPlace, PairLabels, Review};
-use touch2touch_work::progress::Progress;
-use touch2touch_work::propose::Proposal;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::progress::Progress;
+pub use touch2touch_pipeline::labels::{DrawnMask, MaskPlace, PairLabels, Review};
+use touch2touch_pipeline::masks::propose::Proposal;
 
 /// The outcome of reading the stored labels of a pair.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -14,9 +14,9 @@ use super::evaluate::TableState;
 use super::labels::Document;
 use touch2touch_core::dataset::{Index, PairEntry, PairId};
 use touch2touch_core::rig::{Rig, SensorKind};
-use touch2touch_work::bundles::{BundleInfo, BundleKind, by_id};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::filter::Filter;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::labels::filter::Filter;
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind, by_id};
 
 /// A place that can be opened.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]

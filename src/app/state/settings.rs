@@ -18,13 +18,13 @@ use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
 use touch2touch_core::postprocess::RefitShift;
 use touch2touch_core::units::clamp_or;
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::figure::{FigureLook, FigurePane, FigureTheme};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::labels::system_person;
-pub use touch2touch_work::mask::{MaskChoice, MaskSource};
-pub use touch2touch_work::propose::ProposalSource;
-pub use touch2touch_work::space::SpacePane;
+use touch2touch_pipeline::images::figure::{FigureLook, FigurePane, FigureTheme};
+pub use touch2touch_pipeline::images::space::SpacePane;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::labels::system_person;
+pub use touch2touch_pipeline::masks::propose::ProposalSource;
+use touch2touch_pipeline::steps::bundles::BundleInfo;
+pub use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
 use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::super::keys::{PredictionKey, TouchKey};
 use super::super::state::cache::Cache;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// The predictions that are shown where the settings do not name one that is there.
 #[derive(Clone, Debug, Default)]

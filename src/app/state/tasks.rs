@@ -6,8 +6,8 @@ use std::path::PathBuf;
 use super::super::jobs::Lane;
 use super::super::keys::{DatasetSeq, PredictionKey};
 use super::super::state::results::Request;
-use touch2touch_work::error::{TaskError, TaskErrorKind};
-use touch2touch_work::job::Progress;
+use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
+use touch2touch_pipeline::job::Progress;
 
 /// The name of a running job.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]

@@ -4,8 +4,8 @@ use std::ops::RangeInclusive;
 use std::sync::Arc;
 use std::time::Duration;
 
-use touch2touch_work::train::{TrainChoice, Trained};
-use touch2touch_work::tuning::Tuning;
+use touch2touch_pipeline::learn::train::{TrainChoice, Trained};
+use touch2touch_pipeline::learn::tuning::Tuning;
 
 /// Minutes that can be asked for.
 pub(crate) const MINUTES: RangeInclusive<u32> = 1..=600;

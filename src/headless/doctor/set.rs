@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, Readings, parse_readings};
 use super::super::{Common, Output, VerbResult};
-use touch2touch_work::doubts::read_otherwise;
-use touch2touch_work::io::dataset::{Dataset, ToolUnit};
-use touch2touch_work::tool::{set_unit, units_of};
+use touch2touch_pipeline::doubts::read_otherwise;
+use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
+use touch2touch_pipeline::steps::tool::{set_unit, units_of};
 
 /// Something to say of a data set.
 #[derive(Debug, Clone)]

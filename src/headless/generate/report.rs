@@ -8,7 +8,7 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::metrics::{self, Unstretched};
 use touch2touch_core::rig::Text;
 use touch2touch_core::sample::Scale;
-use touch2touch_work::compare::Comparison;
+use touch2touch_pipeline::compare::Comparison;
 
 /// Unit of a prediction's errors.
 #[derive(Clone, Copy, PartialEq, Eq)]

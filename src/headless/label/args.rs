@@ -12,8 +12,8 @@ use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_core::pose::Registration;
-use touch2touch_work::labels::{ImprintSource, Review};
-use touch2touch_work::propose::ProposalSource;
+use touch2touch_pipeline::labels::{ImprintSource, Review};
+use touch2touch_pipeline::masks::propose::ProposalSource;
 
 /// Arguments of `label`.
 #[derive(Debug, Args)]

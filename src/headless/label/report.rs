@@ -6,9 +6,9 @@ use serde::Serialize;
 
 use touch2touch_core::grid::Mask;
 use touch2touch_core::manual::AcceptedPose;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::labels::{ImprintOf, PairLabels};
-use touch2touch_work::progress::Counts;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::labels::progress::Counts;
+use touch2touch_pipeline::labels::{ImprintOf, PairLabels};
 
 /// Labels that are stored of a pair.
 #[derive(Debug, Serialize)]

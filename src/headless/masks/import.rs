@@ -6,8 +6,8 @@ use clap::Args;
 
 use super::super::args::{DatasetArgs, keyed};
 use super::super::{Common, Output, VerbResult};
-use touch2touch_work::import::{ImportSetup, import_masks, plan_import};
-use touch2touch_work::io::exchange::Format;
+use touch2touch_pipeline::export::import::{ImportSetup, import_masks, plan_import};
+use touch2touch_pipeline::io::exchange::Format;
 
 /// Arguments of `masks import`.
 #[derive(Debug, Args)]

@@ -8,9 +8,9 @@ use super::super::recipe::ModelArgs;
 use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
 use touch2touch_core::dataset::{PairEntry, PairId};
 use touch2touch_core::pose::Registration;
-use touch2touch_work::filter::Filter;
-use touch2touch_work::labels::{ImprintSource, Labels};
-use touch2touch_work::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
+use touch2touch_pipeline::labels::filter::Filter;
+use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::masks::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
 
 /// Arguments of `masks propose`.
 #[derive(Debug, Args)]

@@ -11,12 +11,12 @@ use super::super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
 use super::super::{Common, Output, ToolArgs, VerbResult, cache};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::Registration;
-use touch2touch_work::evaluate::Setup;
-use touch2touch_work::infer::bundle::{Bundle, find_all};
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::labels::{Labels, Review};
-use touch2touch_work::models::Models;
-use touch2touch_work::queue::{Line, QueueBy, queue};
+use touch2touch_pipeline::infer::bundle::{Bundle, find_all};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::labels::{Labels, Review};
+use touch2touch_pipeline::masks::queue::{Line, QueueBy, queue};
+use touch2touch_pipeline::scores::evaluate::Setup;
+use touch2touch_pipeline::steps::models::Models;
 
 /// Arguments of `masks queue`.
 #[derive(Debug, Args)]

@@ -11,13 +11,15 @@ use super::super::recipe::RuntimeArg;
 use super::super::{Common, Output, VerbResult, cache};
 use touch2touch_core::pose::Registration;
 use touch2touch_core::units::counted;
-use touch2touch_work::bundles::{self, BundleKind};
-use touch2touch_work::export::DrawnMasks;
-use touch2touch_work::labels::Labels;
-use touch2touch_work::models::Models;
-use touch2touch_work::new_bundle::models_folder;
-use touch2touch_work::train::{MaskScore, MasksFrom, TrainChoice, TrainSetup, Trained, new_folder, plan, train};
-use touch2touch_work::tuning::{Tuning, unfinished_folder};
+use touch2touch_pipeline::export::DrawnMasks;
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::learn::new_bundle::models_folder;
+use touch2touch_pipeline::learn::train::{
+    MaskScore, MasksFrom, TrainChoice, TrainSetup, Trained, new_folder, plan, train,
+};
+use touch2touch_pipeline::learn::tuning::{Tuning, unfinished_folder};
+use touch2touch_pipeline::steps::bundles::{self, BundleKind};
+use touch2touch_pipeline::steps::models::Models;
 
 /// Trained for so long where nothing is said.
 const MINUTES: f64 = 10.0;
@@ -145,8 +147,8 @@ fn text(trained: &Trained) -> String {
     };
     for one in &trained.held_out {
         let imprint = match one.imprint {
-            touch2touch_work::labels::ImprintSource::Measured => "",
-            touch2touch_work::labels::ImprintSource::Predicted => ", predicted",
+            touch2touch_pipeline::labels::ImprintSource::Measured => "",
+            touch2touch_pipeline::labels::ImprintSource::Predicted => ", predicted",
         };
         lines.push(row(one.before, one.after, &format!("{}, {}{imprint}", one.pair, one.finger)));
     }

@@ -12,8 +12,8 @@ use touch2touch_core::align::{LabIcpConfig, PaperTrap, Register, lab_starts};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::recipe::Recipe;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Arguments of `pose`.
 #[derive(Debug, Args)]

@@ -11,9 +11,9 @@ use strum::IntoEnumIterator as _;
 use super::super::args::keyed;
 use touch2touch_core::diffusion::{GUIDANCE, Preset, Sampler};
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
-use touch2touch_work::bundles::{self, BundleKind, FoundBundles};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::recipe::ShiftChoice;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::steps::bundles::{self, BundleKind, FoundBundles};
+use touch2touch_pipeline::steps::recipe::ShiftChoice;
 
 /// Models, and how they are run.
 #[derive(Debug, Clone, Args)]

@@ -13,9 +13,9 @@ use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, Text};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::verdict::Verdict;
-use touch2touch_work::compare;
-use touch2touch_work::mask::Contact;
-use touch2touch_work::prediction::Prediction;
+use touch2touch_pipeline::compare;
+use touch2touch_pipeline::steps::mask::Contact;
+use touch2touch_pipeline::steps::prediction::Prediction;
 
 /// Metrics of one finger.
 #[derive(Debug, Clone, Serialize)]

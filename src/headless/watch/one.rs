@@ -15,17 +15,17 @@ use super::{Source, WatchArgs, recipe, write};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::compare;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::feel::{Touch, feel};
-use touch2touch_work::io::dataset::{Dataset, read_in_meters};
-use touch2touch_work::io::follow::Ready;
-use touch2touch_work::job::{Cancel, JobCx};
-use touch2touch_work::labels::{ImprintSource, PairLabels};
-use touch2touch_work::models::Models;
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::recipe::{Recipe, Stage};
-use touch2touch_work::tool::{load_tool, named_tool};
+use touch2touch_pipeline::compare;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::dataset::{Dataset, read_in_meters};
+use touch2touch_pipeline::io::follow::Ready;
+use touch2touch_pipeline::job::{Cancel, JobCx};
+use touch2touch_pipeline::labels::{ImprintSource, PairLabels};
+use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::models::Models;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
+use touch2touch_pipeline::steps::tool::{load_tool, named_tool};
 
 /// The tool of a touch.
 pub(super) struct HeldTool {
@@ -102,26 +102,26 @@ impl<'a> Worker<'a> {
         let mut latency = Latency { found: since(ready.stamp.closed, found), load, ..Latency::default() };
 
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
-        let felt = match feel(touch, &self.recipe, Stage::Imprint, &self.models, &cx) {
+        let estimate = match estimate(touch, &self.recipe, Stage::Imprint, &self.models, &cx) {
             Err(_) if self.stop.is_cancelled() => return Ok(None),
-            Ok(felt) if felt.predictions.is_empty() => {
+            Ok(estimate) if estimate.predictions.is_empty() => {
                 return Err(self.recipe.generating()?.no_input(&sample.rig).into());
             }
-            felt => felt?,
+            estimate => estimate?,
         };
         latency.generate = ms(read);
         let step = Instant::now();
-        let felt = felt.reach(touch, Stage::Mask, &self.models, &cx)?;
+        let estimate = estimate.reach(touch, Stage::Mask, &self.models, &cx)?;
         latency.mask = ms(step);
         let step = Instant::now();
-        let felt = felt.reach(touch, Stage::Pose, &self.models, &cx)?;
+        let estimate = estimate.reach(touch, Stage::Pose, &self.models, &cx)?;
         // Without a tool, that is the reason, whatever else is missing.
-        let (pose, no_pose) = match (tool, touch.tool.and(felt.pose())) {
+        let (pose, no_pose) = match (tool, touch.tool.and(estimate.pose())) {
             (Some(name), Ok(found)) => (Some(PoseMetrics::new(name, found)), None),
             (_, Err(err)) => (None, Some(err.why.clone())),
             (None, Ok(_)) => (None, None),
         };
-        let (contact, shift) = (felt.contact(), self.recipe.shift);
+        let (contact, shift) = (estimate.contact(), self.recipe.shift);
         latency.pose = ms(step);
 
         let step = Instant::now();
@@ -129,7 +129,7 @@ impl<'a> Worker<'a> {
         latency.write = ms(step);
         latency.total = since(ready.stamp.closed, SystemTime::now());
         let tile = compare::tile_of(touch.dataset, touch.pair, sample)?;
-        let drawn = |pad: PadId| Some((felt.predictions[pad].as_ref()?, shift));
+        let drawn = |pad: PadId| Some((estimate.predictions[pad].as_ref()?, shift));
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),

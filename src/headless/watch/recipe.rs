@@ -6,9 +6,9 @@ use serde_json::{Value, json};
 
 use super::WatchArgs;
 use touch2touch_core::grid::Mask;
-use touch2touch_work::infer::engine::resolve;
-use touch2touch_work::labels::PairLabels;
-use touch2touch_work::recipe::{Recipe, Stage};
+use touch2touch_pipeline::infer::engine::resolve;
+use touch2touch_pipeline::labels::PairLabels;
+use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 
 /// Everything the result depends on besides the touch.
 pub(super) fn told(

@@ -10,10 +10,10 @@ use super::Source;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::rig::{Rig, Text};
-use touch2touch_work::io::names::OUTPUT_MARK;
-use touch2touch_work::io::pt::{PtItem, Tensor};
-use touch2touch_work::io::{atomic, files, images, names, npz, pt};
-use touch2touch_work::mask::Contact;
+use touch2touch_pipeline::io::names::OUTPUT_MARK;
+use touch2touch_pipeline::io::pt::{PtItem, Tensor};
+use touch2touch_pipeline::io::{atomic, files, images, names, npz, pt};
+use touch2touch_pipeline::steps::mask::Contact;
 
 /// A form of the prediction.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

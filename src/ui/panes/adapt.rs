@@ -14,7 +14,7 @@ use crate::ui::parts::theme::{SMALL, caption, section};
 use crate::ui::parts::thumbnail;
 use crate::ui::parts::widget::{curves, empty};
 use touch2touch_core::units::{fixed, mm};
-use touch2touch_work::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
+use touch2touch_pipeline::learn::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
 
 /// Between pictures, points.
 const GAP: f32 = 6.0;

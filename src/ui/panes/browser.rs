@@ -23,7 +23,7 @@ use crate::ui::parts::widget::texture::depth_image;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::units::counted;
-use touch2touch_work::queue::QueueBy;
+use touch2touch_pipeline::masks::queue::QueueBy;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;

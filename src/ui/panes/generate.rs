@@ -13,7 +13,7 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
 use touch2touch_core::diffusion::GUIDANCE;
 use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
-use touch2touch_work::bundles::{BundleInfo, BundleKind};
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
 const LABEL: f32 = 60.0;

@@ -32,8 +32,8 @@ use touch2touch_core::rig::{PadId, Sensor, SensorKind};
 use touch2touch_core::sample::Scale;
 use touch2touch_core::turn::Turn;
 use touch2touch_core::units;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::error::{TaskError, UnitOffer};
+use touch2touch_pipeline::error::{TaskError, UnitOffer};
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 /// Stroke on the images, and outlines of masks.
 #[derive(Default)]

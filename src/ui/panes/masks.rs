@@ -21,7 +21,7 @@ use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED, SMALL, caption, sectio
 use crate::ui::parts::widget::icon::{self, Icon};
 use touch2touch_core::label::{DrawTool, Layers, Paint};
 use touch2touch_core::units;
-use touch2touch_work::labels::MAX_NOTE;
+use touch2touch_pipeline::labels::MAX_NOTE;
 
 /// The note being typed.
 #[derive(Default)]

@@ -17,9 +17,9 @@ use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
-use touch2touch_work::compare::Comparison;
-use touch2touch_work::labels::ImprintOf;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_pipeline::compare::Comparison;
+use touch2touch_pipeline::labels::ImprintOf;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();

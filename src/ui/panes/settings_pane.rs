@@ -9,8 +9,8 @@ use crate::app::command::Pane;
 use crate::app::settings::{ColorMap, MAX_CACHE_MIB, Theme};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{caption, section};
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::labels::system_person;
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::labels::system_person;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();

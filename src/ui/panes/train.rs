@@ -14,9 +14,9 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section};
 use crate::ui::parts::widget::curves;
 use touch2touch_core::units::counted;
-use touch2touch_work::bundles::BundleKind;
-use touch2touch_work::labels::ImprintSource;
-use touch2touch_work::train::{MaskScore, MasksFrom, Trained};
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::learn::train::{MaskScore, MasksFrom, Trained};
+use touch2touch_pipeline::steps::bundles::BundleKind;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();

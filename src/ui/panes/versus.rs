@@ -25,7 +25,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
 
 /// Memory of the comparison.
 pub(crate) struct Memory {

@@ -8,7 +8,7 @@ use eframe::egui::{self, Key, RichText};
 
 use crate::app::export::Output;
 use crate::ui::parts::theme::{Palette, caption};
-use touch2touch_work::io::dataset::BuiltIn;
+use touch2touch_pipeline::io::dataset::BuiltIn;
 
 /// A dialog that ends empty sooner than a person could have closed it was never shown.
 const NEVER_SHOWN: Duration = Duration::from_millis(700);

@@ -15,7 +15,7 @@ use strum::IntoEnumIterator as _;
 pub use super::lost::Loss;
 use super::pane::{Docking, Panes};
 use super::screenshot::Shot;
-use super::{about, bars, export, layout, lost, palette, pane, shortcuts, unsaved};
+use super::{bars, doctor, export, layout, lost, palette, pane, shortcuts, unsaved};
 use crate::app::action::Action;
 use crate::app::command::{
     Command, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand,
@@ -41,9 +41,9 @@ use crate::ui::parts::scene_view::Device;
 use crate::ui::parts::theme;
 use crate::ui::parts::theme::{DARK, LIGHT};
 use touch2touch_core::rig::SensorKind;
-use touch2touch_work::error::TaskError;
-use touch2touch_work::fonts;
-use touch2touch_work::io::caught::caught;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::images::fonts;
+use touch2touch_pipeline::io::caught::caught;
 
 /// Options that the studio is started with.
 pub struct Options {
@@ -562,7 +562,7 @@ impl eframe::App for StudioApp {
                 }
             });
             bars::hint(&mut cx, &ctx);
-            about::panel(&mut cx, &ctx);
+            doctor::panel(&mut cx, &ctx);
             export::form(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             export::import::form(&mut cx, &ctx);

@@ -14,9 +14,9 @@ use crate::app::keys::ImprintSource;
 use crate::app::pane::Kind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
-use touch2touch_work::figure::{FigurePane, FigureTheme};
-use touch2touch_work::space::Ground;
-use touch2touch_work::still::WIDTH_PX;
+use touch2touch_pipeline::images::figure::{FigurePane, FigureTheme};
+use touch2touch_pipeline::images::space::Ground;
+use touch2touch_pipeline::images::still::WIDTH_PX;
 
 /// The form of a figure, where it is open. It blocks nothing: pairs and colors can be changed beside it.
 pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {

@@ -8,7 +8,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use eframe::egui::Context;
 
 use crate::gpu::wgpu;
-use touch2touch_work::error::TaskError;
+use touch2touch_pipeline::error::TaskError;
 
 /// Tells the program that it was started again, and when: seconds since 1970.
 const STARTED_AGAIN: &str = "TOUCH2TOUCH_STARTED_AGAIN";

@@ -6,8 +6,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use eframe::egui::{self, ColorImage, Rect};
 
 use crate::app::command::{Command, TasksCommand};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::io::folders;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::folders;
 
 /// Use of a picture of the window.
 #[derive(Clone, Copy, Debug)]

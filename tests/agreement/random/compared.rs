@@ -6,8 +6,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{Versus, VersusMode};
-use touch2touch_work::compare::Comparison;
-use touch2touch_work::subject::{Mapping, RecipeChange, Subject};
+use touch2touch_pipeline::compare::Comparison;
+use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, Subject};
 
 use super::*;
 

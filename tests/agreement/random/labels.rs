@@ -7,10 +7,10 @@ use touch2touch::app::settings::{MaskTool, ProposalSource, prefer};
 use touch2touch::app::{recipe, results};
 use touch2touch_core::label::{CleanKind, CleanUp};
 use touch2touch_core::rig::lab;
-use touch2touch_work::io::dataset::Dataset;
-use touch2touch_work::labels::Labels;
-use touch2touch_work::mask::MaskSource;
-use touch2touch_work::recipe::Stage;
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::steps::mask::MaskSource;
+use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
 

@@ -4,8 +4,8 @@ use touch2touch::app::command::{AdaptCommand, TrainCommand};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::train::TrainForm;
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_work::mask::{MaskChoice, MaskSource};
-use touch2touch_work::train::TrainChoice;
+use touch2touch_pipeline::learn::train::TrainChoice;
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
 
 use super::*;
 use crate::training::{bytes, corrected};
@@ -59,7 +59,7 @@ pub(in crate::agreement) fn a_training_is_the_same_by_button_and_verb() {
     let choice = TrainChoice { held_out_percent: 40, seed: 7, ..TrainChoice::default() };
     both.studio
         .send(TrainCommand::SetForm(TrainForm { choice, by_steps: true, steps: 3, ..TrainForm::default() }).into());
-    both.studio.send(prefer(|s| s.runtime = touch2touch_work::infer::engine::EngineChoice::Rten).into());
+    both.studio.send(prefer(|s| s.runtime = touch2touch_pipeline::infer::engine::EngineChoice::Rten).into());
     let out = ["--out".to_owned(), both.at("trained")];
     let words = [both.words(Pane::Train), out.to_vec()].concat();
     both.studio.send(TrainCommand::Start.into());

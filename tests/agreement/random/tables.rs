@@ -4,9 +4,9 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::command::EvaluateCommand;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::postprocess::ShiftMode;
-use touch2touch_work::io::names::Outputs;
-use touch2touch_work::queue::QueueBy;
-use touch2touch_work::recipe::Stage;
+use touch2touch_pipeline::io::names::Outputs;
+use touch2touch_pipeline::masks::queue::QueueBy;
+use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
 

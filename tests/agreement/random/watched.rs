@@ -6,10 +6,10 @@ use touch2touch::app::command::FollowCommand;
 use touch2touch_core::catalog;
 use touch2touch_core::postprocess::Stats;
 use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
-use touch2touch_work::io::pt::Tensor;
-use touch2touch_work::io::simulated::{Layout, write_pair};
-use touch2touch_work::mask::MaskSource;
-use touch2touch_work::recipe::Stage;
+use touch2touch_pipeline::io::pt::Tensor;
+use touch2touch_pipeline::io::simulated::{Layout, write_pair};
+use touch2touch_pipeline::steps::mask::MaskSource;
+use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
 use touch2touch::app::{recipe, results};
@@ -36,7 +36,8 @@ fn same_touch(both: &Both, written_by: &Path, what: &str) -> usize {
         let px = in_force.mask.as_slice().iter().filter(|&&on| on).count();
         assert_eq!(finger["contact_px"], px, "{what}");
         let compared = results::comparison(state, pad).ready();
-        let figure = |get: fn(&touch2touch_work::compare::Comparison) -> Option<f64>| written(&compared.and_then(get));
+        let figure =
+            |get: fn(&touch2touch_pipeline::compare::Comparison) -> Option<f64>| written(&compared.and_then(get));
         let none = Value::Null;
         let of = |key: &str| finger.get(key).unwrap_or(&none).clone();
         count += same(&figure(|c| c.psnr_db), &of("psnr_db"), &what) + same(&figure(|c| c.ssim), &of("ssim"), &what);

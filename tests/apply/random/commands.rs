@@ -8,13 +8,13 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
-use touch2touch::app::about::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
-    AboutCommand, AdaptCommand, Answer, CameraPreset, Command, EvaluateCommand, ExportCommand, FollowCommand, Hover,
+    AdaptCommand, Answer, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
     InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand,
     UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
+use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
 use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
@@ -44,24 +44,24 @@ use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
 use touch2touch_core::manual::{ManualPose, PoseAxis};
 use touch2touch_core::pose::Gate;
 use touch2touch_core::rig::{PadId, lab};
-use touch2touch_work::about::{Cure, Examined, Worth};
-use touch2touch_work::error::TaskError;
-use touch2touch_work::evaluate::{Evaluation, Setup};
-use touch2touch_work::export::{ExportChoice, Which};
-use touch2touch_work::figure::FigurePane;
-use touch2touch_work::import::Import;
-use touch2touch_work::infer::engine::EngineChoice;
-use touch2touch_work::io::dataset::ToolUnit;
-use touch2touch_work::io::exchange::Format;
-use touch2touch_work::io::statistics::ShiftStatistics;
-use touch2touch_work::job::{PreviewPicture, Progress};
-use touch2touch_work::labels::Operation;
-use touch2touch_work::propose::Batch;
-use touch2touch_work::queue::QueueBy;
-use touch2touch_work::space::{Ground, ViewAngles};
-use touch2touch_work::subject::Subject;
-use touch2touch_work::tool::UnitSet;
-use touch2touch_work::train::{MasksFrom, TrainChoice};
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::doctor::{Cure, Examined, Worth};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::Import;
+use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::images::figure::FigurePane;
+use touch2touch_pipeline::images::space::{Ground, ViewAngles};
+use touch2touch_pipeline::infer::engine::EngineChoice;
+use touch2touch_pipeline::io::dataset::ToolUnit;
+use touch2touch_pipeline::io::exchange::Format;
+use touch2touch_pipeline::io::statistics::ShiftStatistics;
+use touch2touch_pipeline::job::{PreviewPicture, Progress};
+use touch2touch_pipeline::labels::Operation;
+use touch2touch_pipeline::learn::train::{MasksFrom, TrainChoice};
+use touch2touch_pipeline::masks::propose::Batch;
+use touch2touch_pipeline::masks::queue::QueueBy;
+use touch2touch_pipeline::scores::evaluate::{Evaluation, Setup};
+use touch2touch_pipeline::steps::tool::UnitSet;
 
 use super::super::answered::{adapted, trained};
 use super::super::double::Double;
@@ -525,7 +525,7 @@ draws! {
         1 Place(output()),
         1 Write(output(), Just(PathBuf::from("/dev/null/folder/picture.png"))),
     }
-    about: AboutCommand {
+    about: DoctorCommand {
         2 Show(any::<bool>()),
         1 Try,
         3 Cure(cure()),
@@ -614,7 +614,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
             | Command::Workbench(_)
             | Command::Evaluate(_)
             | Command::Export(_)
-            | Command::About(_)
+            | Command::Doctor(_)
             | Command::Adapt(_)
             | Command::Train(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}

@@ -12,10 +12,10 @@ use touch2touch_core::rig::{PadId, PerPad, lab};
 use touch2touch_core::sample::{DepthTouch, Sample};
 use touch2touch_core::sim::{self, SimConfig};
 use touch2touch_core::units::angle_error;
-use touch2touch_work::cloud::{contact_points, images};
-use touch2touch_work::compare::LAB_PEAK_M;
-use touch2touch_work::infer::mask::MaskModel;
-use touch2touch_work::labels::ImprintSource;
+use touch2touch_pipeline::compare::LAB_PEAK_M;
+use touch2touch_pipeline::infer::mask::MaskModel;
+use touch2touch_pipeline::labels::ImprintSource;
+use touch2touch_pipeline::steps::cloud::{contact_points, images};
 
 /// A grasp of a simulated tool.
 pub(super) struct Case {

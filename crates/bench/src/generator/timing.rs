@@ -12,9 +12,9 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::postprocess::{RawPrediction, ShiftMode};
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::Sample;
-use touch2touch_work::infer::bundle::{Bundle, TimestepType};
-use touch2touch_work::infer::engine::{EngineKind, Input};
-use touch2touch_work::infer::generator::{Generator, Item, Observer, prepare};
+use touch2touch_pipeline::infer::bundle::{Bundle, TimestepType};
+use touch2touch_pipeline::infer::engine::{EngineKind, Input};
+use touch2touch_pipeline::infer::generator::{Generator, Item, Observer, prepare};
 
 /// Pairs of runs for the overhead.
 const PAIRS: usize = 30;

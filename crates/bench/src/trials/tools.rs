@@ -66,11 +66,11 @@ mod tests {
             let mesh = spec.mesh();
             assert!(mesh.is_watertight(), "{}", spec.name);
             ToolModel::new(mesh).unwrap();
-            let felt = |degrees: f64| {
+            let estimate = |degrees: f64| {
                 let grasp = Grasp { theta_rad: degrees.to_radians(), ..Grasp::default() };
                 simulate(&spec, grasp, 1, &SimConfig::default())
             };
-            let (upright, turned) = (felt(0.0), felt(15.0));
+            let (upright, turned) = (estimate(0.0), estimate(15.0));
             let pad = lab::RIGHT;
             let contact = |sample: &Sample| {
                 let truth = sample.pad(pad).unwrap().depth().unwrap().truth.as_ref().unwrap().contact.clone();

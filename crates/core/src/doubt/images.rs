@@ -4,7 +4,7 @@ use std::borrow::Cow;
 
 use strum::IntoEnumIterator as _;
 
-use super::{Cause, Doubt, Felt, median};
+use super::{Cause, Doubt, PairInput, median};
 use crate::evaluation::mean;
 use crate::grid::RgbGrid;
 use crate::read_as::{Colors, Images, Lay, ReadAs, Stored};
@@ -46,7 +46,7 @@ const CLEARER: f64 = 0.05;
 const SIDE: usize = 128;
 
 /// Doubt about the color images of some pairs.
-pub(super) fn judge(felt: &[Felt<'_>]) -> Option<Doubt> {
+pub(super) fn judge(felt: &[PairInput<'_>]) -> Option<Doubt> {
     let touches = felt.iter().flat_map(|felt| felt.sample.pads.entries());
     let (pads, images): (Vec<PadId>, Vec<&ColorImages>) =
         touches.filter_map(|(pad, touch)| Some((pad, touch.color()?.images.as_ref()?))).unzip();
@@ -247,7 +247,7 @@ fn wrapped_around(images: &[&ColorImages], faces: &[Face]) -> Option<Doubt> {
 }
 
 /// An untouched image that changes from pair to pair, beside a touched one that does not.
-fn swapped(felt: &[Felt<'_>]) -> Option<Doubt> {
+fn swapped(felt: &[PairInput<'_>]) -> Option<Doubt> {
     let mut by_pad: PerPad<Vec<[Vec<f64>; 2]>> = PerPad::default();
     for felt in felt {
         for (pad, touch) in felt.sample.pads.entries() {
@@ -289,9 +289,9 @@ fn area(image: &RgbGrid) -> RgbGrid {
 }
 
 /// Images that lie otherwise than the light says, or are in other colors.
-fn by_light(felt: &[Felt<'_>], faces: &[Face]) -> Option<Doubt> {
+fn by_light(felt: &[PairInput<'_>], faces: &[Face]) -> Option<Doubt> {
     // Only a GelSlim's light is known.
-    let gelslims: Vec<&Felt<'_>> = felt.iter().filter(|felt| is_gelslim(&felt.sample.rig)).collect();
+    let gelslims: Vec<&PairInput<'_>> = felt.iter().filter(|felt| is_gelslim(&felt.sample.rig)).collect();
     let touches = gelslims.iter().flat_map(|felt| felt.sample.pads.entries());
     let touches: Vec<(PadId, &ColorTouch)> = touches.filter_map(|(pad, touch)| Some((pad, touch.color()?))).collect();
     let light = Light::of(touches.iter().map(|(pad, color)| (*pad, Cow::Borrowed(&color.difference))));

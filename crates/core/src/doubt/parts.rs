@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::poses::{Models, Registered};
-use super::{Cause, Doubt, Felt, imprints};
+use super::{Cause, Doubt, PairInput, imprints};
 use crate::contact::{FLAT_M, rise};
 use crate::mesh::TriMesh;
 use crate::rig::PadId;
@@ -31,9 +31,9 @@ struct Alone {
 }
 
 impl Alone {
-    fn of(felt: &[Felt<'_>], models: &Models<'_>, pad: PadId) -> Self {
+    fn of(felt: &[PairInput<'_>], models: &Models<'_>, pad: PadId) -> Self {
         let samples: Vec<Sample> = felt.iter().map(|felt| alone(felt.sample, pad)).collect();
-        let each = felt.iter().zip(&samples).map(|(felt, sample)| Felt { sample, ..*felt });
+        let each = felt.iter().zip(&samples).map(|(felt, sample)| PairInput { sample, ..*felt });
         let registered = Registered::of(&each.collect::<Vec<_>>(), models);
         let (tried, right, contradicting) = (registered.tried(), registered.right(), registered.contradicting());
         Self { pad, samples, tried, right, contradicting }
@@ -51,7 +51,11 @@ impl Alone {
 }
 
 /// Doubt about the imprints of one finger, where the other one's lie on the CAD models at the true poses.
-pub(super) fn of_fingers(felt: &[Felt<'_>], tools: &BTreeMap<String, TriMesh>, models: &Models<'_>) -> Option<Doubt> {
+pub(super) fn of_fingers(
+    felt: &[PairInput<'_>],
+    tools: &BTreeMap<String, TriMesh>,
+    models: &Models<'_>,
+) -> Option<Doubt> {
     let rig = &felt.first()?.sample.rig;
     let fingers: Vec<Alone> = rig.pads().map(|pad| Alone::of(felt, models, pad)).collect();
     let sound = fingers.iter().filter(|finger| finger.is_at_least(RIGHT)).max_by_key(|finger| finger.right)?;

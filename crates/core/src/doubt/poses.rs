@@ -9,7 +9,7 @@ use glam::DVec2;
 use rayon::prelude::*;
 
 use super::fit::{contact_points, grainless, likeness};
-use super::{Cause, Doubt, Felt, median};
+use super::{Cause, Doubt, PairInput, median};
 use crate::align::{Ask, Contacts, PadImage};
 use crate::contact::rest_and_top;
 use crate::frames::PlanarPose;
@@ -131,7 +131,7 @@ struct Sure {
 pub(super) type Models<'a> = BTreeMap<&'a str, ToolModel>;
 
 /// The models of these pairs' tools, as far as they can be used.
-pub(super) fn models<'a>(felt: &[Felt<'a>], tools: &BTreeMap<String, TriMesh>) -> Models<'a> {
+pub(super) fn models<'a>(felt: &[PairInput<'a>], tools: &BTreeMap<String, TriMesh>) -> Models<'a> {
     let named: BTreeMap<&str, &TriMesh> =
         felt.iter().filter_map(|felt| Some((felt.tool?, tools.get(felt.tool?)?))).collect();
     named.par_iter().filter_map(|(name, mesh)| Some((*name, ToolModel::new((*mesh).clone()).ok()?))).collect()
@@ -175,7 +175,7 @@ pub(super) struct Registered<'m, 'a> {
 
 impl<'m, 'a> Registered<'m, 'a> {
     /// Registers the pairs.
-    pub(super) fn of(felt: &[Felt<'_>], models: &'m Models<'a>) -> Self {
+    pub(super) fn of(felt: &[PairInput<'_>], models: &'m Models<'a>) -> Self {
         let tried: Vec<(usize, &Sample, &ToolModel)> = (0..)
             .zip(felt)
             .filter_map(|(at, felt)| Some((at, felt.sample, models.get(felt.tool?)?)))
@@ -259,7 +259,7 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 
     /// The mismatch of truth and registrations where they contradict each other, with the mean likeness where it is mended.
-    pub(super) fn mismatch(&self, felt: &[Felt<'_>]) -> Option<(Mismatch, f64)> {
+    pub(super) fn mismatch(&self, felt: &[PairInput<'_>]) -> Option<(Mismatch, f64)> {
         let count = self.known().count();
         let far = count - self.near();
         if count < FEWEST || (count as f64) < SURE * self.asked as f64 || (far as f64) < FAR * count as f64 {
@@ -280,7 +280,7 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 
     /// The mean likeness of the good registrations with a truth at these poses.
-    fn likeness(&self, felt: &[Felt<'_>], poses: &[Option<PlanarPose>]) -> f64 {
+    fn likeness(&self, felt: &[PairInput<'_>], poses: &[Option<PlanarPose>]) -> f64 {
         let one = |((sure, _), pose): ((&Sure, PlanarPose), &Option<PlanarPose>)| {
             let felt = felt[sure.at];
             Some(likeness(&grainless(felt.sample), &self.models.get(felt.tool?)?.field, (*pose)?))
@@ -290,7 +290,7 @@ impl<'m, 'a> Registered<'m, 'a> {
     }
 
     /// Explanations of what is wrong with the truth, and the truths of the good registrations if it is.
-    fn explanations(&self, felt: &[Felt<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
+    fn explanations(&self, felt: &[PairInput<'_>]) -> Vec<(Mismatch, Vec<Option<PlanarPose>>)> {
         let known: Vec<(Sure, PlanarPose)> = self.known().map(|(sure, truth)| (*sure, truth)).collect();
         let all = |of: &dyn Fn(&Sure, PlanarPose) -> PlanarPose| {
             known.iter().map(|(sure, truth)| Some(of(sure, *truth))).collect::<Vec<_>>()

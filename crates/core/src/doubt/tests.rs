@@ -27,8 +27,8 @@ fn set(condition: Condition, pairs: u64, config: &SimConfig) -> Set {
 
 impl Set {
     fn judged(&self) -> Vec<String> {
-        let felt: Vec<Felt<'_>> =
-            self.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None }).collect();
+        let felt: Vec<PairInput<'_>> =
+            self.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None }).collect();
         judge(&felt, &self.tools, None).iter().map(|doubt| doubt.cause.key()).collect()
     }
 
@@ -49,7 +49,7 @@ fn sound_sets_of_every_condition_and_of_other_sensors_raise_no_doubt() {
     }
     assert!(judge(&[], &BTreeMap::new(), None).is_empty());
     let nothing = Sample::default();
-    assert!(judge(&[Felt { tool: None, sample: &nothing, beside: None }], &BTreeMap::new(), None).is_empty());
+    assert!(judge(&[PairInput { tool: None, sample: &nothing, beside: None }], &BTreeMap::new(), None).is_empty());
 }
 
 #[test]
@@ -104,7 +104,7 @@ fn images_in_other_colors_and_those_of_one_finger_that_lie_otherwise_are_named()
 fn a_cure_is_worth_what_it_does_to_the_poses() {
     let sound = set(Condition::Plain, 4, &SimConfig::default());
     let worth = |set: &Set| {
-        let felt = set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None });
+        let felt = set.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None });
         super::worth(&felt.collect::<Vec<_>>(), &set.tools)
     };
     let (as_is, twice) = (worth(&sound), worth(&sound.stored(ReadAs::Scale(Depths::Imprints, 2.0))));
@@ -128,7 +128,8 @@ fn a_wrong_cad_model_is_named() {
 fn predictions_tell_the_fingers_of_the_images() {
     // In place of a generator: the imprints of the fingers whose images they are.
     let sound = set(Condition::Plain, 3, &SimConfig::default());
-    let felt: Vec<Felt<'_>> = sound.pairs.iter().map(|(_, sample)| Felt { tool: None, sample, beside: None }).collect();
+    let felt: Vec<PairInput<'_>> =
+        sound.pairs.iter().map(|(_, sample)| PairInput { tool: None, sample, beside: None }).collect();
     let predictor = |is_swapped: fn(usize) -> bool| {
         move |samples: &[&Sample]| {
             let imprint =
@@ -184,8 +185,8 @@ fn true_poses_that_contradict_the_imprints_are_named_with_their_mistake() {
         let beside: Vec<_> = (0..with.len())
             .map(|at| move |on: isize| Some(stored[(at as isize + on).rem_euclid(4) as usize]))
             .collect();
-        let felt: Vec<Felt<'_>> = (0..with.len())
-            .map(|at| Felt { tool: Some(&sound.pairs[at].0), sample: &with[at], beside: Some(&beside[at]) })
+        let felt: Vec<PairInput<'_>> = (0..with.len())
+            .map(|at| PairInput { tool: Some(&sound.pairs[at].0), sample: &with[at], beside: Some(&beside[at]) })
             .collect();
         let doubts = judge(&felt, &sound.tools, None);
         let keys: Vec<String> = doubts.iter().map(|doubt| doubt.cause.key()).collect();
@@ -245,8 +246,8 @@ fn pairs_under_another_tools_name_are_named() {
     assert!(set.judged().is_empty());
     let names = [set.pairs[1].0.clone(), set.pairs[2].0.clone()];
     (set.pairs[2].0, set.pairs[1].0) = (names[0].clone(), names[1].clone());
-    let felt: Vec<Felt<'_>> =
-        set.pairs.iter().map(|(tool, sample)| Felt { tool: Some(tool), sample, beside: None }).collect();
+    let felt: Vec<PairInput<'_>> =
+        set.pairs.iter().map(|(tool, sample)| PairInput { tool: Some(tool), sample, beside: None }).collect();
     let doubts = judge(&felt, &set.tools, None);
     assert_eq!(doubts.iter().map(|doubt| doubt.cause.key()).collect::<Vec<_>>(), ["other-tool-of-some"]);
     assert_eq!(doubts[0].pairs, [1, 2], "{doubts:?}");

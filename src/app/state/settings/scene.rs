@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
 use touch2touch_core::units::clamp_or;
-use touch2touch_work::deviation::DISTANCES_M;
+use touch2touch_pipeline::compare::deviation::DISTANCES_M;
 
 /// Something that 3D views draw and a person can switch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, EnumIter)]

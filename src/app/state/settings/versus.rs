@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::EnumIter;
 
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::subject::Subject;
 
 /// The way in which two imprints are held against each other.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, EnumIter)]

@@ -8,7 +8,7 @@ use crate::app::labels::Review;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, section};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
-use touch2touch_work::progress::Counts;
+use touch2touch_pipeline::labels::progress::Counts;
 
 /// Height of a tool's row, points.
 const ROW: f32 = 18.0;

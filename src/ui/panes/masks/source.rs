@@ -14,7 +14,7 @@ use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{PROPOSED, SMALL, caption};
 use touch2touch_core::rig::PadId;
-use touch2touch_work::propose::FARTHEST_M;
+use touch2touch_pipeline::masks::propose::FARTHEST_M;
 
 /// The list, the number of what is chosen, and what can be done with it.
 pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui) {

@@ -21,7 +21,7 @@ use crate::ui::parts::theme::{self, CONTACT, GHOST};
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::PerPad;
-use touch2touch_work::cloud::{Clouds, FingerCloud};
+use touch2touch_pipeline::steps::cloud::{Clouds, FingerCloud};
 
 /// Points as the renderer takes them, made once per cloud.
 pub(super) struct SceneCloud {

@@ -16,7 +16,7 @@ use crate::ui::parts::scene_view::SceneOutput;
 use crate::ui::parts::widget::image_canvas::CanvasMap;
 use touch2touch_core::label::DrawTool;
 use touch2touch_core::units;
-use touch2touch_work::cloud::Clouds;
+use touch2touch_pipeline::steps::cloud::Clouds;
 
 /// True where the pointer draws on masks in the 3D views.
 pub(super) fn is_ready(state: &State) -> bool {

@@ -20,7 +20,7 @@ use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::{PadId, PerPad};
 use touch2touch_core::verdict::Grade;
-use touch2touch_work::deviation::DISTANCE_MAP;
+use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 
 /// Bars of a histogram of distances.
 const BARS: usize = 37;

@@ -20,7 +20,7 @@ use crate::ui::parts::widget::colorbar::gradient;
 use touch2touch_core::align::reason::Reason;
 use touch2touch_core::colormap::ColorMap;
 use touch2touch_core::units;
-use touch2touch_work::deviation::DISTANCE_MAP;
+use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 
 /// Height of a row, points.
 const ROW: f32 = 17.0;

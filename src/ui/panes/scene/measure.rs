@@ -15,7 +15,7 @@ use crate::ui::parts::scene_view::SceneOutput;
 use crate::ui::parts::theme::{SMALL, caption};
 use crate::ui::parts::widget::line::Line;
 use touch2touch_core::units;
-use touch2touch_work::cloud::Clouds;
+use touch2touch_pipeline::steps::cloud::Clouds;
 
 /// Does what a click means with the tool in hand.
 pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, output: &SceneOutput, clouds: &Clouds) {

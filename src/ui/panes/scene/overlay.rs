@@ -19,7 +19,7 @@ use touch2touch_core::align::Rung;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
-use touch2touch_work::pose::PoseResult;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// Scale bar, names of the axes, bar of the colors; in the `first` view the legend.
 pub(super) fn show(

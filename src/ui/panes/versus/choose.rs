@@ -12,8 +12,8 @@ use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
 use crate::ui::parts::widget::cut::cut_in_the_middle;
 use touch2touch_core::rig::SensorKind;
-use touch2touch_work::bundles::BundleInfo;
-use touch2touch_work::subject::{Mapping, RecipeChange, SEEDS, Subject};
+use touch2touch_pipeline::compare::subject::{Mapping, RecipeChange, SEEDS, Subject};
+use touch2touch_pipeline::steps::bundles::BundleInfo;
 
 /// Width of a letter in a button, points.
 const LETTER: f32 = 5.8;

@@ -8,9 +8,9 @@ use crate::app::settings::Versus;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::SMALL;
 use touch2touch_core::units;
-use touch2touch_work::compare::Comparison;
-use touch2touch_work::pose::PoseResult;
-use touch2touch_work::subject::Subject;
+use touch2touch_pipeline::compare::Comparison;
+use touch2touch_pipeline::compare::subject::Subject;
+use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// A column of the figures.
 #[derive(Clone, Copy, PartialEq, Eq)]

@@ -21,7 +21,7 @@ use crate::ui::parts::widget::empty;
 use touch2touch_core::colormap::Range;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units;
-use touch2touch_work::deviation::DISTANCE_MAP;
+use touch2touch_pipeline::compare::deviation::DISTANCE_MAP;
 
 /// Diameter of a point, meters.
 const POINT_M: f32 = 0.000_5;

@@ -3,7 +3,7 @@
 use eframe::egui::{Align2, FontId, Pos2, Rect, Role, Sense, Shape, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 
 use crate::ui::parts::theme::Palette;
-use touch2touch_work::job::Curve;
+use touch2touch_pipeline::job::Curve;
 
 /// Room for the numbers at the left, points.
 const LEFT: f32 = 40.0;

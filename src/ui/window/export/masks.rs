@@ -9,8 +9,8 @@ use crate::app::results;
 use crate::app::state::Lookup;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::caption;
-use touch2touch_work::export::{ExportChoice, Which};
-use touch2touch_work::io::exchange::Format;
+use touch2touch_pipeline::export::{ExportChoice, Which};
+use touch2touch_pipeline::io::exchange::Format;
 
 /// The form, where it is open. It blocks nothing: pairs can be drawn and marked beside it.
 pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {

@@ -1,0 +1,91 @@
+//! Distances of the contact points from the registered model: [`deviation`]; and of one cloud from another:
+//! [`cloud_difference`].
+
+use crate::steps::cloud::Clouds;
+use touch2touch_core::colormap::ColorMap;
+use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::PerPad;
+
+/// The colors of signed distances: blue inside, red outside.
+pub const DISTANCE_MAP: ColorMap = ColorMap::Diverging;
+/// Distances at which these colors can end, meters.
+pub const DISTANCES_M: std::ops::RangeInclusive<f64> = 1e-5..=0.05;
+/// Contact points within this distance of the model's surface are painted on it, meters.
+const REACH_M: f64 = 0.004;
+
+/// Signed distances between contact points and a model at a pose, both ways.
+#[derive(Clone, Debug)]
+pub struct Deviation {
+    /// The pose that they are of, `grasp_from_object`.
+    pub grasp_from_object: PlanarPose,
+    /// Of each contact point, in the order of the cloud, meters; positive outside the model.
+    pub points: PerPad<Vec<f32>>,
+    /// The model's surface in its own frame.
+    pub surface: Painted,
+}
+
+impl Deviation {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        let points: usize = self.points.iter().flatten().map(Vec::len).sum();
+        4 * points + 28 * self.surface.mesh.vertices.len() + 12 * self.surface.mesh.triangles.len()
+    }
+}
+
+/// Distances of the points of a cloud from another of the same cameras.
+#[derive(Clone, Debug)]
+pub struct CloudDifference {
+    /// Of each point, in the order of the first cloud, meters: positive where its imprint is the deeper one; NaN of a
+    /// finger that the other cloud lacks.
+    pub points: PerPad<Vec<f32>>,
+    /// Root mean square over the contact points of the first cloud, meters; NaN without one.
+    pub contact_rms_m: f64,
+}
+
+impl CloudDifference {
+    /// Bytes held.
+    pub fn bytes(&self) -> usize {
+        4 * self.points.iter().flatten().map(Vec::len).sum::<usize>()
+    }
+}
+
+/// Measures the points of `a` against those of `b`. `imprints` are those that the two clouds were made of: they say which
+/// is deeper.
+pub fn cloud_difference(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> CloudDifference {
+    let (mut squares, mut count) = (0.0, 0usize);
+    let mut points = PerPad::default();
+    for (pad, cloud) in a.fingers.entries() {
+        let others = b.finger(pad).map_or(&[][..], |cloud| &cloud.points);
+        let mut found = to_cloud(&cloud.points, others);
+        for ((d, pixel), contact) in found.iter_mut().zip(&cloud.pixels).zip(&cloud.contact) {
+            let at = |depth: &DepthMap| depth.get(pixel[0].into(), pixel[1].into()).copied();
+            let deeper = imprints[pad].as_ref().and_then(|[a, b]| Some(at(a)? - at(b)?));
+            if deeper.is_some_and(|deeper| deeper < 0.0) {
+                *d = -*d;
+            }
+            if *contact && d.is_finite() {
+                squares += f64::from(*d).powi(2);
+                count += 1;
+            }
+        }
+        points[pad] = Some(found);
+    }
+    CloudDifference { points, contact_rms_m: if count == 0 { f64::NAN } else { (squares / count as f64).sqrt() } }
+}
+
+/// Measures the contact points of both fingers against the model at a pose.
+pub fn deviation(clouds: &Clouds, tool: &ToolModel, grasp_from_object: PlanarPose) -> Deviation {
+    let object_from_grasp = grasp_from_object.to_affine().inverse();
+    let points = clouds.fingers.as_ref().map(|cloud| {
+        cloud.map(|cloud| {
+            let contact = cloud.points.iter().zip(&cloud.contact).filter(|(_, contact)| **contact);
+            let contact: Vec<_> = contact.map(|(p, _)| *p).collect();
+            of_points(&contact, &object_from_grasp, &tool.distance)
+        })
+    });
+    let in_object: Vec<_> = clouds.contact_points().iter().map(|p| object_from_grasp.transform_point3(*p)).collect();
+    Deviation { grasp_from_object, points, surface: on_surface(&tool.mesh, &in_object, REACH_M) }
+}

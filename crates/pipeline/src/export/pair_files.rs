@@ -1,0 +1,326 @@
+//! A pair in files for other programs: its cloud as PLY, its pose as JSON, its CAD model in the hand as STL ([`write()`]).
+
+use std::path::{Path, PathBuf};
+
+use glam::DAffine3;
+use serde::Serialize;
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+use crate::error::TaskError;
+use crate::io::names::{OUTPUT_MARK, output};
+use crate::io::ply::{self, PlyPoint};
+use crate::io::{atomic, stl};
+use crate::labels::ImprintSource;
+use crate::steps::cloud::Clouds;
+use crate::steps::pose::PoseResult;
+use touch2touch_core::deviation;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::mesh::TriMesh;
+use touch2touch_core::pose::{Registration, ToolModel};
+use touch2touch_core::rig::Rig;
+use touch2touch_core::units::{angle_error, mm};
+use touch2touch_core::verdict::Verdict;
+
+const WHAT: &str = "Export the pair";
+
+/// A file of a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, EnumIter, EnumString, IntoStaticStr)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum PairFile {
+    /// The surface points, with contact, finger and distance to the model: PLY.
+    Cloud,
+    /// The pose of the tool in the hand: JSON.
+    Pose,
+    /// The CAD model at that pose: STL.
+    Mesh,
+}
+
+impl PairFile {
+    /// Name on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    fn ending(self) -> &'static str {
+        match self {
+            Self::Cloud => "cloud.ply",
+            Self::Pose => "pose.json",
+            Self::Mesh => "mesh.stl",
+        }
+    }
+}
+
+/// Parts that are written of a pair.
+#[derive(Clone, Copy, Debug)]
+pub struct PairParts<'a> {
+    /// Name of the pair.
+    pub name: &'a str,
+    /// Source of the imprint.
+    pub source: ImprintSource,
+    /// Origin of the prediction, as [`crate::images::figure::note`] says it; `None` of a measured one.
+    pub prediction: Option<&'a str>,
+    /// Sensors of the pair.
+    pub rig: &'a Rig,
+    /// The surface points of that imprint.
+    pub clouds: &'a Clouds,
+    /// Bases of the contact masks, as [`crate::steps::mask::made_of`] says them.
+    pub mask: &'a str,
+    /// The registration.
+    pub registration: Registration,
+    /// Pose by the registration; `None` where there is none.
+    pub pose: Option<&'a PoseResult>,
+    /// The true pose, `grasp_from_object`, where it is known.
+    pub truth: Option<PlanarPose>,
+    /// The tool, by name.
+    pub tool: Option<(&'a str, &'a ToolModel)>,
+}
+
+/// Rows of a 4 x 4 matrix that takes columns `(x, y, z, 1)`.
+type Matrix = [[f64; 4]; 4];
+
+#[derive(Debug, Serialize)]
+struct PoseFile<'a> {
+    pair: &'a str,
+    imprint: &'static str,
+    /// Origin of the prediction; none of a measured imprint.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    prediction: Option<&'a str>,
+    tool: Option<&'a str>,
+    #[serde(rename = "engine")]
+    registration: String,
+    mask: &'a str,
+    convention: &'static str,
+    grasp_from_object: Matrix,
+    object_from_grasp: Matrix,
+    #[serde(flatten)]
+    numbers: Numbers,
+    truth: Option<Truth>,
+    /// Standard deviation of the angle, and the covariance of `grasp_from_object`: angle (radians), y and z (meters).
+    #[serde(skip_serializing_if = "Option::is_none")]
+    angle_sd_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    covariance: Option<[[f64; 3]; 3]>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    verdict: Option<&'a Verdict>,
+    rms_mm: f64,
+    contact_points: usize,
+    converged: bool,
+    stop: &'a str,
+}
+
+/// A planar pose, of `object_from_grasp`: its angle is the number that the lab reports.
+#[derive(Debug, Serialize)]
+struct Numbers {
+    theta_deg: f64,
+    y_mm: f64,
+    z_mm: f64,
+}
+
+#[derive(Debug, Serialize)]
+struct Truth {
+    grasp_from_object: Matrix,
+    #[serde(flatten)]
+    numbers: Numbers,
+    error_deg: f64,
+    /// Between the origins of the object's frame, in the grasp frame.
+    error_mm: f64,
+}
+
+const CONVENTION: &str = "grasp_from_object moves points of the CAD model (meters) into the grasp frame: x is the closing \
+                          axis, +z where the tool points, y lateral. Matrices are given row by row and take columns \
+                          (x, y, z, 1). theta_deg, y_mm and z_mm are those of object_from_grasp, about +x from y towards z, \
+                          as the lab reports them.";
+
+fn matrix(motion: DAffine3) -> Matrix {
+    let columns = glam::DMat4::from(motion).transpose().to_cols_array_2d();
+    // No minus before a zero.
+    columns.map(|row| row.map(|v| v + 0.0))
+}
+
+fn numbers(grasp_from_object: PlanarPose) -> Numbers {
+    let pose = grasp_from_object.inverse();
+    Numbers { theta_deg: pose.theta_rad.to_degrees(), y_mm: mm(pose.y_m), z_mm: mm(pose.z_m) }
+}
+
+/// Writes files of a pair into a folder, which is made if it is not there; returns them in order.
+///
+/// # Errors
+/// If a pose or mesh is asked for and there is none, or a file cannot be written.
+pub fn write(parts: &PairParts<'_>, files: &[PairFile], folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+    let fail = |why: String, file: &Path| TaskError::new(WHAT, format!("{why} ({})", file.display()));
+    std::fs::create_dir_all(folder).map_err(|err| fail(err.to_string(), folder))?;
+    let no_pose = || TaskError::new(WHAT, format!("{} has no pose of the {} imprint", parts.name, parts.source.key()));
+    let mut written = Vec::new();
+    for file in files {
+        let name = format!("{}{OUTPUT_MARK}{}.{}", output(parts.name), parts.source.key(), file.ending());
+        let path = folder.join(name);
+        match file {
+            PairFile::Cloud => {
+                ply::write(&path, &points(parts), &comments(parts)).map_err(|err| fail(err.to_string(), &path))?;
+            }
+            PairFile::Pose => {
+                let text =
+                    pose_json(parts, parts.pose.ok_or_else(no_pose)?).map_err(|err| fail(err.to_string(), &path))?;
+                atomic::write_bytes(&path, text.as_bytes()).map_err(|err| fail(err.to_string(), &path))?;
+            }
+            PairFile::Mesh => {
+                let pose = parts.pose.ok_or_else(no_pose)?;
+                let (_, tool) = parts.tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
+                let motion = pose.grasp_from_object.to_affine();
+                let vertices = tool.mesh.vertices.iter().map(|p| motion.transform_point3(*p)).collect();
+                let mesh = TriMesh { vertices, triangles: tool.mesh.triangles.clone() };
+                stl::write(&path, &mesh).map_err(|err| TaskError::from_error(WHAT, &err))?;
+            }
+        }
+        written.push(path);
+    }
+    Ok(written)
+}
+
+fn comments(parts: &PairParts<'_>) -> Vec<String> {
+    let fingers: Vec<String> =
+        parts.rig.pads().map(|pad| format!("{} = {}", pad.index(), parts.rig.pad_key(pad))).collect();
+    let distance = match (parts.pose, parts.tool) {
+        (Some(_), Some((tool, _))) => format!("signed, to {tool} as registered by {}", parts.registration),
+        _ => "NaN, without a pose".to_owned(),
+    };
+    let predicted = parts.prediction.map_or_else(String::new, |how| format!(" ({})", how.replace('·', ",")));
+    vec![
+        "written by touch2touch".into(),
+        format!("pair {}, {} imprint{predicted}, contact mask: {}", parts.name, parts.source.key(), parts.mask),
+        "unit meters; grasp frame: x closing axis, +z where the tool points, y lateral".into(),
+        format!("finger: {}; pixel of its imprint", fingers.join(", ")),
+        format!("distance_to_model: meters, {distance}"),
+    ]
+}
+
+fn points(parts: &PairParts<'_>) -> Vec<PlyPoint> {
+    let mut all = Vec::new();
+    for (pad, cloud) in parts.clouds.fingers.entries() {
+        let distances = parts.pose.zip(parts.tool).map(|(pose, (_, tool))| {
+            deviation::of_points(&cloud.points, &pose.grasp_from_object.inverse().to_affine(), &tool.distance)
+        });
+        for (i, at) in cloud.points.iter().enumerate() {
+            all.push(PlyPoint {
+                at: *at,
+                contact: cloud.contact[i],
+                finger: pad.index() as u8,
+                pixel: cloud.pixels[i],
+                distance: distances.as_ref().map_or(f32::NAN, |found| found[i]),
+            });
+        }
+    }
+    all
+}
+
+fn pose_json(parts: &PairParts<'_>, pose: &PoseResult) -> serde_json::Result<String> {
+    let found = pose.grasp_from_object;
+    let truth = parts.truth.map(|truth| Truth {
+        grasp_from_object: matrix(pose.grasp_from_cad_at(truth)),
+        numbers: numbers(truth),
+        error_deg: angle_error(found.theta_rad, truth.theta_rad).to_degrees(),
+        error_mm: mm((found.y_m - truth.y_m).hypot(found.z_m - truth.z_m)),
+    });
+    serde_json::to_string_pretty(&PoseFile {
+        pair: parts.name,
+        imprint: parts.source.key(),
+        prediction: parts.prediction,
+        tool: parts.tool.map(|(name, _)| name),
+        registration: parts.registration.to_string(),
+        mask: parts.mask,
+        convention: CONVENTION,
+        grasp_from_object: matrix(pose.grasp_from_cad()),
+        object_from_grasp: matrix(pose.grasp_from_cad().inverse()),
+        numbers: numbers(found),
+        truth,
+        angle_sd_deg: pose.angle_sd_rad().map(f64::to_degrees),
+        covariance: pose.report.evidence.map(|evidence| evidence.uncertainty.covariance),
+        verdict: pose.verdict.as_ref(),
+        rms_mm: mm(pose.rms_m),
+        contact_points: pose.num_points,
+        converged: pose.converged,
+        stop: &pose.stop,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::steps::cloud::clouds;
+    use crate::steps::imprint::measured;
+    use crate::steps::pose::pose;
+    use glam::{DVec3, DVec4};
+    use touch2touch_core::align::Ask;
+    use touch2touch_core::catalog;
+    use touch2touch_core::contact::threshold;
+    use touch2touch_core::sim::{SimConfig, random_grasp, simulate};
+
+    #[test]
+    fn a_pair_in_files_is_the_pair() {
+        let (spec, folder) = (&catalog::tools()[0], tempfile::tempdir().unwrap());
+        let sample = simulate(spec, random_grasp(3), 3, &SimConfig::default());
+        let imprints = measured(&sample);
+        let masks = imprints.clone().map(|i| i.map(|i| threshold(&i, 0.005)));
+        let of = sample.rig.pads().map(|pad| Some((imprints[pad].as_ref()?, masks[pad].as_ref()))).collect();
+        let clouds = clouds(&sample, &of).unwrap();
+        // The lab's models lie 4 mm beside the grasp plane.
+        let mut model = spec.mesh();
+        model.vertices.iter_mut().for_each(|v| v.x -= 0.004);
+        let tool = ToolModel::new(model.clone()).unwrap();
+        let (registration, truth) = (Registration::default(), sample.grasp_from_object);
+        let found = pose(&clouds.contact_points(), &tool, &*registration.method(), Ask::default(), truth).unwrap();
+        let parts = PairParts {
+            name: "a/b",
+            source: ImprintSource::Measured,
+            prediction: None,
+            rig: &sample.rig,
+            clouds: &clouds,
+            mask: "threshold",
+            registration,
+            pose: Some(&found),
+            truth,
+            tool: Some(("tool", &tool)),
+        };
+        use PairFile::{Cloud, Mesh, Pose};
+        let files = write(&parts, &[Cloud, Pose, Mesh], &folder.path().join("new")).unwrap();
+        assert!(files[1].ends_with("new/a__b.t2t.measured.pose.json"), "{files:?}");
+
+        let all = points(&parts);
+        let contact: Vec<DVec3> = all.iter().filter(|p| p.contact).map(|p| p.at).collect();
+        assert_eq!(contact, clouds.contact_points());
+        let near = all.iter().filter(|p| p.contact && p.distance.abs() < 0.003).count();
+        // A threshold of 5 mm takes in membrane that hangs beside the tool: more than half touches it.
+        assert!(near * 2 > contact.len(), "{near} of {}", contact.len());
+        let header = String::from_utf8_lossy(&std::fs::read(&files[0]).unwrap()[..900]).into_owned();
+        assert!(header.contains("unit meters; grasp frame") && header.contains("0 = right, 1 = left"), "{header}");
+
+        let json: serde_json::Value = serde_json::from_slice(&std::fs::read(&files[1]).unwrap()).unwrap();
+        let rows: Matrix = serde_json::from_value(json["grasp_from_object"].clone()).unwrap();
+        let by_rows = |p: DVec3| {
+            let column = DVec4::new(p.x, p.y, p.z, 1.0);
+            DVec3::from_array([0, 1, 2].map(|i| DVec4::from_array(rows[i]).dot(column)))
+        };
+        assert_eq!(rows[3], [0.0, 0.0, 0.0, 1.0]);
+        let truth = truth.unwrap();
+        let reported = json["truth"]["theta_deg"].as_f64().unwrap();
+        assert!((reported - truth.inverse().theta_rad.to_degrees()).abs() < 1e-12);
+        assert!((json["truth"]["error_deg"].as_f64().unwrap() - found.error_rad.unwrap().to_degrees()).abs() < 1e-9);
+
+        // The mesh lies where the matrix puts the model; STL has 32 bits.
+        let back = stl::read(&files[2]).unwrap().mesh;
+        assert_eq!(back.triangles.len(), tool.mesh.triangles.len());
+        for i in 0..back.triangles.len() {
+            for (found, corner) in back.corners(i).into_iter().zip(model.corners(i)) {
+                assert!((found - by_rows(corner)).length() < 1e-7);
+            }
+        }
+        // Without a pose the cloud can still be had, and the rest is said to be missing.
+        let lacking = PairParts { pose: None, ..parts };
+        write(&lacking, &[Cloud], folder.path()).unwrap();
+        assert!(points(&lacking).iter().all(|p| p.distance.is_nan()));
+        for file in [Pose, Mesh] {
+            assert!(write(&lacking, &[file], folder.path()).unwrap_err().why.contains("no pose"));
+        }
+    }
+}

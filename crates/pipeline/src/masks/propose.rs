@@ -1,0 +1,382 @@
+//! Proposals: masks that a person looks at, and accepts or not. Nothing here changes a mask.
+//!
+//! Masks by threshold, share and mask model are those of [`crate::steps::mask`]; what comes here takes more than one imprint: a pose,
+//! strokes, another pair's mask.
+
+mod batch;
+mod touch;
+
+use std::borrow::Cow;
+
+use glam::DAffine3;
+use serde::{Deserialize, Serialize};
+use strum::{EnumIter, EnumString, IntoStaticStr};
+
+use crate::error::TaskError;
+use crate::labels::{DrawnMask, ImprintSource, MaskPlace, PairLabels, Review};
+use crate::steps::mask::MaskRecipe;
+use crate::steps::on_pad::OnPad;
+use touch2touch_core::cloud::CloudError;
+use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
+use touch2touch_core::dataset::{Index, PairId};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Grid, Mask};
+use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
+use touch2touch_core::manual::{AcceptedPose, ManualPose};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
+
+pub use batch::{Batch, BatchSetup, propose_all};
+pub use touch::{Proposals, ProposeSetup, propose};
+
+const WHAT: &str = "Propose a mask";
+
+/// Distance that a membrane may lie at most from where it was in the other pair and still be in contact with the same
+/// place of the tool, meters.
+const CARRY_GATE_M: f64 = 0.0015;
+/// Distance likewise from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
+const ACROSS_GATE_M: f64 = 0.003;
+
+/// The greatest distance to the CAD model that a mask can be made of, meters.
+pub const FARTHEST_M: f64 = 0.01;
+
+/// Source of a proposed mask.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    EnumIter,
+    EnumString,
+    IntoStaticStr,
+)]
+#[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
+pub enum ProposalSource {
+    /// The automatic source as it is set.
+    #[default]
+    Automatic,
+    /// Near the CAD model at the true pose.
+    CadTruth,
+    /// Near the CAD model at the pose that the registration answers.
+    CadRegistered,
+    /// Near the CAD model at the pose set by hand.
+    CadHand,
+    /// Grown from what a person painted.
+    Grow,
+    /// Another pair's mask, moved as the tool was.
+    Carry,
+    /// The other finger's mask.
+    OtherFinger,
+}
+
+impl ProposalSource {
+    /// The name in files and on the command line.
+    pub fn key(self) -> &'static str {
+        self.into()
+    }
+
+    /// The name on screen.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Automatic => "Automatic source",
+            Self::CadTruth => "CAD at the true pose",
+            Self::CadRegistered => "CAD at the registered pose",
+            Self::CadHand => "CAD at the pose by hand",
+            Self::Grow => "Grow from strokes",
+            Self::Carry => "Carried from another pair",
+            Self::OtherFinger => "The other finger's mask",
+        }
+    }
+
+    /// Description in a line.
+    pub fn tooltip(self) -> &'static str {
+        match self {
+            Self::Automatic => "What the automatic source below says, with its numbers",
+            Self::CadTruth => "Pixels whose membrane point lies near the CAD model at the true pose",
+            Self::CadRegistered => {
+                "Pixels whose membrane point lies near the CAD model at the pose that was registered from the mask in force"
+            }
+            Self::CadHand => "Pixels whose membrane point lies near the CAD model where the pose tool holds it",
+            Self::Grow => {
+                "From the strokes painted by hand, contact and free, to the steps of the imprint between them"
+            }
+            Self::Carry => "The mask of an earlier pair of the same tool, moved as the tool moved between the grasps",
+            Self::OtherFinger => "The other finger's mask, as the tool would press on this side",
+        }
+    }
+
+    /// Base that a proposal of it is made from.
+    pub fn takes(self) -> Takes {
+        match self {
+            Self::Automatic => Takes::AutomaticMask,
+            Self::CadTruth => Takes::CadModel(CadAt::Truth),
+            Self::CadRegistered => Takes::CadModel(CadAt::Registered),
+            Self::CadHand => Takes::CadModel(CadAt::Hand),
+            Self::Grow => Takes::DrawnMask,
+            Self::Carry => Takes::OtherPair,
+            Self::OtherFinger => Takes::OtherPad,
+        }
+    }
+
+    /// It measures the distance to the CAD model.
+    pub fn is_cad(self) -> bool {
+        matches!(self.takes(), Takes::CadModel(_))
+    }
+}
+
+/// Base of a proposal, besides the imprint. Each has one function that makes it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Takes {
+    /// The mask of the automatic source: [`automatic`].
+    AutomaticMask,
+    /// The distances to the CAD model at a pose ([`cad_distances`]): [`near_cad`].
+    CadModel(CadAt),
+    /// The mask that a person drew on the imprint: [`grown`].
+    DrawnMask,
+    /// The mask that a person drew of the pair that [`carries_from`] names: [`carried_from_pair`].
+    OtherPair,
+    /// The mask in force of the other pad: [`carried_across`].
+    OtherPad,
+}
+
+/// Pose of the CAD model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CadAt {
+    /// At the true pose.
+    Truth,
+    /// At the pose that is registered from the masks in force.
+    Registered,
+    /// At the pose at which a hand holds it, else at which one put it: [`hand_pose`].
+    Hand,
+}
+
+/// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
+pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Option<ManualPose> {
+    held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
+}
+
+/// A proposed mask.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Proposal {
+    /// The contact, as large as the imprint.
+    pub mask: Mask,
+    /// Origin of the mask.
+    pub provenance: Provenance,
+    /// Remark on the mask, in words; empty if there is none.
+    pub note: String,
+}
+
+fn fail(err: &CloudError) -> TaskError {
+    TaskError::from_error(WHAT, err)
+}
+
+/// The camera that felt a touch.
+///
+/// # Errors
+/// If there is none.
+fn camera_of(sample: &Sample, pad: PadId) -> Result<&DepthCamera, TaskError> {
+    let camera = sample.pad(pad).and_then(PadTouch::camera);
+    camera.ok_or_else(|| TaskError::new(WHAT, "this source has no depth camera"))
+}
+
+/// Radius around a pixel in which a measured imprint is looked at to tell grain from membrane, millimeters. On
+/// simulated touches of unseen tools at the true pose, masks of 1 mm then have an IoU of 0.93 with the truth, and of
+/// 0.82 with the grain.
+const GRAIN_MM: f64 = 1.7;
+
+/// The imprint as distances to the CAD model are measured from it: what was measured without its grain, a prediction, which
+/// has none, as it is.
+pub(crate) fn smooth_imprint<'a>(imprint: &'a DepthMap, of: ImprintSource, rig: &Rig) -> Cow<'a, DepthMap> {
+    let radius_px = (GRAIN_MM * rig.depth_px_per_mm()).round();
+    match of {
+        ImprintSource::Measured if radius_px >= 1.0 => Cow::Owned(without_grain(imprint, radius_px as usize)),
+        _ => Cow::Borrowed(imprint),
+    }
+}
+
+/// The mask of an automatic source; of the mask model's it says how sure that is. `model` is its name.
+pub fn automatic(found: ContactMask, recipe: &MaskRecipe, model: &str) -> Proposal {
+    let provenance = recipe.provenance(model, found.basis);
+    let unsure = found.unsure.map(|share| format!("the model is unsure of {:.1} % of the picture", share * 100.0));
+    let note = found.basis.note().into_iter().chain(unsure).collect::<Vec<_>>().join("; ");
+    Proposal { mask: found.mask, provenance, note }
+}
+
+/// The signed distance of each membrane point to the CAD model, meters, negative inside; NaN without depth. From it
+/// [`near_cad`] makes a mask of any distance at once.
+///
+/// # Errors
+/// If sizes differ or the camera's numbers cannot be right.
+pub fn cad_distances(
+    imprint: &DepthMap,
+    of: ImprintSource,
+    OnPad { sample, pad }: OnPad<'_>,
+    tool: &ToolModel,
+    grasp_from_object: ManualPose,
+) -> Result<Grid<f64>, TaskError> {
+    let (imprint, camera) = (smooth_imprint(imprint, of, &sample.rig), camera_of(sample, pad)?);
+    let object_from_grasp = grasp_from_object.to_affine().inverse();
+    signed_distances(&imprint, camera, &tool.distance, object_from_grasp, FARTHEST_M).map_err(|err| fail(&err))
+}
+
+/// The pixels within a distance of the CAD model.
+pub fn near_cad(distances: &Grid<f64>, within_m: f32, at: CadPose) -> Proposal {
+    Proposal {
+        mask: distances.map(|d| *d <= f64::from(within_m)),
+        provenance: Provenance::Cad { within_m, at },
+        note: String::new(),
+    }
+}
+
+/// Grown from what was painted by hand on the mask.
+///
+/// # Errors
+/// If nothing was painted.
+pub fn grown(imprint: &DepthMap, hand: Option<&DrawnMask>) -> Result<Proposal, TaskError> {
+    let nothing = || {
+        TaskError::new(WHAT, "there is nothing to grow from")
+            .with_hint("Paint a short stroke of contact, and with the right button one where there is none.")
+    };
+    let hand = hand.ok_or_else(nothing)?;
+    let painted = hand.marks.manual_checked();
+    let which = |contact: bool| {
+        let (painted, mask) = (painted.as_slice(), hand.mask.as_slice());
+        let seeds = painted.iter().zip(mask).map(|(painted, in_contact)| *painted && *in_contact == contact);
+        Mask::from_vec(imprint.width(), imprint.height(), seeds.collect())
+    };
+    let (Ok(contact), Ok(free)) = (which(true), which(false)) else {
+        return Err(TaskError::new(WHAT, "the mask is not as large as the imprint"));
+    };
+    let mask = grow_from(imprint, &contact, &free).ok_or_else(nothing)?;
+    let note =
+        if free.as_slice().contains(&true) { "" } else { "no stroke says what is free: the edge of the image is" };
+    Ok(Proposal { mask, provenance: Provenance::Grown, note: note.into() })
+}
+
+/// One finger of a pair with a mask to carry from.
+#[derive(Clone, Copy, Debug)]
+pub struct Side<'a> {
+    /// The pair.
+    pub sample: &'a Sample,
+    /// The finger.
+    pub pad: PadId,
+    /// Imprint of the finger, meters.
+    pub imprint: &'a DepthMap,
+}
+
+impl<'a> Side<'a> {
+    /// Without its grain: a pixel that was dropped would be carried nowhere.
+    fn smooth(self) -> Cow<'a, DepthMap> {
+        smooth_imprint(self.imprint, ImprintSource::Measured, &self.sample.rig)
+    }
+}
+
+fn carried(
+    from: Side<'_>,
+    mask: &Mask,
+    to: Side<'_>,
+    from_to: DAffine3,
+    gate_m: f64,
+    provenance: Provenance,
+) -> Result<Proposal, TaskError> {
+    let (from_imprint, to_imprint) = (from.smooth(), to.smooth());
+    let to = Surface { imprint: &to_imprint, camera: camera_of(to.sample, to.pad)? };
+    let from = Surface { imprint: &from_imprint, camera: camera_of(from.sample, from.pad)? };
+    let found = carry(from, mask, to, from_to, gate_m).map_err(|err| fail(&err))?;
+    let note = match found.drift_m {
+        Some(drift) => format!("the membranes lie {:.2} mm apart (median)", drift * 1e3),
+        None => "nothing of it is in contact here".into(),
+    };
+    Ok(Proposal { mask: found.mask, provenance, note })
+}
+
+/// Another pair, which has a mask to carry.
+#[derive(Clone, Copy, Debug)]
+pub struct OtherPair<'a> {
+    /// Name of the pair.
+    pub name: &'a str,
+    /// The pair.
+    pub sample: &'a Sample,
+    /// Labels that people gave the pair.
+    pub labels: &'a PairLabels,
+}
+
+/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known.
+///
+/// # Errors
+/// If there is no such mask, a pose or a camera is not known, or sizes differ.
+pub fn carried_from_pair(from: OtherPair<'_>, to: Side<'_>) -> Result<Proposal, TaskError> {
+    let OtherPair { name, sample, labels } = from;
+    let measured = sample.pad(to.pad).and_then(PadTouch::depth).map(|depth| &depth.imprint);
+    let hand = measured.and_then(|imprint| labels.drawn(&MaskPlace::measured(to.pad), imprint));
+    let (Some(imprint), Some(hand)) = (measured, hand) else {
+        return Err(TaskError::new(WHAT, format!("nobody painted this finger's mask of {name}")));
+    };
+    let from = Side { sample, pad: to.pad, imprint };
+    let pose = |sample: &Sample, whose: &str| {
+        let why = || TaskError::new(WHAT, format!("the true pose of {whose} is not known, so its move is not either"));
+        sample.grasp_from_object.ok_or_else(why)
+    };
+    let (a, b) = (pose(sample, name)?, pose(to.sample, "this pair")?);
+    let moved = PlanarPose { theta_rad: b.theta_rad - a.theta_rad, y_m: b.y_m - a.y_m, z_m: b.z_m - a.z_m };
+    let provenance = Provenance::Copied { from: format!("the mask of {name}"), moved: Some(moved) };
+    carried(from, &hand.mask, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
+}
+
+/// The other finger's mask of the same grasp. `name` is that finger's.
+///
+/// # Errors
+/// If a camera is not known, or sizes differ.
+pub fn carried_across(name: &str, from: Side<'_>, mask: &Mask, to: Side<'_>) -> Result<Proposal, TaskError> {
+    let provenance = Provenance::Copied { from: format!("the {name} finger's mask"), moved: None };
+    carried(from, mask, to, across(), ACROSS_GATE_M, provenance)
+}
+
+/// The pair whose masks are carried to another: of the same tool and looked at by somebody, the nearest before it in the data
+/// set, else the nearest behind it. `None` if there is none.
+pub fn carries_from(index: &Index, to: PairId, review: impl Fn(&str) -> Review) -> Option<PairId> {
+    let tool = index.get(to)?.tool.as_ref()?;
+    let is_begun = |name: &str| !matches!(review(name), Review::Todo | Review::Skip);
+    let pairs = (0..).map(PairId).zip(&index.pairs);
+    let begun = pairs.filter(|(id, pair)| *id != to && pair.tool.as_ref() == Some(tool) && is_begun(&pair.name));
+    begun.map(|(id, _)| id).min_by_key(|id| if id.0 < to.0 { (0, to.0 - id.0) } else { (1, id.0 - to.0) })
+}
+
+/// The mask that accepting a proposal whole makes. Of the one that was drawn, what a person painted stays unless
+/// `over_drawn`, and ignored pixels stay so.
+#[must_use]
+pub fn accepted(drawn: Option<&DrawnMask>, proposal: &Proposal, over_drawn: bool) -> DrawnMask {
+    let Some(drawn) = drawn else { return DrawnMask::new(proposal.mask.clone(), proposal.provenance.clone()) };
+    let mut hand = drawn.clone();
+    hand.replace(&proposal.mask, proposal.provenance.clone(), !over_drawn);
+    hand
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use touch2touch_core::bits::Bits;
+    use touch2touch_core::contact::MaskBasis;
+
+    #[test]
+    fn a_model_says_how_sure_it_is() {
+        let recipe = MaskRecipe::Unet("id".into(), Some(Bits::from(0.5_f32)));
+        let found = |basis, unsure| ContactMask { mask: Mask::filled(2, 2, true), basis, unsure };
+        let sure = automatic(found(MaskBasis::Source, Some(0.012)), &recipe, "model");
+        assert_eq!(sure.note, "the model is unsure of 1.2 % of the picture");
+        assert!(matches!(sure.provenance, Provenance::Model { .. }), "{:?}", sure.provenance);
+        let instead = automatic(found(MaskBasis::Depth(0.004), Some(0.2)), &recipe, "model");
+        assert!(instead.note.contains("found no contact") && instead.note.ends_with("20.0 % of the picture"));
+        let silent = automatic(found(MaskBasis::Source, None), &MaskRecipe::Truth, "");
+        assert_eq!(silent.note, "");
+    }
+}

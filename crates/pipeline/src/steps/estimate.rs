@@ -1,0 +1,335 @@
+//! [`estimate`]: the way from a touch to its pose. No other place strings its steps together.
+
+use std::sync::Arc;
+
+use glam::DVec3;
+use strum::IntoEnumIterator as _;
+
+use crate::error::TaskError;
+use crate::infer::mask::contact_of;
+use crate::io::caught::caught;
+use crate::io::dataset::Dataset;
+use crate::job::JobCx;
+use crate::labels::{ImprintOf, ImprintSource, PairLabels};
+use crate::steps::cloud::images;
+use crate::steps::imprint::{imprints_of, measured};
+use crate::steps::mask::{Contact, MaskInputs, contact_mask};
+use crate::steps::models::Models;
+use crate::steps::pose::{PoseResult, pose};
+use crate::steps::prediction::Prediction;
+use crate::steps::recipe::{Recipe, Stage, no_mask_model};
+use touch2touch_core::align::{Ask, Contacts, Register};
+use touch2touch_core::dataset::PairId;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::pose::ToolModel;
+use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::sample::{Sample, Scale};
+use touch2touch_core::which_tool::{Candidate, which_tool};
+
+/// A pair with what is known of it.
+#[derive(Clone, Copy, Debug)]
+pub struct Touch<'a> {
+    /// The data set.
+    pub dataset: &'a Dataset,
+    /// Place of the pair in the data set.
+    pub pair: PairId,
+    /// The pair itself.
+    pub sample: &'a Sample,
+    /// The tool; `Err` says why there is none.
+    pub tool: Result<&'a ToolModel, &'a TaskError>,
+    /// Labels that people gave the pair.
+    pub labels: &'a PairLabels,
+}
+
+/// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
+pub(crate) type Probability = Arc<(Grid<f32>, f32)>;
+
+/// Results of a touch by a recipe, as far as they were asked for. They are cheap to copy.
+#[derive(Clone, Debug, Default)]
+pub struct Estimate {
+    recipe: Recipe,
+    reached: Option<Stage>,
+    /// Predictions of the generator; empty where the imprints are measured.
+    pub predictions: Arc<PerPad<Prediction>>,
+    /// Meters, raw orientation.
+    pub imprints: Arc<PerPad<DepthMap>>,
+    probabilities: PerPad<Probability>,
+    contact: Option<Arc<Contact>>,
+    points: Option<Arc<Result<Vec<DVec3>, TaskError>>>,
+    pose: Option<Arc<Result<PoseResult, TaskError>>>,
+}
+
+/// The results of a touch up to a stage.
+///
+/// # Errors
+/// If prediction, imprint or mask cannot be made. That there are no points or no pose is a result, with the reason.
+pub fn estimate(
+    touch: Touch<'_>,
+    recipe: &Recipe,
+    stage: Stage,
+    models: &Models,
+    cx: &JobCx,
+) -> Result<Estimate, TaskError> {
+    Estimate::new(recipe).reach(touch, stage, models, cx)
+}
+
+impl Estimate {
+    /// Nothing yet, by a recipe.
+    pub fn new(recipe: &Recipe) -> Self {
+        Self { recipe: recipe.clone(), ..Self::default() }
+    }
+
+    /// Imprints of a recipe that were made together with others.
+    pub(crate) fn with_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+        Self { imprints: Arc::new(imprints), reached: Some(Stage::Imprint), ..Self::new(recipe) }
+    }
+
+    /// Imprints that no recipe makes, such as the mean of several. Nobody can have drawn on them.
+    pub fn of_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
+        Self::with_imprints(&Recipe { hand: false, ..recipe.clone() }, imprints)
+    }
+
+    /// The pose that one from other imprints is compared with: the true one, or that of the measured imprints of pictures,
+    /// which know no true pose.
+    ///
+    /// # Errors
+    /// If the mask of the measured imprints cannot be made.
+    pub(crate) fn compared_with(
+        touch: Touch<'_>,
+        recipe: &Recipe,
+        models: &Models,
+        cx: &JobCx,
+    ) -> Result<Option<PlanarPose>, TaskError> {
+        if touch.sample.scale == Scale::Measured {
+            return Ok(touch.sample.grasp_from_object);
+        }
+        let imprints = touch.sample.pads.clone().map(|touch| Some(touch?.depth()?.imprint.clone()));
+        let recipe = Recipe { imprint: ImprintSource::Measured, generator: None, ..recipe.clone() };
+        let estimate = Self::with_imprints(&recipe, imprints);
+        let estimate = estimate.reach_asking(touch, Stage::Pose, Ask::default(), models, cx)?;
+        Ok(estimate.pose().ok().map(|found| found.grasp_from_object))
+    }
+
+    /// The part of it that another recipe makes just so.
+    #[must_use]
+    pub fn again(&self, recipe: &Recipe) -> Self {
+        let mut estimate = Self::new(recipe);
+        for stage in Stage::iter() {
+            if self.reached < Some(stage) || self.recipe.until(stage) != recipe.until(stage) {
+                break;
+            }
+            estimate.reached = Some(stage);
+            match stage {
+                Stage::Prediction => estimate.predictions = self.predictions.clone(),
+                Stage::Imprint => {
+                    estimate.imprints = self.imprints.clone();
+                    if self.recipe.mask_model == recipe.mask_model && self.recipe.engine == recipe.engine {
+                        estimate.probabilities = self.probabilities.clone();
+                    }
+                }
+                Stage::Mask => estimate.contact = self.contact.clone(),
+                Stage::Cloud => estimate.points = self.points.clone(),
+                Stage::Pose => estimate.pose = self.pose.clone(),
+            }
+        }
+        estimate
+    }
+
+    /// Results of the touch up to a later stage; a pose with its verdict.
+    ///
+    /// # Errors
+    /// As [`estimate`].
+    pub fn reach(self, touch: Touch<'_>, stage: Stage, models: &Models, cx: &JobCx) -> Result<Self, TaskError> {
+        self.reach_asking(touch, stage, Ask { evidence: true, ..Ask::default() }, models, cx)
+    }
+
+    /// Results up to a later stage, with a request to the registration: to record its steps, or to leave the verdict out
+    /// where only the pose counts.
+    ///
+    /// # Errors
+    /// As [`estimate`].
+    pub(crate) fn reach_asking(
+        mut self,
+        touch: Touch<'_>,
+        stage: Stage,
+        ask: Ask<'_>,
+        models: &Models,
+        cx: &JobCx,
+    ) -> Result<Self, TaskError> {
+        let sample = touch.sample;
+        for next in Stage::iter().filter(|next| *next <= stage) {
+            if self.reached >= Some(next) {
+                continue;
+            }
+            match next {
+                Stage::Prediction if self.recipe.imprint == ImprintSource::Predicted => {
+                    self.predictions = Arc::new(self.recipe.generating()?.pair(models, sample, cx)?);
+                }
+                Stage::Prediction => {}
+                Stage::Imprint => {
+                    self.imprints = Arc::new(match self.recipe.imprint {
+                        ImprintSource::Measured => measured(sample),
+                        ImprintSource::Predicted => imprints_of(&self.predictions, self.recipe.shift, sample)?,
+                    });
+                }
+                Stage::Mask => self.contact = Some(Arc::new(self.masks(touch, models)?)),
+                Stage::Cloud => {
+                    self.points = self.contact.as_ref().map(|contact| Arc::new(contact.points(sample)));
+                }
+                Stage::Pose => {
+                    let found = self.pose_by(touch, &*self.recipe.registration.method(), ask);
+                    self.pose = Some(Arc::new(found));
+                }
+            }
+            self.reached = Some(next);
+        }
+        Ok(self)
+    }
+
+    /// Asks the mask model of the imprints now, so that masks by other choices need not: models run one at a time.
+    pub fn see(&mut self, touch: Touch<'_>, models: &Models) {
+        let Some(model) = &self.recipe.mask_model else { return };
+        let of = self.recipe.imprint_of();
+        for (pad, imprint) in self.imprints.entries() {
+            if self.mask_inputs(touch, &of).drawn(pad, imprint).is_some() {
+                continue;
+            }
+            // What fails here fails again, and is said, where the mask is asked for.
+            let found = caught(|| models.probability(model, self.recipe.engine, imprint));
+            self.probabilities[pad] = found.ok().and_then(Result::ok).map(Arc::new);
+        }
+    }
+
+    /// The pose by a registration that no recipe names, such as one with the traps of the lab's.
+    ///
+    /// # Errors
+    /// Why there is none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn pose_by(
+        &self,
+        touch: Touch<'_>,
+        registration: &dyn Register,
+        ask: Ask<'_>,
+    ) -> Result<PoseResult, TaskError> {
+        let tool = touch.tool.map_err(Clone::clone)?;
+        let truth = touch.sample.grasp_from_object;
+        self.with_contacts(touch, |contacts| pose(contacts, tool, registration, ask, truth))?
+    }
+
+    /// Candidates for the tool of the touch, the likeliest first.
+    ///
+    /// # Errors
+    /// If there are no contact points.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn which_tool<'t>(
+        &self,
+        touch: Touch<'_>,
+        tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
+        registration: &dyn Register,
+    ) -> Result<Vec<Candidate>, TaskError> {
+        self.with_contacts(touch, |contacts| which_tool(contacts, tools, registration))
+    }
+
+    /// The contact points with the imprints that they are from, as every registration takes them.
+    ///
+    /// # Errors
+    /// If there are no contact points.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn with_contacts<T>(&self, touch: Touch<'_>, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
+        let points = self.points().map_err(Clone::clone)?;
+        let images = images(touch.sample, &self.contact().imprints.as_ref(), self.recipe.imprint);
+        Ok(of(Contacts { points, images: &images }))
+    }
+
+    /// Contact probability by the mask model at the imprint of a pad, asked once, and the probability from which on
+    /// that is contact by the recipe.
+    ///
+    /// # Errors
+    /// If there is no mask model or no such imprint, or the model cannot be loaded or run.
+    pub(crate) fn probability(&mut self, pad: PadId, models: &Models) -> Result<(Probability, f32), TaskError> {
+        let found = match &self.probabilities[pad] {
+            Some(known) => known.clone(),
+            None => {
+                let imprint = self.imprints[pad].as_ref();
+                let imprint = imprint.ok_or_else(|| TaskError::new("Contact mask", "there is no imprint"))?;
+                let model = self.recipe.mask_model.as_ref().ok_or_else(no_mask_model)?;
+                let found = Arc::new(models.probability(model, self.recipe.engine, imprint)?);
+                self.probabilities[pad].insert(found).clone()
+            }
+        };
+        let least = self.recipe.mask.probability.unwrap_or(found.1);
+        Ok((found, least))
+    }
+
+    /// Inputs of a touch's masks; drawn ones are left out where the recipe says so.
+    fn mask_inputs<'a>(&self, touch: Touch<'a>, of: &'a ImprintOf) -> MaskInputs<'a> {
+        let labels = self.recipe.hand.then_some(touch.labels);
+        MaskInputs { sample: touch.sample, tool: touch.tool.ok(), labels, of: Some(of) }
+    }
+
+    fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
+        let made_by = self.recipe.mask_recipe()?;
+        let of = self.recipe.imprint_of();
+        let inputs = self.mask_inputs(touch, &of);
+        let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());
+        for (pad, imprint) in imprints.entries() {
+            let unet = |imprint: &DepthMap| {
+                let (found, least) = self.probability(pad, models)?;
+                Ok(contact_of(&found.0, imprint, least))
+            };
+            let finger = || touch.sample.rig.pad_key(pad);
+            let found = contact_mask(&made_by, imprint, pad, inputs, unet);
+            let named = |err: TaskError| TaskError { why: format!("{} finger: {}", finger(), err.why), ..err };
+            masks[pad] = Some(found.map_err(named)?);
+        }
+        let model = self.recipe.mask_model.as_ref().map(|model| model.name.clone());
+        Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
+    }
+
+    /// True where it came to a stage.
+    pub fn has(&self, stage: Stage) -> bool {
+        self.reached >= Some(stage)
+    }
+
+    /// The recipe that it is by.
+    pub fn recipe(&self) -> &Recipe {
+        &self.recipe
+    }
+
+    /// The contact masks with their imprints.
+    ///
+    /// # Panics
+    /// Before [`Stage::Mask`].
+    pub fn contact(&self) -> &Contact {
+        self.contact.as_ref().expect("the masks were asked for")
+    }
+
+    /// The contact points of all pads, grasp frame, meters.
+    ///
+    /// # Errors
+    /// Why there are none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Cloud`].
+    pub fn points(&self) -> Result<&Vec<DVec3>, &TaskError> {
+        (**self.points.as_ref().expect("the points were asked for")).as_ref()
+    }
+
+    /// The pose.
+    ///
+    /// # Errors
+    /// Why there is none.
+    ///
+    /// # Panics
+    /// Before [`Stage::Pose`].
+    pub fn pose(&self) -> Result<&PoseResult, &TaskError> {
+        (**self.pose.as_ref().expect("the pose was asked for")).as_ref()
+    }
+}

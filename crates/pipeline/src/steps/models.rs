@@ -1,0 +1,533 @@
+//! [`Models`]: the models of a run of the program, loaded when first needed and kept loaded; predictions come from the
+//! disk where they were made before.
+
+use std::collections::BTreeMap;
+use std::ops::ControlFlow;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use strum::IntoEnumIterator as _;
+
+use crate::error::TaskError;
+use crate::infer::bundle::GeneratorSpec;
+use crate::infer::engine::{EngineChoice, resolve};
+use crate::infer::generator::{GenerateError, Generator, Item, Observer};
+use crate::infer::kept_key::{KeptKey, input_digest};
+use crate::infer::mask::{MaskError, MaskModel};
+use crate::infer::sheets::Sheets;
+use crate::infer::store::{Inputs, Store};
+use crate::io::caught::caught;
+use crate::job::{JobCx, PreviewPicture};
+use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
+use crate::steps::imprint::in_meters;
+use crate::steps::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
+use crate::steps::prediction::{Chains, Prediction};
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::diffusion::{GenerateConfig, Progress};
+use touch2touch_core::fit::Fitted;
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
+use touch2touch_core::postprocess::{ColorChain, RawPrediction, ShiftMode};
+use touch2touch_core::rig::{PadId, PerPad};
+
+/// Predictions of one touch that are read back; older ones stay on the disk.
+const LISTED: usize = 16;
+
+/// A prediction to be made.
+#[derive(Clone, Copy, Debug)]
+pub struct GenerateInput<'a> {
+    /// The condition: [`touch2touch_core::sample::PadTouch::picture`] of the sensor that the bundle starts from.
+    pub difference: &'a RgbGrid,
+    /// Seed of its noise.
+    pub seed: u64,
+    /// `[width, height]` of the bubble image, for pictures on the way; `[0, 0]` where there is none.
+    pub size: [usize; 2],
+}
+
+/// A prediction from the disk, with the choices that made it.
+#[derive(Clone, Debug)]
+pub struct KeptPrediction {
+    /// The engine to ask for to make it again.
+    pub engine: EngineChoice,
+    /// The choices.
+    pub config: GenerateConfig,
+    /// The prediction.
+    pub prediction: Prediction,
+}
+
+/// A model in memory, with the bundle's identity and the engine it was loaded for.
+type Loaded<T> = Option<((Arc<str>, EngineChoice), T)>;
+
+/// The models of a run of the program. Shared by threads; each model runs on one at a time.
+#[derive(Debug, Default)]
+pub struct Models {
+    store: Option<Mutex<Store>>,
+    /// Scores beside the predictions.
+    sheets: Arc<Sheets>,
+    generator: Mutex<Loaded<Generator>>,
+    mask_model: Mutex<Loaded<MaskModel>>,
+    outputs: Mutex<BTreeMap<Arc<str>, OutputChains>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Runs what holds a model's lock while the engine computes. A thread of a pool takes on other work of the pool while it
+/// waits for the engine's threads, and that work may want the same lock, which it then waits for for ever: such a thread has
+/// another one do it.
+pub fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
+    if rayon::current_thread_index().is_none() {
+        return job();
+    }
+    let done = std::thread::scope(|scope| scope.spawn(job).join());
+    done.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
+}
+
+/// Folder of the sheets: that of the store, if it keeps anything.
+fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
+    (store.budget() > 0).then(|| store.folder().to_owned())
+}
+
+/// Output of a bundle: ways to meters, steps to a color picture, and the size of its condition.
+#[derive(Clone, Debug, Default)]
+struct OutputChains {
+    chains: Chains,
+    fit: Option<Arc<Fitted>>,
+    color: Option<ColorChain>,
+    input: [usize; 2],
+}
+
+fn output_chains_of(spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
+    let chain = |mode| (mode, spec.depth_chain(mode).map_err(|err| err.to_string()));
+    OutputChains {
+        chains: Arc::new(ShiftMode::iter().map(chain).collect()),
+        fit: fit.cloned(),
+        color: spec.color_chain(),
+        input: spec.input.sensor.size,
+    }
+}
+
+/// The model of `key`, loaded by `load` if it is not there.
+fn ready<T>(
+    loaded: &mut Loaded<T>,
+    key: (Arc<str>, EngineChoice),
+    load: impl FnOnce() -> Result<T, TaskError>,
+) -> Result<&mut T, TaskError> {
+    if loaded.as_ref().is_none_or(|(known, _)| *known != key) {
+        // Before the new one is loaded, so that both are never in memory.
+        *loaded = None;
+        *loaded = Some((key, load()?));
+    }
+    Ok(&mut loaded.as_mut().expect("it was just put there").1)
+}
+
+impl Models {
+    /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
+    pub fn new(store: Option<Store>) -> Self {
+        let sheets = Arc::new(Sheets::new(store.as_ref().and_then(folder_of)));
+        Self { store: store.map(Mutex::new), sheets, ..Self::default() }
+    }
+
+    /// Further models, with the same kept predictions.
+    #[must_use]
+    pub fn beside(&self) -> Self {
+        let again = |store: &Mutex<Store>| {
+            let store = lock(store);
+            Store::new(store.folder().to_owned(), store.budget())
+        };
+        Self { store: self.store.as_ref().map(again).map(Mutex::new), sheets: self.sheets.clone(), ..Self::default() }
+    }
+
+    /// Forgets everything that was loaded: a bug may have left it half changed.
+    pub fn forget(&self) {
+        *lock(&self.generator) = None;
+        *lock(&self.mask_model) = None;
+    }
+
+    /// Sets what kept predictions may take, bytes.
+    pub fn keep_at_most(&self, bytes: u64) {
+        if let Some(store) = &self.store {
+            let mut store = lock(store);
+            store.set_budget(bytes);
+            self.sheets.set_folder(folder_of(&store));
+        }
+    }
+
+    /// Scores that were computed before.
+    pub(crate) fn sheets(&self) -> &Arc<Sheets> {
+        &self.sheets
+    }
+
+    /// The ways to meters that a generator's bundle offers; none for another kind.
+    ///
+    /// # Errors
+    /// If the bundle cannot be opened.
+    pub fn chains(&self, bundle: &BundleInfo) -> Result<Chains, TaskError> {
+        Ok(self.outputs(bundle)?.chains)
+    }
+
+    fn outputs(&self, bundle: &BundleInfo) -> Result<OutputChains, TaskError> {
+        if let Some(known) = lock(&self.outputs).get(&bundle.id) {
+            return Ok(known.clone());
+        }
+        let opened = bundle.open(&format!("Open {}", bundle.name))?;
+        Ok(opened.generator().map(|spec| self.output_chains_by(bundle, spec, opened.fit())).unwrap_or_default())
+    }
+
+    /// Output chains of a bundle that is open already.
+    fn output_chains_by(&self, bundle: &BundleInfo, spec: &GeneratorSpec, fit: Option<&Arc<Fitted>>) -> OutputChains {
+        lock(&self.outputs).entry(bundle.id.clone()).or_insert_with(|| output_chains_of(spec, fit)).clone()
+    }
+
+    /// Predictions; one answer for each, in order. What was made before is not made
+    /// again.
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run, the choices are not for this bundle, or the job was told to stop.
+    pub fn predict(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[GenerateInput<'_>],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        self.make(self.store.as_ref(), bundle, engine, config, wanted, cx)
+    }
+
+    /// Predictions, where a picture that fails, or makes a model panic, does not take the others with it. `None` once
+    /// told to stop.
+    pub(crate) fn predict_each(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[GenerateInput<'_>],
+        cx: &JobCx,
+    ) -> Option<Vec<Result<Prediction, TaskError>>> {
+        let what = || format!("Generate with {}", bundle.name);
+        let run = |wanted: &[GenerateInput<'_>]| {
+            let predict = || self.predict(bundle, engine, config, wanted, cx);
+            caught(predict).unwrap_or_else(|message| Err(TaskError::panicked(what(), &message)))
+        };
+        let one = |wanted: &GenerateInput<'_>| {
+            let made = run(std::slice::from_ref(wanted))?.pop();
+            made.ok_or_else(|| TaskError::new(what(), "the generator gave no prediction"))
+        };
+        let made = match run(wanted) {
+            Ok(made) => made.into_iter().map(Ok).collect(),
+            Err(err) if err.is_cancelled() => return None,
+            Err(_) => wanted.iter().map(one).collect(),
+        };
+        (!cx.cancel.is_cancelled()).then_some(made)
+    }
+
+    fn make(
+        &self,
+        store: Option<&Mutex<Store>>,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+        wanted: &[GenerateInput<'_>],
+        cx: &JobCx,
+    ) -> Result<Vec<Prediction>, TaskError> {
+        let what = format!("Generate with {}", bundle.name);
+        let fail = |err: GenerateError| match err {
+            GenerateError::Cancelled => TaskError::cancelled(&what),
+            err => TaskError::from_error(&what, &err),
+        };
+        if wanted.is_empty() {
+            return Ok(Vec::new());
+        }
+        let kind = resolve(engine).map_err(|err| fail(err.into()))?;
+        let (images, image) = distinct(wanted);
+        let mut answers: Vec<Option<(RawPrediction, f64, bool)>> = vec![None; wanted.len()];
+        let mut keys = Vec::new();
+        if let Some(store) = store {
+            let digests: Vec<String> = images.iter().map(|difference| input_digest(difference)).collect();
+            let recipe = |(item, at): (&GenerateInput<'_>, &usize)| {
+                let config = GenerateConfig { seed: item.seed, ..*config };
+                KeptKey { input: digests[*at].clone(), bundle: bundle.id.to_string(), engine: kind, config }
+            };
+            keys = wanted.iter().zip(&image).map(recipe).collect();
+            let store = lock(store);
+            for (answer, key) in answers.iter_mut().zip(&keys) {
+                *answer = store.get(key).map(|found| (found.raw, found.seconds, true));
+            }
+        }
+        let fresh: Vec<usize> = (0..wanted.len()).filter(|at| answers[*at].is_none()).collect();
+        let OutputChains { chains, fit, color, .. } = if fresh.is_empty() {
+            // Nothing has to be loaded to show what is there.
+            self.outputs(bundle)?
+        } else {
+            outside_of_pools(|| {
+                let mut loaded = lock(&self.generator);
+                let generator = ready(&mut loaded, (bundle.id.clone(), engine), || {
+                    cx.progress(0, config.steps.into(), "loading the model");
+                    open_generator(bundle, engine)
+                })?;
+                let outputs = self.output_chains_by(bundle, generator.spec(), generator.fit());
+                let begin = std::time::Instant::now();
+                let items: Vec<Item> =
+                    fresh.iter().map(|&at| Item { image: image[at], seed: wanted[at].seed }).collect();
+                let mut follow = Follow { cx, wanted, fresh: &fresh, chains: &outputs.chains };
+                let made = generator.run(&images, &items, config, &mut follow).map_err(fail)?;
+                let each = begin.elapsed().as_secs_f64() / fresh.len() as f64;
+                for (&at, raw) in fresh.iter().zip(made) {
+                    if let Some(store) = store
+                        && let Err(err) = lock(store).put(&keys[at], &raw, each)
+                    {
+                        log::warn!("a prediction could not be kept on the disk: {err}");
+                    }
+                    answers[at] = Some((raw, each, false));
+                }
+                Ok::<_, TaskError>(outputs)
+            })?
+        };
+        let prediction = |(raw, seconds, kept)| Prediction {
+            raw,
+            chains: chains.clone(),
+            fit: fit.clone(),
+            color,
+            bundle: bundle.id.clone(),
+            engine: kind.label().to_owned(),
+            seconds,
+            kept,
+        };
+        Ok(answers.into_iter().flatten().map(prediction).collect())
+    }
+
+    /// Loads a generator or a mask model, so that one that cannot be used is known before the first touch.
+    ///
+    /// # Errors
+    /// If it cannot be loaded, or is of another kind.
+    pub fn load(&self, bundle: &BundleInfo, engine: EngineChoice) -> Result<(), TaskError> {
+        let key = (bundle.id.clone(), engine);
+        let generator = || ready(&mut lock(&self.generator), key.clone(), || open_generator(bundle, engine)).map(drop);
+        let mask_model =
+            || ready(&mut lock(&self.mask_model), key.clone(), || open_mask_model(bundle, engine)).map(drop);
+        match bundle.kind {
+            BundleKind::Generator => outside_of_pools(generator),
+            BundleKind::Mask => outside_of_pools(mask_model),
+            kind @ (BundleKind::Classifier | BundleKind::Features) => {
+                Err(TaskError::new(format!("Open {}", bundle.name), format!("it is a {}", kind.name())))
+            }
+        }
+    }
+
+    /// Loads a generator and runs it once on two blank images, so that the first touch does not wait for memory and
+    /// kernels; the result is not kept.
+    ///
+    /// # Errors
+    /// As [`Self::predict`].
+    pub fn warm_up(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        config: &GenerateConfig,
+    ) -> Result<Prediction, TaskError> {
+        let [width, height] = self.outputs(bundle)?.input;
+        let blank = RgbGrid::filled(width, height, [0.0; 3]);
+        // Both fingers of a grasp go through the model together.
+        let item = |seed| GenerateInput { difference: &blank, seed, size: [0, 0] };
+        let both = [item(config.seed), item(config.seed.wrapping_add(1))];
+        let made = self.make(None, bundle, engine, config, &both, &JobCx::unwatched())?.pop();
+        made.ok_or_else(|| TaskError::new(format!("Generate with {}", bundle.name), "the model gave no answer"))
+    }
+
+    /// Predictions of an image that were made before and are kept on the disk, oldest first, as far as their bundle is
+    /// among `bundles`. `engine` is the choice in force: what it stands for is said so. Never fails: what cannot be
+    /// read is not there.
+    pub fn kept(&self, bundles: &[BundleInfo], engine: EngineChoice, difference: &RgbGrid) -> Vec<KeptPrediction> {
+        let Some(store) = &self.store else { return Vec::new() };
+        let found = lock(store).of_input(&input_digest(difference), LISTED);
+        let in_force = resolve(engine).ok();
+        let mut kept = Vec::new();
+        // Oldest first: the last one is the one shown.
+        for stored in found.into_iter().rev() {
+            let Some(bundle) = by_id(bundles, &stored.recipe.bundle) else { continue };
+            let Ok(OutputChains { chains, fit, color, .. }) = self.outputs(bundle) else { continue };
+            let engine = match stored.recipe.engine {
+                made if Some(made) == in_force => engine,
+                made => made.into(),
+            };
+            let prediction = Prediction {
+                raw: stored.raw,
+                chains,
+                fit,
+                color,
+                bundle: bundle.id.clone(),
+                engine: stored.recipe.engine.label().to_owned(),
+                seconds: stored.seconds,
+                kept: true,
+            };
+            kept.push(KeptPrediction { engine, config: stored.recipe.config, prediction });
+        }
+        kept
+    }
+
+    /// Names of the predictions that are kept on the disk.
+    pub(crate) fn kept_inputs(&self) -> Inputs {
+        self.store.as_ref().map_or_else(Inputs::default, |store| lock(store).inputs())
+    }
+
+    /// Contact mask by the mask model for an imprint in meters, with what it is made of in the end. A pixel of at least
+    /// `probability` is contact; `None` for the bundle's own.
+    ///
+    /// # Errors
+    /// If the model cannot be loaded or run.
+    pub fn mask(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        imprint: &DepthMap,
+        probability: Option<f32>,
+    ) -> Result<ContactMask, TaskError> {
+        self.with_mask_model(bundle, engine, |model| model.contact(imprint, probability))
+    }
+
+    /// The mask model's probability of contact at each pixel of its own grid, and from which on it calls that contact.
+    ///
+    /// # Errors
+    /// As [`Self::mask`].
+    pub fn probability(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        imprint: &DepthMap,
+    ) -> Result<(Grid<f32>, f32), TaskError> {
+        self.with_mask_model(bundle, engine, |model| Ok((model.probability(imprint)?, model.least_probability())))
+    }
+
+    fn with_mask_model<T: Send>(
+        &self,
+        bundle: &BundleInfo,
+        engine: EngineChoice,
+        ask: impl FnOnce(&mut MaskModel) -> Result<T, MaskError> + Send,
+    ) -> Result<T, TaskError> {
+        outside_of_pools(|| {
+            let mut loaded = lock(&self.mask_model);
+            let model = ready(&mut loaded, (bundle.id.clone(), engine), || open_mask_model(bundle, engine))?;
+            ask(model).map_err(|err| TaskError::from_error(format!("Mask with {}", bundle.name), &err))
+        })
+    }
+
+    /// The contact mask of one pad's imprint: the one drawn by hand, else as the choice says.
+    ///
+    /// # Errors
+    /// If something the choice needs is not there, or the model cannot be loaded or run.
+    pub fn contact_mask(
+        &self,
+        by: Masking<'_>,
+        imprint: &DepthMap,
+        pad: PadId,
+        inputs: MaskInputs<'_>,
+    ) -> Result<ContactMask, TaskError> {
+        let unet = |imprint: &DepthMap| match by.model {
+            Some(model) => self.mask(model, by.engine, imprint, by.choice.probability),
+            None => Err(no_mask_model()),
+        };
+        mask::contact_mask(&by.recipe()?, imprint, pad, inputs, unet)
+    }
+
+    /// The contact masks of all imprints of a pair, as [`Self::contact_mask`].
+    ///
+    /// # Errors
+    /// As [`Self::contact_mask`].
+    pub fn contact(
+        &self,
+        by: Masking<'_>,
+        imprints: PerPad<DepthMap>,
+        inputs: MaskInputs<'_>,
+    ) -> Result<Contact, TaskError> {
+        let mut masks = PerPad::default();
+        for (pad, imprint) in imprints.entries() {
+            masks[pad] = Some(self.contact_mask(by, imprint, pad, inputs)?);
+        }
+        Ok(Contact { imprints, masks, recipe: by.recipe()?, model: by.model.map(|model| model.name.clone()) })
+    }
+}
+
+fn open_generator(bundle: &BundleInfo, engine: EngineChoice) -> Result<Generator, TaskError> {
+    let what = format!("Generate with {}", bundle.name);
+    Generator::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
+}
+
+fn open_mask_model(bundle: &BundleInfo, engine: EngineChoice) -> Result<MaskModel, TaskError> {
+    let what = format!("Mask with {}", bundle.name);
+    MaskModel::open(&bundle.open(&what)?, engine).map_err(|err| TaskError::from_error(&what, &err))
+}
+
+/// Choice, model and engine of contact masks.
+#[derive(Clone, Copy, Debug)]
+pub struct Masking<'a> {
+    /// Of what.
+    pub choice: MaskChoice,
+    /// The mask model, where there is one.
+    pub model: Option<&'a BundleInfo>,
+    /// The engine that runs it.
+    pub engine: EngineChoice,
+}
+
+impl Masking<'_> {
+    /// The recipe behind the choice.
+    ///
+    /// # Errors
+    /// If it takes a model and there is none.
+    pub fn recipe(&self) -> Result<MaskRecipe, TaskError> {
+        self.choice.recipe(self.model.map(|model| &model.id)).ok_or_else(no_mask_model)
+    }
+}
+
+fn no_mask_model() -> TaskError {
+    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
+}
+
+/// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is
+/// whose.
+fn distinct<'a>(wanted: &[GenerateInput<'a>]) -> (Vec<&'a RgbGrid>, Vec<usize>) {
+    let mut images: Vec<&RgbGrid> = Vec::new();
+    let mut of = |difference: &'a RgbGrid| match images.iter().position(|known| std::ptr::eq(*known, difference)) {
+        Some(at) => at,
+        None => {
+            images.push(difference);
+            images.len() - 1
+        }
+    };
+    let image = wanted.iter().map(|item| of(item.difference)).collect();
+    (images, image)
+}
+
+/// Progress, Cancel and previews of a run.
+struct Follow<'a> {
+    cx: &'a JobCx,
+    wanted: &'a [GenerateInput<'a>],
+    /// Positions in `wanted` of the predictions that are made.
+    fresh: &'a [usize],
+    chains: &'a Chains,
+}
+
+impl Follow<'_> {
+    fn shift(&self, after: Progress, item: usize) -> Option<(usize, ShiftMode)> {
+        let at = *self.fresh.get(item)?;
+        Some((at, self.cx.previews()?.wants(at, after.step)?))
+    }
+}
+
+impl Observer for Follow<'_> {
+    fn progress(&mut self, p: Progress) -> ControlFlow<()> {
+        self.cx.progress(p.step.into(), p.of.into(), format!("step {} of {}", p.step, p.of));
+        if self.cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+
+    fn wants_preview(&mut self, after: Progress, item: usize) -> bool {
+        self.shift(after, item).is_some()
+    }
+
+    fn preview(&mut self, after: Progress, item: usize, raw: RawPrediction) {
+        let Some((at, shift)) = self.shift(after, item) else { return };
+        let Some(Ok(chain)) = self.chains.get(&shift) else { return };
+        if let (Ok(depth), Some(previews)) = (in_meters(chain, &raw, self.wanted[at].size), self.cx.previews()) {
+            previews.show(at, PreviewPicture { step: after.step, of: after.of, depth });
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! The room of the panel about the open data set: what it is, what the models are worth on it, and what would better that.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::adapt::{self, AdaptCommand, AdaptPairs};
+use super::effect::{Access, Effect, Errand};
+use super::keys::{DatasetSeq, ImprintSource};
+use super::library::{self, LibraryCommand};
+use super::pane::Pane;
+use super::settings::{self, ColorRange, prefer};
+use super::source::DataSource;
+use super::state::State;
+use super::state::tasks::TaskKind;
+use super::state::view::UiRequest;
+use super::train::{self, TrainCommand};
+use super::{recipe, tasks};
+use touch2touch_core::read_as::parse_list;
+use touch2touch_pipeline::doctor::{self, Cure, Examined, SAMPLE, Worth, WorthSetup};
+use touch2touch_pipeline::doubts;
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::doctor::MOST_PAIRS;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::learn::train::MasksFrom;
+use touch2touch_pipeline::steps::bundles::BundleKind;
+use touch2touch_pipeline::steps::predict::Generating;
+use touch2touch_pipeline::steps::recipe::Recipe;
+
+/// A command to the panel.
+#[derive(Clone, Debug)]
+pub enum DoctorCommand {
+    /// Opens or closes it.
+    Show(bool),
+    /// Tries the models on a sample of the data set.
+    Try,
+    /// Does what betters a fact.
+    Cure(Cure),
+}
+
+pub(super) fn step(state: &mut State, command: DoctorCommand, effects: &mut Vec<Effect>) {
+    match command {
+        DoctorCommand::Show(shown) => state.doctor.shown = shown && state.library.open.is_some(),
+        DoctorCommand::Try => {
+            let (Some(setup), Some(open)) = (worth_setup(state), &state.library.open) else { return };
+            let source = open.source.clone();
+            let title = format!("Try the models on {}", source.title());
+            if tasks::start(state, title, TryModels { source, setup }, effects).is_some() {
+                state.doctor.tried = true;
+            }
+        }
+        DoctorCommand::Cure(cure) if can(state, &cure) => carry_out(state, cure, effects),
+        DoctorCommand::Cure(_) => {}
+    }
+}
+
+/// True where a cure can do anything now.
+pub(crate) fn can(state: &State, cure: &Cure) -> bool {
+    let free = |kind| state.tasks.of_kind(kind).is_none();
+    state.library.open.is_some()
+        && match cure {
+            Cure::FitRange { min_m, max_m } => !is_fitted(state.settings.range, [*min_m, *max_m]),
+            Cure::ReadTool { .. } | Cure::ReadAs { .. } => true,
+            Cure::Fit { .. } => adapt::can_adapt(state) && free(TaskKind::Fit),
+            Cure::TrainFromCad { .. } => train::setup(state).is_some() && free(TaskKind::Train),
+            Cure::Examine { .. } => free(TaskKind::Examine),
+        }
+}
+
+/// True where colors span about this range already: a little more or less is the same to the eye.
+fn is_fitted(range: ColorRange, [min_m, max_m]: [f32; 2]) -> bool {
+    let near = 0.15 * (max_m - min_m);
+    (range.min_m - min_m).abs() <= near && (range.max_m - max_m).abs() <= near
+}
+
+fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
+    match cure {
+        Cure::FitRange { min_m, max_m } => {
+            let range = prefer(move |s| s.range = ColorRange { min_m, max_m, locked: true });
+            settings::step(state, range, effects);
+        }
+        Cure::ReadTool { tool, unit, replacing } => {
+            library::step(state, LibraryCommand::ReadToolAs { tool, unit, replacing }, effects);
+        }
+        Cure::ReadAs { list } => {
+            let Some((seq, source)) = state.library.open.as_ref().map(|open| (open.seq, open.source.clone())) else {
+                return;
+            };
+            tasks::start(state, TaskKind::ReadOtherwise.name(), ReadOtherwise { seq, source, list }, effects);
+        }
+        Cure::Fit { .. } => {
+            stop_trying(state, effects);
+            adapt::step(state, AdaptCommand::Choose(AdaptPairs::All), effects);
+            adapt::step(state, AdaptCommand::Start, effects);
+            effects.push(Effect::Ui(UiRequest::ShowPane(Pane::Adapt)));
+            state.doctor.shown = false;
+        }
+        Cure::TrainFromCad { .. } => {
+            stop_trying(state, effects);
+            state.train.form.choice.from = MasksFrom::Cad;
+            train::step(state, TrainCommand::Start, effects);
+            effects.push(Effect::Ui(UiRequest::ShowPane(Pane::Train)));
+            state.doctor.shown = false;
+        }
+        Cure::Examine { .. } => {
+            let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
+            let errand = Examine { source, recipe: tried_recipe(state) };
+            tasks::start(state, TaskKind::Examine.name(), errand, effects);
+        }
+    }
+}
+
+/// Ends the trial of the models: something else takes its place and must not wait for it.
+fn stop_trying(state: &mut State, effects: &mut Vec<Effect>) {
+    if let Some((ticket, _)) = state.tasks.of_kind(TaskKind::TryModels) {
+        tasks::step(state, tasks::TasksCommand::Cancel(ticket), effects);
+    }
+}
+
+/// The models that are tried: a generator as it was before it was fitted to anything.
+fn tried_recipe(state: &State) -> Recipe {
+    let generator = adapt::to_be_fitted(state).cloned();
+    Recipe {
+        generator: generator.map(|bundle| (bundle.clone().into(), state.settings.generate.config(&bundle))),
+        ..recipe::in_force(state, ImprintSource::Predicted)
+    }
+}
+
+/// The setup of trying the models now; `None` where no data, or no model, is there.
+fn worth_setup(state: &State) -> Option<WorthSetup> {
+    // The models come from what is built in.
+    state.library.open.as_ref()?.source.root()?;
+    let recipe = tried_recipe(state);
+    (recipe.generator.is_some() || recipe.mask_model.is_some()).then_some(WorthSetup { recipe, pairs: SAMPLE })
+}
+
+/// True where the models can be tried.
+pub(crate) fn can_try(state: &State) -> bool {
+    worth_setup(state).is_some()
+}
+
+/// True where the models are to be tried because the panel is looked at, and were not yet.
+pub(crate) fn wants_worth(state: &State) -> bool {
+    let doctor = &state.doctor;
+    doctor.shown && !doctor.tried && can_try(state) && state.tasks.of_kind(TaskKind::TryModels).is_none()
+}
+
+/// The name of the generator in force, where it was fitted to something.
+pub(crate) fn fitted_in_use(state: &State) -> Option<&str> {
+    let now = recipe::bundle(state, BundleKind::Generator).ok()?;
+    now.is_fitted().then_some(now.name.as_str())
+}
+
+/// Tries the models on a sample.
+pub struct TryModels {
+    source: Arc<dyn DataSource>,
+    setup: WorthSetup,
+}
+
+impl Errand for TryModels {
+    type End = Option<Arc<Worth>>;
+    const KIND: TaskKind = TaskKind::TryModels;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let dataset = self.source.on_disk(Self::KIND.name())?;
+        Ok(doctor::worth(dataset, &self.setup, access.services.models(), cx)?.map(Arc::new))
+    }
+
+    fn ended(worth: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        state.doctor.worth = worth.clone();
+    }
+}
+
+/// Examines every pair.
+pub struct Examine {
+    source: Arc<dyn DataSource>,
+    recipe: Recipe,
+}
+
+impl Errand for Examine {
+    type End = Arc<Examined>;
+    const KIND: TaskKind = TaskKind::Examine;
+
+    fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
+        let dataset = self.source.on_disk(Self::KIND.name())?;
+        let generating = self.recipe.generating().ok();
+        let generator = generating.map(|generating: Generating<'_>| (access.services.models(), generating));
+        doctor::examined(dataset, MOST_PAIRS, doubts::PAIRS, generator, cx).map(Arc::new)
+    }
+
+    fn ended(examined: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
+        state.doctor.examined = Some(examined.clone());
+    }
+}
+
+/// Has the data set read otherwise than it is stored, and opens it again.
+pub struct ReadOtherwise {
+    seq: DatasetSeq,
+    source: Arc<dyn DataSource>,
+    list: String,
+}
+
+impl Errand for ReadOtherwise {
+    /// The data set that it is of, the file that says so, and what it says.
+    type End = (DatasetSeq, PathBuf, String);
+    const KIND: TaskKind = TaskKind::ReadOtherwise;
+
+    fn run(self, _: &Access, _: &JobCx) -> Result<Self::End, TaskError> {
+        let what = Self::KIND.name();
+        let dataset = self.source.on_disk(what)?;
+        let read_as = parse_list(&self.list).map_err(|why| TaskError::new(what, why))?;
+        Ok((self.seq, doubts::read_otherwise(dataset, &read_as)?, self.list))
+    }
+
+    fn ended((seq, file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
+        let text = match list.as_str() {
+            "" => "The data are read as they are stored".to_owned(),
+            list => format!("The data are read with {list}"),
+        };
+        state.log.saved(text, file.clone());
+        if state.library.is_open(*seq) {
+            library::step(state, LibraryCommand::Reload, effects);
+        }
+    }
+}
