@@ -29,35 +29,25 @@ CLASSIFIER = ("--classifier", MODELS / "tool_classifier")
 
 
 class Bench:
-    """Both programs, the folders that were named, and the commands that were given so far."""
+    """Both programs, and the folders that were named."""
 
     def __init__(self, programs, out, places):
         self.verbs, self.benches = (Program(programs / name, out) for name in ("touch2touch", "touch2touch-bench"))
-        self.out, self.places, self.commands = out, places, []
+        self.out, self.places = out, places
         out.mkdir(parents=True, exist_ok=True)
 
-    def said(self, name, words):
-        """A command as a person would give it, folders by their names in capitals."""
-        text = " ".join(map(str, words)).replace(str(self.out), "OUT").replace(str(MODELS), "assets/models")
-        for place, path in self.places.items():
-            text = text.replace(str(path), place.upper()) if path else text
-        self.commands.append(f"{name} {text}")
-
     def verb(self, *words):
-        self.said("touch2touch", words)
         return self.verbs.run(*words)
 
     def bench(self, name, *words):
         """A benchmark; its pictures lie beside its file in `out`."""
         file = self.out / f"{name}.json"
-        self.said("touch2touch-bench", words)
         return self.benches.write(file, *words)
 
     def cases(self, name, *words):
         """A folder of fresh cases; the same seed writes the same."""
         folder = self.out / "cases" / name
         words = ("cases", "--out", folder, *words)
-        self.said("touch2touch-bench", words)
         if not (folder / "done").exists():
             self.benches.run(*words)
             (folder / "done").touch()
@@ -237,8 +227,9 @@ def number(figure, digits, interval=True):
         return "-"
     if not isinstance(figure, dict):
         return f"{figure:.{digits}f}"
-    text, ends = f"{figure['value']:.{digits}f}", figure.get("interval")
-    return f"{text} [{ends[0]:.{digits}f}, {ends[1]:.{digits}f}]" if ends and interval else text
+    text, ends = f"{figure['value']:.{digits}f}", [f"{end:.{digits}f}" for end in figure.get("interval") or ()]
+    # An interval of no width says nothing.
+    return f"{text} [{', '.join(ends)}]" if interval and set(ends) - {text} else text
 
 
 def name_of(row):
@@ -489,8 +480,8 @@ STEPS = (
 def section(step, kept):
     """A step's table, and the origin of its figures."""
     facts = kept["made"]
-    made = f"Made {facts['date']} at commit {facts['commit']} in {facts['seconds']} s on {facts['machine']}:"
-    return "\n\n".join([f"## {step.what}", step.table(kept["figures"]), made, "\n".join(["```text", *facts["commands"], "```"])])
+    made = f"`./study {step.name}`, {facts['date']} at commit {facts['commit']}, {facts['seconds']} s on {facts['machine']}."
+    return "\n\n".join([f"## {step.what}", step.table(kept["figures"]), made])
 
 
 def write(results):
@@ -510,7 +501,7 @@ def measure(step, args):
     bench = Bench(args.programs.resolve(), args.out.resolve(), places)
     begun, load = time.monotonic(), machine()
     figures = step.figures(bench)
-    facts = {"date": today(), "commit": bench.verbs.commit(), "machine": load, "seconds": round(time.monotonic() - begun), "commands": bench.commands}
+    facts = {"date": today(), "commit": bench.verbs.commit(), "machine": load, "seconds": round(time.monotonic() - begun)}
     partial = args.results / f"{step.name}.partial"
     partial.write_text(json.dumps({"made": facts, "figures": figures}, ensure_ascii=False, indent=1))
     partial.replace(args.results / f"{step.name}.json")
