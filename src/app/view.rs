@@ -22,8 +22,6 @@ pub enum ViewCommand {
     SelectImprint(ImprintSource),
     /// Shows a proposal over the mask, or no longer: nothing else changes.
     Propose(bool),
-    /// Magnifies imprints around the pointer, or no longer.
-    ShowLens(bool),
     /// Shows both fingers, or only the active one.
     ShowBothFingers(bool),
     /// The pixel under the pointer, shared by all images.
@@ -66,7 +64,6 @@ pub(super) fn step(state: &mut State, command: ViewCommand, effects: &mut Vec<Ef
             labels::end_stroke(state, effects);
             state.selection.proposing = shown;
         }
-        ViewCommand::ShowLens(shown) => selection.lens = shown,
         ViewCommand::ShowBothFingers(both) => {
             labels::end_stroke(state, effects);
             state.selection.both_fingers = both;

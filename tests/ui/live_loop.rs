@@ -1,4 +1,4 @@
-//! After a stroke: what was before, and the lens.
+//! After a stroke: what was before.
 
 use eframe::egui::{Event, Key, Modifiers, PointerButton, pos2};
 use egui_kittest::kittest::Queryable as _;
@@ -74,40 +74,6 @@ fn what_was_before_a_stroke_stays_visible_until_the_next_or_elsewhere() {
 }
 
 #[test]
-fn the_lens_uploads_nothing_and_leaves_an_idle_window_idle() {
-    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    let picture = rig.harness.get_by_label("Measured imprint right").rect();
-    rig.harness.hover_at(picture.center());
-    rig.settle();
-    let uploads = rig.harness.state().uploads();
-    let without = rig.harness.render().unwrap();
-    rig.harness.key_press_modifiers(Modifiers::SHIFT, Key::M);
-    rig.harness.step();
-    rig.settle();
-    assert!(state(&rig).selection.lens);
-    let with = rig.harness.render().unwrap();
-    assert_ne!(without, with);
-    for at in [0.3, 0.5, 0.7] {
-        rig.harness.hover_at(pos2(picture.left() + at * picture.width(), picture.center().y));
-        rig.settle();
-    }
-    rig.shoot("label-lens");
-    assert_eq!(rig.harness.state().uploads(), uploads);
-    // It is painting's companion: a stroke beneath it is drawn as without.
-    let at = picture.center();
-    rig.harness.hover_at(at);
-    for pressed in [true, false] {
-        let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
-        rig.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers });
-        rig.harness.step();
-    }
-    rig.settle();
-    assert!(results::drawn_mask(state(&rig), MEASURED, lab::RIGHT).is_some());
-}
-
-#[test]
 #[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
 fn pictures_of_the_live_loop() {
     let Some(mut rig) = Rig::live(SIZE, Place::Demo) else { return };
@@ -120,7 +86,5 @@ fn pictures_of_the_live_loop() {
     rig.harness.hover_at(picture.center());
     let scene = state(&rig).settings.scene.clone();
     assert!(scene.layer(SceneLayer::Before).shown);
-    rig.send(ViewCommand::ShowLens(true));
-    rig.shoot("live-lens");
     rig.send(LabelsCommand::ResetMask);
 }

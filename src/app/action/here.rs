@@ -12,8 +12,8 @@ impl Action {
     /// True where its letter means it only where masks are drawn: it changes labels, or what the tools do to them.
     pub(crate) fn is_of_labeling(self) -> bool {
         use Action as A;
-        let looks = matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-            || matches!(self, A::Ghosts | A::Lens);
+        let looks =
+            matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger) || self == A::Ghosts;
         self.group() == Group::Mask && !looks
     }
 
@@ -50,7 +50,7 @@ impl Action {
                 picture
                     || range
                     || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-                    || matches!(self, A::Ghosts | A::Lens)
+                    || self == A::Ghosts
             }
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene => picture || self.is_of_scene(),

@@ -21,8 +21,6 @@ pub struct Selection {
     pub imprint: ImprintSource,
     /// True where a proposal is shown over the mask.
     pub proposing: bool,
-    /// True where imprints are magnified around the pointer.
-    pub lens: bool,
     /// True where both fingers are shown; else only the active one.
     pub both_fingers: bool,
     /// The pixel under the pointer: the cross-hair of all images.

@@ -1,7 +1,6 @@
 //! The image panes: GelSlim, measured and predicted imprint. Linked pan, zoom and cross-hair.
 
 pub(crate) mod bar;
-mod lens;
 pub(crate) mod link;
 mod paint;
 
@@ -452,9 +451,6 @@ fn depth_pane(
         });
     }
     captions(cx, &output, pane, finger);
-    if cx.state.selection.lens && !paint::is_bared(ui) {
-        lens::show(cx, memory, &output, texture, (source, finger, paintable));
-    }
     histogram
 }
 

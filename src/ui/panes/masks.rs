@@ -429,7 +429,6 @@ fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
         (Action::MaskVisible, "mask", settings.mask_visible),
         (Action::MaskOutline, "outline", settings.mask_outline),
         (Action::Ghosts, "before", settings.ghosts),
-        (Action::Lens, "lens", selection.lens),
         (Action::Footprint, "GelSlim window", settings.footprint_visible),
     ];
     ui.horizontal_wrapped(|ui| {

@@ -435,7 +435,6 @@ draws! {
         3 SelectFinger(finger()),
         1 SelectImprint(source()),
         3 Propose(any::<bool>()),
-        1 ShowLens(any::<bool>()),
         2 ShowBothFingers(any::<bool>()),
         1 HoverPixel(proptest::option::of((finger(), position()).prop_map(|(finger, at_px)| Hover { finger, at_px }))),
         1 HoverPoint(proptest::option::of(point())),
