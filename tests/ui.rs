@@ -21,7 +21,6 @@ mod generate;
 mod inspect;
 mod job;
 mod jobs;
-mod live_loop;
 mod narrow;
 mod palette;
 mod queue;

@@ -204,8 +204,6 @@ macro_rules! actions {
             _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
         MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)],
             _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
-        Ghosts, Mask, "As it was before", "Keeps mask, points and pose as they were before the last change visible until the next one, or not", [shift(K::H)],
-            _ => does(prefer(|s| s.ghosts ^= true));
         DoneAndNext, Mask, "Done and next", "Marks the pair as done, accepts the automatic masks on screen that nobody corrected, and shows the next unfinished one", [ctrl(K::Enter)],
             state => editable(state, LibraryCommand::DoneAndNext);
         Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)],
@@ -465,7 +463,6 @@ impl Action {
             Self::ResetMask => "delete mask automatic again",
             Self::ClearMask => "delete erase empty nothing start over reset",
             Self::Undo => "revert back",
-            Self::Ghosts => "ghost previous before undo compare",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",
             Self::TryTools => "which tool wrong cad model identify rank recognize",

@@ -1,14 +1,12 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
 mod batch;
-pub mod ghost;
 pub(super) mod unsaved;
 
 pub(crate) use super::state::labels::{Changed, Merged};
 pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
 pub(crate) use batch::can_propose_all;
 pub use batch::{ImportMasks, ProposeAll};
-pub use ghost::ghost;
 pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;
@@ -16,7 +14,7 @@ use std::borrow::Cow;
 use glam::DVec3;
 
 use super::effect::{Effect, LabelsToSave};
-use super::keys::{ImprintSource, Revision};
+use super::keys::{ImprintSource, PoseKey, Revision};
 use super::state::history::Gesture;
 use super::state::tasks::Level;
 use super::state::{Lookup, State};
@@ -138,6 +136,13 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
     }
 }
 
+/// The recipe of the pose that is shown of an imprint.
+fn shown_pose_key(state: &State, source: ImprintSource) -> Option<PoseKey> {
+    results::pose(state, source).shown()?;
+    let now = results::pose_key(state, source).ok().flatten().filter(|key| state.results.poses.contains(key));
+    now.or_else(|| results::latest(state, source)?.pose.clone())
+}
+
 /// True where the selected pair may be edited; says why not.
 pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     if state.entry().is_none() {
@@ -209,7 +214,7 @@ fn begin_stroke(
         return state.log.error(&err.with_hint("Propose a mask first, or paint contact."));
     }
     state.selection.imprint = source;
-    let (pair, pose) = (state.pair_name().to_owned(), ghost::shown_pose_key(state, source));
+    let (pair, pose) = (state.pair_name().to_owned(), shown_pose_key(state, source));
     start.revision = state.document.next_revision();
     let labels = state.document.labels.entry(pair.clone()).or_default();
     let before = labels.put(&place, Some(start.clone()));
@@ -280,11 +285,10 @@ fn finish(state: &mut State, effects: &mut Vec<Effect>) {
     let Stroke { pair, place, source, drawing, pose, before, start, .. } = stroke;
     let labels = doc.labels.entry(pair.clone()).or_default();
     let Some(mask) = labels.put(&place, before) else { return };
-    let (finger, shown, drawn) = (place.pad, Some(start.mask.clone()), mask.revision);
+    let drawn = mask.revision;
     let edit = LabelEdit::Draw { on: TakenUp { place, mask: start }, mask, drawing: &drawing };
     let Some(name) = change(state, &pair, edit, Some(drawn), effects) else { return };
-    let revision = state.document.next_revision();
-    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask: shown, before: pose });
+    state.document.changed = Some(Changed { pair, source, name, before: pose });
 }
 
 /// Takes in what somebody else made of a pair's masks meanwhile. What was done here before cannot be taken back any more: it
@@ -368,14 +372,13 @@ fn clean(state: &mut State, clean_up: CleanUp, effects: &mut Vec<Effect>) {
     }
 }
 
-/// Does something to the mask of an imprint of the selected pair; what it was before is still shown.
+/// Does something to the mask of an imprint of the selected pair.
 fn change_mask(state: &mut State, place: &MaskPlace, edit: LabelEdit<'_>, effects: &mut Vec<Effect>) -> bool {
     let pair = state.pair_name().to_owned();
-    let (source, finger, revision) = (place.of.source(), place.pad, state.document.next_revision());
-    let before = ghost::shown_pose_key(state, source);
-    let mask = results::mask_in_force(state, source, finger).ok().map(|mask| mask.mask.clone());
+    let (source, revision) = (place.of.source(), state.document.next_revision());
+    let before = shown_pose_key(state, source);
     let Some(name) = change(state, &pair, edit, Some(revision), effects) else { return false };
-    state.document.changed = Some(Changed { pair, source, name, finger, revision, mask, before });
+    state.document.changed = Some(Changed { pair, source, name, before });
     true
 }
 
@@ -568,7 +571,7 @@ fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, 
     let how = if act == Act::Undo { "Undone" } else { "Done again" };
     match name {
         Some(name) => {
-            // What the last change did is said, and shown, no more: it may be what was taken back.
+            // What the last change did is said no more: it may be what was taken back.
             state.document.changed = None;
             state.log.info(format!("{how}: {name}"));
             save_pair(state, pair, Operation { act, ..Operation::named(name) }, effects);

@@ -12,8 +12,7 @@ impl Action {
     /// True where its letter means it only where masks are drawn: it changes labels, or what the tools do to them.
     pub(crate) fn is_of_labeling(self) -> bool {
         use Action as A;
-        let looks =
-            matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger) || self == A::Ghosts;
+        let looks = matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger);
         self.group() == Group::Mask && !looks
     }
 
@@ -47,10 +46,7 @@ impl Action {
             },
             Kind::Color => picture,
             Kind::Imprint(_) => {
-                picture
-                    || range
-                    || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
-                    || self == A::Ghosts
+                picture || range || matches!(self, A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger)
             }
             Kind::Versus => picture || range || matches!(self, A::CompareMode | A::SwapCompared),
             Kind::Scene => picture || self.is_of_scene(),

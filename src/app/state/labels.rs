@@ -7,7 +7,6 @@ use std::sync::Arc;
 use super::super::keys::{ImprintSource, PoseKey, Revision};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::{DrawTool, Drawing, Ground, Provenance, VisiblePixels};
-use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::progress::Progress;
 pub use touch2touch_pipeline::labels::{DrawnMask, MaskPlace, PairLabels, Review};
@@ -73,12 +72,6 @@ pub struct Changed {
     pub source: ImprintSource,
     /// The deed.
     pub name: Cow<'static, str>,
-    /// The finger.
-    pub finger: PadId,
-    /// The change of the document.
-    pub revision: Revision,
-    /// The mask before, where there was one.
-    pub mask: Option<Arc<Mask>>,
     /// The pose before, by its recipe.
     pub before: Option<PoseKey>,
 }

@@ -90,8 +90,6 @@ pub struct Settings {
     pub mask_opacity: f32,
     /// True where the GelSlim's window is drawn on bubble images.
     pub footprint_visible: bool,
-    /// True where mask, points and pose before the last change of a mask stay visible until the next.
-    pub ghosts: bool,
     /// True where the hint of the first start was dismissed.
     pub hint_dismissed: bool,
     /// True where the panel about the data set opens with each folder of somebody's own.
@@ -151,7 +149,6 @@ impl Default for Settings {
             mask_outline: false,
             mask_opacity: 0.35,
             footprint_visible: true,
-            ghosts: true,
             hint_dismissed: false,
             about_own_data: true,
             recent: Vec::new(),

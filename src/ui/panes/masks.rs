@@ -424,11 +424,10 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
 
 /// Switches of the layers over the imprints.
 fn overlay(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (settings, selection) = (&cx.state.settings, &cx.state.selection);
+    let settings = &cx.state.settings;
     let switches = [
         (Action::MaskVisible, "mask", settings.mask_visible),
         (Action::MaskOutline, "outline", settings.mask_outline),
-        (Action::Ghosts, "before", settings.ghosts),
         (Action::Footprint, "GelSlim window", settings.footprint_visible),
     ];
     ui.horizontal_wrapped(|ui| {

@@ -2,7 +2,6 @@
 
 mod build;
 mod draw;
-mod ghost;
 mod gizmo;
 mod hands;
 mod layers;
@@ -19,7 +18,6 @@ use glam::{DAffine3, DVec3};
 use strum::IntoEnumIterator as _;
 
 use build::{SceneCloud, SceneSurface};
-use ghost::SceneGhost;
 use gizmo::Gizmo;
 use layers::LayerColors;
 use steps::StepLines;
@@ -66,8 +64,6 @@ pub(crate) struct Memory {
     clouds: [Option<SceneCloud>; 2],
     /// Membranes as surfaces, while they are shown.
     surfaces: [Option<SceneSurface>; 2],
-    /// Contact points that the last change of a mask dropped and added, while they are shown.
-    ghosts: [Option<SceneGhost>; 2],
     /// The data set that the views were fitted to.
     fitted: Option<DatasetSeq>,
     /// Colors of the contact points.
@@ -359,7 +355,6 @@ fn update(cx: &mut Cx<'_>, memory: &mut Memory, source: ImprintSource) {
     }
     build::update_mesh(cx, &mut memory.mesh, &mut memory.revision);
     layers::update(cx, memory, source);
-    ghost::update(cx, memory, source);
     steps::update(cx, memory, source);
 }
 

@@ -28,9 +28,6 @@ pub(crate) const CONTACT: Color32 = Color32::from_rgb(0xff, 0x5f, 0xc4);
 pub(crate) const PROPOSED: Color32 = Color32::from_rgb(0x4a, 0xd9, 0xff);
 /// The color of ignored pixels.
 pub const IGNORED: Color32 = Color32::from_rgb(0xff, 0xc8, 0x3d);
-/// The color of what was before the last change of a mask.
-pub(crate) const GHOST: Color32 = Color32::from_rgb(0xc9, 0xb0, 0xff);
-
 /// The colors of one theme.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Palette {

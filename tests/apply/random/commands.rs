@@ -223,10 +223,10 @@ pub(super) fn change() -> impl Strategy<Value = Change> {
         3 => any_of::<Paint>().prop_map(|v| prefer(move |s| s.mask.paint = v)),
         2 => any_of::<MaskSource>().prop_map(|v| prefer(move |s| s.mask.choice.source = v)),
         1 => number().prop_map(|v| prefer(move |s| s.mask.radius_px = v)),
-        1 => any::<[bool; 6]>().prop_map(|[visible, outline, footprint, ghosts, linked, hint]| {
+        1 => any::<[bool; 5]>().prop_map(|[visible, outline, footprint, linked, hint]| {
             prefer(move |s| {
                 (s.mask_visible, s.mask_outline, s.footprint_visible) = (visible, outline, footprint);
-                (s.ghosts, s.cameras_linked, s.hint_dismissed) = (ghosts, linked, hint);
+                (s.cameras_linked, s.hint_dismissed) = (linked, hint);
             })
         }),
         1 => number().prop_map(|v| prefer(move |s| s.mask_opacity = v)),

@@ -28,12 +28,6 @@ pub enum SceneLayer {
     OtherCad,
     /// The model at the true pose.
     TrueCad,
-    /// The model where it was registered before the last change of a mask.
-    Before,
-    /// The contact points that the last change dropped.
-    Dropped,
-    /// The contact points that it added.
-    Added,
     /// The model at the pinned steps.
     Pins,
     /// Floor grid, axes, scale bar.
@@ -100,7 +94,6 @@ impl SceneLayer {
             Self::Surface => LayerLook { opacity: 0.4, ..look },
             Self::Contact | Self::OtherContact => LayerLook { size: LayerSize::Mm(0.35), ..look },
             Self::TrueCad => LayerLook { size: LayerSize::Px(1.2), ..look },
-            Self::Dropped | Self::Added => LayerLook { size: LayerSize::Mm(0.6), ..look },
             _ => look,
         }
     }
@@ -112,7 +105,7 @@ impl SceneLayer {
 
     /// True where its size can be in millimeters.
     pub(crate) fn has_points(self) -> bool {
-        matches!(self, Self::Membrane | Self::Contact | Self::OtherContact | Self::Dropped | Self::Added)
+        matches!(self, Self::Membrane | Self::Contact | Self::OtherContact)
     }
 }
 

@@ -5,11 +5,11 @@ use eframe::egui::{Color32, Key, Ui};
 use super::Memory;
 use crate::app::keys::{ImprintSource, MaskVersion};
 use crate::app::pane::Pane;
-use crate::app::{labels, results};
+use crate::app::results;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{CONTACT, GHOST, IGNORED, PROPOSED};
+use crate::ui::parts::theme::{CONTACT, IGNORED, PROPOSED};
 use crate::ui::parts::widget::image_canvas::CanvasOutput;
-use crate::ui::parts::widget::texture::{dashes, mask_image, outline};
+use crate::ui::parts::widget::texture::{mask_image, outline};
 use touch2touch_core::rig::PadId;
 
 /// True while a key is held that takes everything off the imprint, so that the data itself is seen.
@@ -65,11 +65,6 @@ pub(super) fn mask(
         let segments = memory.outlines.get(&slot, &key, || outline(&proposal.mask));
         output.segments(segments, Color32::from_black_alpha(110), 2.5);
         output.segments(segments, PROPOSED, 1.25);
-    }
-    if let Some(ghost) = labels::ghost(cx.state, source).filter(|ghost| ghost.finger == finger) {
-        let dashes = memory.outlines.get(&("ghost", source, finger), ghost.revision, || dashes(&outline(ghost.mask)));
-        output.segments(dashes, Color32::from_black_alpha(140), 2.5);
-        output.segments(dashes, GHOST, 1.5);
     }
     let mask = in_force.mask;
     let segments = memory.outlines.get(&("mask", source, finger), &key, || outline(mask));

@@ -9,7 +9,7 @@ use super::{Memory, layers, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
-use crate::app::{labels, results};
+use crate::app::results;
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
@@ -17,7 +17,7 @@ use crate::gpu::scene::SceneData;
 use crate::gpu::view::Plane;
 use crate::spatial::items;
 use crate::ui::parts::cx::{Cx, side_color};
-use crate::ui::parts::theme::{self, CONTACT, GHOST};
+use crate::ui::parts::theme::{self, CONTACT};
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::PerPad;
@@ -144,9 +144,6 @@ pub(super) fn color(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> Co
         SceneLayer::Cad | SceneLayer::Registered => p.cad,
         SceneLayer::OtherCad => theme::mix(p.strong, side_color(p, source.other()), 0.7),
         SceneLayer::TrueCad => p.strong,
-        SceneLayer::Before => theme::mix(p.strong, GHOST, 0.8),
-        SceneLayer::Dropped => theme::mix(p.strong, GHOST, 0.5),
-        SceneLayer::Added => theme::mix(p.strong, p.good, 0.6),
         SceneLayer::Pins => p.pins[0],
         SceneLayer::Guides => p.weak,
     }
@@ -158,7 +155,6 @@ pub(super) fn scene_of(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> S
     let mut scene = SceneData { background: rgb(cx.p.canvas), eye_dome: look.eye_dome, ..SceneData::default() };
     scene.cut = cut(cx, memory, source);
     clouds(cx, memory, source, &mut scene);
-    changed(cx, memory, source, &mut scene);
     surfaces(cx, memory, source, &mut scene);
     pointed(cx, source, &mut scene);
     picked(cx, source, &mut scene);
@@ -221,23 +217,6 @@ fn clouds(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut Scene
     }
     if cx.state.workbench.both_clouds {
         other_cloud(cx, memory, source, scene);
-    }
-}
-
-/// The contact points that the last change dropped and added.
-fn changed(cx: &Cx<'_>, memory: &Memory, source: ImprintSource, scene: &mut SceneData) {
-    let Some(ghost) = &memory.ghosts[source as usize] else { return };
-    for (layer, points) in &ghost.points {
-        let look = cx.state.settings.scene.layer(*layer);
-        if look.shown && !points.is_empty() {
-            scene.clouds.push(CloudItem {
-                name: format!("{layer:?}").to_lowercase(),
-                revision: ghost.revision,
-                points: points.clone(),
-                colors: PointColors::One,
-                style: cloud_style(look, color(cx, source, *layer)),
-            });
-        }
     }
 }
 
@@ -330,9 +309,6 @@ pub(super) fn models(cx: &Cx<'_>, source: ImprintSource) -> Vec<(SceneLayer, DAf
     models.extend(other.map(|pose| (SceneLayer::OtherCad, pose.grasp_from_object.to_affine())));
     let truth = results::sample(state).ready().and_then(|sample| sample.grasp_from_object);
     models.extend(truth.map(|pose| (SceneLayer::TrueCad, pose.to_affine())));
-    let before = labels::ghost(state, source).and_then(|ghost| ghost.pose).map(|pose| pose.grasp_from_object);
-    let before = before.filter(|before| registered != Some(*before));
-    models.extend(before.map(|pose| (SceneLayer::Before, pose.to_affine())));
     models
 }
 

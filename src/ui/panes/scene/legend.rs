@@ -10,7 +10,7 @@ use eframe::egui::{
 use strum::IntoEnumIterator as _;
 
 use super::layers::{RESIDUAL_MAP, reason_rgb};
-use super::{Memory, build, ghost, steps};
+use super::{Memory, build, steps};
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer, SceneLook};
 use crate::app::workbench::Layer;
@@ -140,9 +140,6 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
         let other = if source.other() == ImprintSource::Measured { "measured contact" } else { "predicted contact" };
         add(SceneLayer::OtherContact, other);
     }
-    for (layer, text) in ghost::legend_entries(memory, source) {
-        add(layer, &text);
-    }
     if memory.mesh.is_some() {
         for (layer, _) in build::models(cx, source) {
             add(layer, model_name(cx, source, layer));
@@ -176,7 +173,6 @@ fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static
         SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
         SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, accepted by hand",
         SceneLayer::TrueCad => "CAD, true pose",
-        SceneLayer::Before => "CAD, before",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
         SceneLayer::OtherCad => "CAD, measured side",
         _ => "CAD, aligned",

@@ -268,19 +268,6 @@ pub fn outline(mask: &Mask) -> Vec<[[f32; 2]; 2]> {
     segments
 }
 
-/// Every other pixel side of an outline, so that it looks dashed.
-pub(crate) fn dashes(outline: &[[[f32; 2]; 2]]) -> Vec<[[f32; 2]; 2]> {
-    let sides = outline.iter().flat_map(|[a, b]| {
-        let along = if a[1] == b[1] { [1.0, 0.0] } else { [0.0, 1.0] };
-        let length = (b[0] - a[0] + b[1] - a[1]).max(0.0) as u32;
-        (0..length).map(move |i| {
-            let from = [a[0] + along[0] * i as f32, a[1] + along[1] * i as f32];
-            [from, [from[0] + along[0], from[1] + along[1]]]
-        })
-    });
-    sides.filter(|[a, _]| ((a[0] + a[1]) as u32).is_multiple_of(2)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -340,9 +327,6 @@ mod tests {
         assert!(sides.contains(&[[1.0, 1.0], [2.0, 1.0]]) && sides.contains(&[[2.0, 1.0], [2.0, 2.0]]));
         assert_eq!(outline(&Mask::filled(4, 2, true)).len(), 4);
         assert!(outline(&Mask::filled(0, 0, true)).is_empty());
-        let dashed = dashes(&outline(&Mask::filled(4, 2, true)));
-        assert_eq!(dashed.len(), 6, "half of the twelve sides: {dashed:?}");
-        assert!(dashed.contains(&[[0.0, 0.0], [1.0, 0.0]]) && !dashed.contains(&[[1.0, 0.0], [2.0, 0.0]]));
     }
 
     #[test]
