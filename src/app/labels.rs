@@ -196,10 +196,6 @@ fn begin_stroke(
         let err = TaskError::new("Correct the mask", "the mask is still being computed").with_hint("Try again.");
         return state.log.error(&err);
     };
-    let allowed = match results::allowed(state, source, finger) {
-        Ok(allowed) => allowed,
-        Err(why) => return state.log.error(&TaskError::new("Paint within limits", why)),
-    };
     let Some(place) = results::mask_place(state, source, finger) else { return };
     let seen = match in_3d.as_ref().map(|(sight, _)| seen(state, source, finger, sight)).transpose() {
         Ok(seen) => seen,
@@ -223,7 +219,7 @@ fn begin_stroke(
     let [width, height] = start.mask.size();
     let touched = Mask::filled(width, height, false);
     let by = Provenance::hand(state.settings.labeler());
-    let stroke = Stroke { pair, place, source, drawing, allowed, proposed, seen, pose, before, start, touched, by };
+    let stroke = Stroke { pair, place, source, drawing, proposed, seen, pose, before, start, touched, by };
     state.document.stroke = Some(stroke);
     redraw(state, 0);
 }

@@ -68,9 +68,9 @@ pub use layers::layers;
 pub(crate) use layers::want_layers;
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
 pub(crate) use manual::{shown_imprint, sides_apart};
-pub use mask::{MaskInForce, allowed, drawn_mask, mask_in_force, mask_places};
+pub use mask::{MaskInForce, drawn_mask, mask_in_force, mask_places};
 pub(crate) use mask::{
-    automatic_mask, automatic_provenance, drawn_mask_on, gate_is_known, mask_pixels, mask_place, mask_recipe, want_mask,
+    automatic_mask, automatic_provenance, drawn_mask_on, mask_pixels, mask_place, mask_recipe, want_mask,
 };
 pub use mask_plan::mask_plan_key;
 pub(crate) use mask_plan::want_mask_plan;

@@ -448,29 +448,3 @@ fn a_change_of_labels_says_itself_where_no_mask_tool_is_on_screen() {
     bench.send(LabelsCommand::SetReview(Review::Flagged));
     assert_eq!(said(&bench), 1, "what changes nothing says nothing");
 }
-
-#[test]
-fn a_gate_keeps_tools_to_a_depth() {
-    let mut bench = bench();
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
-    let before = mask(&bench, lab::RIGHT);
-    let imprint = results::imprint(&bench.state, MEASURED, lab::RIGHT).ready().unwrap().clone();
-    let deep = |depth: f32| depth >= 0.002;
-    assert!(imprint.as_slice().iter().any(|d| deep(*d)) && imprint.as_slice().iter().any(|d| !deep(*d)));
-    let mut settings = bench.state.settings.mask.clone();
-    settings.gate.depth_m = Some([0.002, 0.02]);
-    settings.tool = MaskTool::Rectangle;
-    bench.send(prefer(move |s| s.mask = settings.clone()));
-    stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
-    let gated = mask(&bench, lab::RIGHT);
-    for (at, on) in gated.as_slice().iter().enumerate() {
-        assert_eq!(*on, before.as_slice()[at] || deep(imprint.as_slice()[at]), "pixel {at}");
-    }
-    // What lies near the CAD model is not known here: that is said, and nothing is painted.
-    bench.send(prefer(|s| s.mask.gate.cad_m = Some(0.001)));
-    let said = bench.state.log.entries.len();
-    stroke(&mut bench, lab::RIGHT, [-1.0, -1.0], [99.0, 99.0]);
-    assert_eq!(mask(&bench, lab::RIGHT), gated);
-    assert!(bench.state.log.entries.len() > said);
-}

@@ -8,7 +8,7 @@ use serde_json::Value;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::label::{Marks, Provenance, paint_where};
+use touch2touch_core::label::{self, Marks, Provenance};
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
@@ -47,7 +47,7 @@ fn stroke(number: u32) -> [DVec2; 2] {
 }
 
 fn paint(mask: &mut Mask, number: u32) {
-    paint_where(mask, stroke(number), 3.0, number % 5 != 4, |_, _| true);
+    label::paint(mask, stroke(number), 3.0, number % 5 != 4);
 }
 
 #[test]

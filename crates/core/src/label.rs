@@ -7,7 +7,6 @@ mod carry;
 mod clean_up;
 mod doubt;
 mod drawing;
-mod gate;
 mod grow;
 mod marks;
 mod merge;
@@ -28,7 +27,6 @@ pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
 pub use doubt::{Doubt, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};
-pub use gate::Gate;
 pub use grow::grow_from;
 pub use marks::Marks;
 pub use merge::merge;
@@ -81,17 +79,10 @@ pub fn difference(a: &Mask, b: &Mask) -> Option<Rect> {
 }
 
 /// Sets every pixel whose center lies within `radius_px` of the segment from `a` to `b` (pixel coordinates,
-/// `(0, 0)` = center of the first pixel), and the pixel under each end; of those only what `allow(x, y)` names, e.g. what
-/// lies within a depth range. `a == b` is a single stamp.
+/// `(0, 0)` = center of the first pixel), and the pixel under each end. `a == b` is a single stamp.
 ///
 /// Returns the rectangle of pixels that changed, `None` if none did (outside, not finite, or set already).
-pub fn paint_where(
-    mask: &mut Mask,
-    [a, b]: [DVec2; 2],
-    radius_px: f64,
-    value: bool,
-    allow: impl Fn(usize, usize) -> bool,
-) -> Option<Rect> {
+pub fn paint(mask: &mut Mask, [a, b]: [DVec2; 2], radius_px: f64, value: bool) -> Option<Rect> {
     if !(a.is_finite() && b.is_finite() && radius_px.is_finite()) || mask.is_empty() {
         return None;
     }
@@ -114,7 +105,7 @@ pub fn paint_where(
             // A brush thinner than a pixel still marks the pixels it crosses.
             let offset = (p - (a + along * t)).abs();
             let hit = offset.length_squared() <= radius * radius || offset.max_element() <= 0.5;
-            if hit && mask[(x, y)] != value && allow(x, y) {
+            if hit && mask[(x, y)] != value {
                 mask[(x, y)] = value;
                 let pixel = Rect { x, y, width: 1, height: 1 };
                 changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
@@ -134,10 +125,6 @@ mod tests {
 
     fn count(mask: &Mask) -> usize {
         mask.as_slice().iter().filter(|&&v| v).count()
-    }
-
-    fn paint(mask: &mut Mask, way: [DVec2; 2], radius_px: f64, value: bool) -> Option<Rect> {
-        paint_where(mask, way, radius_px, value, |_, _| true)
     }
 
     #[test]
@@ -186,8 +173,5 @@ mod tests {
         assert!(paint(&mut mask, [DVec2::new(-2.0, -2.0); 2], 4.0, true).is_some(), "a stamp may hang over the edge");
         assert!(paint(&mut mask, [DVec2::new(20.0, 15.0); 2], 1e6, true).is_some());
         assert_eq!(count(&mask), mask.len());
-        let mut gated = empty();
-        paint_where(&mut gated, [DVec2::new(20.0, 15.0); 2], 8.0, true, |x, _| x < 20);
-        assert!(gated[(19, 15)] && !gated[(20, 15)]);
     }
 }

@@ -6,7 +6,6 @@ use strum::IntoEnumIterator as _;
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{AutomaticMask, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
-use super::super::pane::Pane;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::results::Request;
@@ -170,37 +169,6 @@ pub fn mask_in_force(
     }
 }
 
-/// The mask of what lies near the CAD model, which the gate of the mask tools may need.
-fn gate_key(state: &State, source: ImprintSource, finger: PadId) -> Option<MaskKey> {
-    let recipe = MaskRecipe::Cad(state.settings.mask.gate.cad_m?.into());
-    Some(MaskKey { imprint: results::imprint_key(state, source, finger).ok()?, recipe })
-}
-
-/// True where everything that the gate needs to know of the CAD model is there.
-pub(crate) fn gate_is_known(state: &State, source: ImprintSource, finger: PadId) -> bool {
-    gate_key(state, source, finger).is_none_or(|key| state.results.masks.get(&key).is_some())
-}
-
-/// The pixels that a hand may change; `None` = all.
-///
-/// # Errors
-/// Why that is not known.
-pub fn allowed(state: &State, source: ImprintSource, finger: PadId) -> Result<Option<Mask>, &'static str> {
-    let gate = state.settings.mask.gate;
-    if gate.is_open() {
-        return Ok(None);
-    }
-    let near = match gate_key(state, source, finger) {
-        Some(key) => {
-            let unknown = "what lies near the CAD model is not known: it takes a tool and its true pose";
-            Some(state.results.masks.get(&key).ok_or(unknown)?)
-        }
-        None => None,
-    };
-    let imprint = results::imprint(state, source, finger).ready().ok_or("the imprint is not there")?;
-    Ok(Some(gate.allowed(imprint, near.map(|near| &*near.mask))))
-}
-
 /// The provenance of the pixels of an automatic mask.
 pub(crate) fn automatic_provenance(
     state: &State,
@@ -215,16 +183,6 @@ pub(crate) fn automatic_provenance(
 
 pub(crate) fn want_mask(wants: &mut Demands<'_>, source: ImprintSource, finger: PadId) {
     let state = wants.state;
-    if let Some(key) = gate_key(state, source, finger).filter(|_| state.selection.panes.contains(&Pane::Masks)) {
-        let can = results::sample(state).ready().is_some_and(|sample| sample.grasp_from_object.is_some());
-        if can && results::imprint(state, source, finger).ready().is_some() && results::tool_name(state).is_ok() {
-            if results::tool(state).ready().is_none() {
-                results::want_tool(wants);
-            } else {
-                wants.ask(key);
-            }
-        }
-    }
     // Stored corrections first: they may make the automatic mask unnecessary.
     if !state.document.stored.contains_key(state.pair_name())
         || drawn_mask(state, source, finger).is_some()

@@ -96,8 +96,6 @@ pub struct Stroke {
     pub source: ImprintSource,
     /// The drawing.
     pub drawing: Drawing,
-    /// The pixels that may change; `None` = all.
-    pub(in crate::app) allowed: Option<Mask>,
     /// The proposal that is let through.
     pub(in crate::app) proposed: Option<Arc<Proposal>>,
     /// The places of its pixels in the 3D picture that it is drawn on.
@@ -124,7 +122,7 @@ impl Stroke {
             self.touched.as_mut_slice().fill(false);
         }
         let proposed = self.proposed.as_ref().map(|proposal| &proposal.mask);
-        let ground = Ground { imprint, allowed: self.allowed.as_ref(), proposed, seen: self.seen.as_ref() };
+        let ground = Ground { imprint, proposed, seen: self.seen.as_ref() };
         hand.draw_on(&self.drawing, &mut self.touched, ground, from, self.by.clone()) || undone
     }
 }

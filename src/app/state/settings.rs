@@ -15,7 +15,7 @@ use super::library::Place;
 use scene::SceneLook;
 use touch2touch_core::colormap;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
-use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Gate, Layers, Paint};
+use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Layers, Paint};
 use touch2touch_core::postprocess::RefitShift;
 use touch2touch_core::units::clamp_or;
 use touch2touch_pipeline::images::figure::{FigureLook, FigurePane, FigureTheme};
@@ -446,8 +446,6 @@ pub struct MaskSettings {
     pub layers: Layers,
     /// Size of the clean-ups that have one, millimeters.
     pub clean_mm: f32,
-    /// The gate that says where a hand may change a mask.
-    pub gate: Gate,
     /// The source of proposals.
     pub proposal: ProposalSource,
     /// True where accepting a proposal replaces what was painted by hand as well.
@@ -469,7 +467,6 @@ impl Default for MaskSettings {
             wand_m: 0.0005,
             layers: Layers::default(),
             clean_mm: 1.0,
-            gate: Gate::default(),
             proposal: ProposalSource::default(),
             over_drawn: false,
             choice: MaskChoice::default(),
@@ -497,11 +494,6 @@ impl MaskSettings {
         self.radius_px = clamp_or(self.radius_px, *BRUSH_RADIUS_PX.start(), *BRUSH_RADIUS_PX.end(), default.radius_px);
         self.wand_m = clamp_or(self.wand_m, 1e-5, 0.05, default.wand_m);
         self.clean_mm = clamp_or(self.clean_mm, *CLEAN_MM.start(), *CLEAN_MM.end(), default.clean_mm);
-        self.gate.depth_m = self.gate.depth_m.map(|[lo, hi]| {
-            let [lo, hi] = [lo, hi].map(|m| clamp_or(m, -0.1, 0.1, 0.0));
-            [lo.min(hi), lo.max(hi)]
-        });
-        self.gate.cad_m = self.gate.cad_m.map(|m| clamp_or(m, 0.0, 0.05, default.choice.cad_distance_m));
         let (choice, default) = (&mut self.choice, default.choice);
         choice.threshold_m = clamp_or(choice.threshold_m, -0.1, 0.1, default.threshold_m);
         choice.probability = choice.probability.filter(|p| (0.0..=1.0).contains(p));

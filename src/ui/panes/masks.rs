@@ -52,10 +52,9 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             source::show(cx, ui);
             fold(ui, "Clean up", "Clean up the mask by one click", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "What is shown, limits, drawing in 3D, the other imprint's mask", |ui| {
+            fold(ui, "More", "What is shown, drawing in 3D, the other imprint's mask", |ui| {
                 overlay(cx, ui);
                 opacity(cx, ui);
-                gate(cx, ui);
                 in_3d(cx, ui);
                 correct(cx, ui);
             });
@@ -228,40 +227,6 @@ fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
                halves it";
     if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {
-        cx.push(prefer(move |s| s.mask = new.clone()));
-    }
-}
-
-/// Limits on the pixels that a hand may change.
-fn gate(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let mut new = cx.state.settings.mask.clone();
-    let gate = &mut new.gate;
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing.x = 6.0;
-        ui.label(caption("Only", cx.p));
-        let mut by_depth = gate.depth_m.is_some();
-        let tip = "Tools change only pixels whose imprint lies between two depths";
-        if ui.checkbox(&mut by_depth, "in depth").on_hover_text(tip).changed() {
-            gate.depth_m = by_depth.then_some([cx.state.settings.mask.choice.threshold_m, 0.02]);
-        }
-        let mut by_cad = gate.cad_m.is_some();
-        let tip = "Tools change only pixels whose membrane point lies near the CAD model at the true pose";
-        if ui.checkbox(&mut by_cad, "near CAD").on_hover_text(tip).changed() {
-            gate.cad_m = by_cad.then_some(cx.state.settings.mask.choice.cad_distance_m);
-        }
-        let invert = egui::Checkbox::new(&mut gate.inverted, "invert");
-        let open = gate.depth_m.is_none() && gate.cad_m.is_none();
-        ui.add_enabled(!open, invert).on_hover_text("Tools change everything but that");
-    });
-    ui.spacing_mut().slider_width = (ui.available_width() - 86.0).max(40.0);
-    if let Some([lo, hi]) = &mut gate.depth_m {
-        slider_mm(ui, "Gate from depth", lo, -5.0..=20.0, "The least depth that may change");
-        slider_mm(ui, "Gate to depth", hi, -5.0..=20.0, "The greatest depth that may change");
-    }
-    if let Some(cad_m) = &mut gate.cad_m {
-        slider_mm(ui, "Gate around CAD", cad_m, 0.0..=5.0, "The greatest distance to the CAD model");
-    }
-    if new.gate != cx.state.settings.mask.gate {
         cx.push(prefer(move |s| s.mask = new.clone()));
     }
 }

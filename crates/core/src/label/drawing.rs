@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::paint::Paint;
 use super::sight::{Sight, VisiblePixels};
-use super::{Rect, paint_where, region};
+use super::{Rect, paint, region};
 use crate::grid::{DepthMap, Mask};
 
 /// A tool with its numbers.
@@ -65,13 +65,11 @@ pub struct Drawing {
     pub sight: Option<Box<Sight>>,
 }
 
-/// Imprint that a drawing falls on, with what limits it.
+/// Imprint that a drawing falls on, with what else decides what it does.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground<'a> {
     /// The imprint, meters; as large as the mask.
     pub imprint: &'a DepthMap,
-    /// The pixels that may change; `None` = all.
-    pub allowed: Option<&'a Mask>,
     /// Mask that [`Paint::LetThrough`] takes the values from.
     pub proposed: Option<&'a Mask>,
     /// Places of the pixels in the picture of a drawing that has a [`Drawing::sight`]; without them such a drawing
@@ -80,9 +78,9 @@ pub struct Ground<'a> {
 }
 
 impl<'a> Ground<'a> {
-    /// An imprint that may be drawn on everywhere.
+    /// An imprint alone.
     pub fn new(imprint: &'a DepthMap) -> Self {
-        Self { imprint, allowed: None, proposed: None, seen: None }
+        Self { imprint, proposed: None, seen: None }
     }
 }
 
@@ -203,7 +201,6 @@ impl Drawing {
     /// Marks the pixels that it touches in `touched`; returns the rectangle that holds those not marked before, `None`
     /// where there are none. Of a brush only what comes after the first `from` points: 0 draws all of it.
     pub fn touch(&self, touched: &mut Mask, ground: Ground<'_>, from: usize) -> Option<Rect> {
-        let allowed = |x, y| ground.allowed.is_none_or(|allowed| allowed.get(x, y) == Some(&true));
         let finite = |p: &&[f32; 2]| p.iter().all(|v| v.is_finite());
         let points: Vec<DVec2> =
             self.points.iter().filter(finite).map(|p| DVec2::new(p[0].into(), p[1].into())).collect();
@@ -213,7 +210,7 @@ impl Drawing {
         };
         let mut changed: Option<Rect> = None;
         let mut mark = |touched: &mut Mask, x: usize, y: usize| {
-            if touched.get(x, y) == Some(&false) && allowed(x, y) {
+            if touched.get(x, y) == Some(&false) {
                 touched[(x, y)] = true;
                 let pixel = Rect { x, y, width: 1, height: 1 };
                 changed = Some(changed.map_or(pixel, |r| r.union(pixel)));
@@ -223,7 +220,7 @@ impl Drawing {
         let region = match (self.tool, self.sight.is_some()) {
             (DrawTool::Brush { radius_px }, false) => {
                 let union = |a: Option<Rect>, b: Option<Rect>| a.zip(b).map(|(a, b)| a.union(b)).or(a).or(b);
-                let stamp = |way| paint_where(touched, way, radius_px.into(), true, allowed);
+                let stamp = |way| paint(touched, way, radius_px.into(), true);
                 return ways().map(stamp).fold(None, union);
             }
             (DrawTool::Rectangle, false) => region::rectangle(touched.size(), first, last),
@@ -363,20 +360,6 @@ mod tests {
     }
 
     #[test]
-    fn a_gate_holds_for_every_tool() {
-        let imprint = imprint();
-        let allowed = imprint.map(|&depth| depth > 0.01);
-        let ground = Ground { allowed: Some(&allowed), ..Ground::new(&imprint) };
-        for tool in [DrawTool::Brush { radius_px: 90.0 }, DrawTool::Rectangle, DrawTool::Wand { tolerance_m: 1.0 }] {
-            let mut mask = Mask::filled(40, 20, false);
-            let points = vec![[0.0, 0.0], [39.0, 19.0]];
-            let drawing = Drawing { tool, points, paint: Paint::Contact, sight: None };
-            drawing.touch(&mut mask, ground, 0);
-            assert!(mask == allowed, "{tool:?}");
-        }
-    }
-
-    #[test]
     fn corners_follow_the_pointer_until_they_are_set_and_drawings_are_stored() {
         let mut drawing = Drawing::begin(DrawTool::Polygon, [2.0, 2.0], Paint::Ignore);
         drawing.move_to([9.0, 2.0]);
@@ -400,7 +383,6 @@ mod tests {
         let seen = VisiblePixels::new(&sight, (&points, &pixels), &[]);
         // A step in the middle: columns from the eleventh on are deeper.
         let imprint = DepthMap::from_fn(21, 21, |x, _| if x < 11 { 0.001 } else { 0.005 });
-        let allowed = Mask::from_fn(21, 21, |_, y| y < 15);
         // Points are 2 px apart around (199.5, 149.5); rows go down on the mask and up in the picture.
         let (left, right) = ([192.5, 144.5], [206.5, 154.5]);
         let square = vec![left, [right[0], left[1]], right, [left[0], right[1]]];
@@ -413,18 +395,16 @@ mod tests {
             (DrawTool::Wand { tolerance_m: 0.001 }, vec![[190.0, 149.0]], 11 * 21),
         ] {
             let drawing = Drawing { tool, points: way, paint: Paint::Contact, sight: Some(Box::new(sight.clone())) };
-            let draw = |allowed, seen| {
+            let draw = |seen| {
                 let mut touched = Mask::filled(21, 21, false);
-                let ground = Ground { allowed, seen, ..Ground::new(&imprint) };
+                let ground = Ground { seen, ..Ground::new(&imprint) };
                 let rect = drawing.touch(&mut touched, ground, 0);
                 assert_eq!(rect.is_some(), touched.as_slice().contains(&true), "{tool:?}");
                 touched
             };
-            let all = draw(None, Some(&seen));
+            let all = draw(Some(&seen));
             assert_eq!(count(&all), expected, "{tool:?}");
-            let gated = draw(Some(&allowed), Some(&seen));
-            assert!((0..all.len()).all(|i| gated.as_slice()[i] == (all.as_slice()[i] && allowed.as_slice()[i])));
-            assert_eq!(count(&draw(None, None)), 0, "{tool:?}: where the pixels lie is not known");
+            assert_eq!(count(&draw(None)), 0, "{tool:?}: where the pixels lie is not known");
         }
     }
 }

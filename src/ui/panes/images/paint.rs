@@ -47,15 +47,6 @@ pub(super) fn mask(
         let segments = memory.outlines.get(&("ignored", source, finger), &key, || outline(ignored));
         output.segments(segments, IGNORED, 1.25);
     }
-    if !settings.mask.gate.is_open() && cx.state.selection.panes.contains(&Pane::Masks) {
-        let gate = serde_json::to_string(&settings.mask.gate).unwrap_or_default();
-        let key = (gate, key.1.clone(), results::gate_is_known(cx.state, source, finger));
-        let allowed = || results::allowed(cx.state, source, finger).ok().flatten();
-        let segments = memory
-            .outlines
-            .get(&("gate", source, finger), &key, || allowed().map(|allowed| outline(&allowed)).unwrap_or_default());
-        output.segments(segments, Color32::from_gray(190), 1.0);
-    }
     if let Some(proposal) = results::shown_proposal(cx.state, source, finger) {
         let key = results::proposal_key(cx.state, source, finger).ok();
         let slot = ("proposal", source, finger);

@@ -7,9 +7,9 @@ use glam::{DAffine3, DVec3};
 
 use super::{Memory, layers, rgb, steps};
 use crate::app::keys::{CloudKey, DatasetSeq, ImprintKey, ImprintSource};
+use crate::app::results;
 use crate::app::settings::{LayerLook, LayerSize, SceneLayer};
 use crate::app::workbench::Layer;
-use crate::app::results;
 use crate::gpu::edges::EdgeStyle;
 use crate::gpu::mesh::{Look, MeshItem, MeshStyle, Shading};
 use crate::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
