@@ -1,6 +1,6 @@
 """The arithmetic of `touch2touch adapt --tune` in PyTorch, for time and memory: `python -m benches.tune_peer SHARDS [STEPS] [THREADS]`.
 
-SHARDS is what `touch2touch training-data PAIRS --out SHARDS` writes. The same networks from the same bundle, the same unrolled
+SHARDS is what `touch2touch-bench training-data PAIRS --out SHARDS` writes. The same networks from the same bundle, the same unrolled
 sampler (zeros or noise; with 30 % a second step), the same losses, optimiser, batch of 12 and running mean of weights; of the
 variations of the pairs only gain and noise. Prints seconds per step, peak memory and the loss.
 """

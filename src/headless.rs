@@ -25,7 +25,6 @@ mod report;
 mod simulate;
 mod stats;
 mod still;
-mod training_data;
 mod version;
 mod watch;
 
@@ -37,7 +36,7 @@ use clap::{Args, CommandFactory as _, Parser, Subcommand};
 
 use output::PrintError;
 
-pub use args::{JsonArgs, LimitArgs, at_least_one};
+pub use args::{DatasetArgs, JsonArgs, LimitArgs, at_least_one, keyed};
 pub use output::{Output, says};
 pub use recipe::{ModelArgs, RuntimeArg};
 pub use simulate::condition;
@@ -94,9 +93,6 @@ enum Verb {
     Export(Box<export::ExportArgs>),
     /// Fit a generator to pairs of your own sensors, and say what it is worth on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
-    /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
-    /// `python -m training.train` reads.
-    TrainingData(Box<training_data::TrainingDataArgs>),
     /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
     Label(Box<label::LabelArgs>),
     /// Contact masks.
@@ -123,11 +119,11 @@ pub struct Common {
 
 /// The option of the verbs that read CAD models.
 #[derive(Debug, Clone, Copy, Args)]
-struct ToolArgs {
+pub struct ToolArgs {
     /// Unit of the CAD models (tools_stls/*.stl): m, cm, mm, um, in, a factor to meters, or `auto` for the one that
     /// makes them as large as a hand-held tool. Without it, what tools_stls/unit.txt says, else meters.
     #[arg(long, value_name = "UNIT")]
-    tool_scale: Option<ToolScale>,
+    pub tool_scale: Option<ToolScale>,
 }
 
 /// Result of a verb: true where everything asked for was done.
@@ -258,7 +254,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),
-        Some(Verb::TrainingData(args)) => training_data::run(&args),
         Some(Verb::Label(args)) => label::run(&args),
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),

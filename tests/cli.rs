@@ -25,7 +25,6 @@ mod read_as;
 mod refused;
 #[cfg(feature = "onnx")]
 mod stats;
-mod training_data;
 mod unit;
 #[cfg(feature = "onnx")]
 mod watch;

@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use glam::{DVec2, DVec3};
 use strum::IntoEnumIterator as _;
+use touch2touch_bench::known::{Case, CaseSet};
 use touch2touch_core::align::{AlignConfig, AlignReport, Ask, Rung, align};
 use touch2touch_core::cloud::lift;
 use touch2touch_core::contact::{
@@ -16,7 +17,6 @@ use touch2touch_core::grid::Mask;
 use touch2touch_core::pose::{Registration, ToolModel, register};
 use touch2touch_core::rig::{PerPad, lab};
 use touch2touch_core::units::angle_error;
-use touch2touch_pipeline::io::cases::{Case, CaseSet};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::steps::cloud::contact_points;
 use touch2touch_pipeline::steps::imprint::measured;

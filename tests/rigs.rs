@@ -183,7 +183,6 @@ fn verbs_refuse_a_spoilt_rig_and_the_doctor_names_it() {
         "compare --pair a",
         "figure --pairs a --out OUT.png",
         "export --pair a --out OUT",
-        "training-data --out OUT",
         "watch --once",
     ] {
         let words: Vec<&str> = verb

@@ -13,6 +13,7 @@ use proptest::prelude::*;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use strum::IntoEnumIterator as _;
+use touch2touch_bench::known::{Case, Suite};
 use touch2touch_core::align::{AlignConfig, AlignError, AlignReport, LabIcpConfig, LabModel, align, lab_icp};
 use touch2touch_core::cloud::{Lifted, lift};
 use touch2touch_core::field::{DistanceField, FieldError};
@@ -22,7 +23,6 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, register};
 use touch2touch_core::tool::{ToolError, ToolModel};
 use touch2touch_core::units::{angle_error, scale_to_meters};
-use touch2touch_pipeline::io::cases::{Case, Suite};
 
 /// A box with the given half sizes about `center`, closed, facing outwards.
 fn cuboid(center: DVec3, half: DVec3) -> TriMesh {

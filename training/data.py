@@ -1,4 +1,4 @@
-"""The training data: folders ("shards") of .npy files written by `touch2touch training-data`, memory-mapped.
+"""The training data: folders ("shards") of .npy files written by `touch2touch-bench training-data`, memory-mapped.
 
 gelslim.npy  (M,3,128,128) i16  difference image in 1/64 grey levels, resized bilinearly without antialias
 imprint.npy  (M,140,175)   i16  measured imprint in micrometres, raw orientation; -32768 = no measurement
@@ -43,7 +43,7 @@ class Shards:
         self.folders, self.parts, self.windows = [], [], []
         self.refresh()
         if not self.parts:
-            raise SystemExit(f"no shards in {folders}: write some with `touch2touch training-data` (see README.md)")
+            raise SystemExit(f"no shards in {folders}: write some with `touch2touch-bench training-data` (see README.md)")
 
     def refresh(self):
         known = set(self.folders)

@@ -139,7 +139,7 @@ def parser():
     parser.add_argument("--from", dest="start", type=Path,
                         help="generator bundle, or a folder of bundles such as assets/models, to begin with")
     parser.add_argument("--out", type=Path, default=Path("training/runs/made"))
-    parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program, which writes the shards")
+    parser.add_argument("--bench", default="target/release/touch2touch-bench", help="the program that writes the shards")
     parser.add_argument("--threads", type=int, default=os.cpu_count(), help="threads of a training on the processor")
     parser.add_argument("--seed", type=int, default=1)
     return parser
@@ -153,7 +153,7 @@ def main():
     torch.set_num_threads(args.threads if on_processor else 1)
     kept = args.out / "make.json"
     spent = json.loads(kept.read_text()) if kept.exists() else {"writing": 0.0}
-    writers = Writers(args.touch2touch, args.out / "data", cores if on_processor else max(1, cores - 1))
+    writers = Writers(args.bench, args.out / "data", cores if on_processor else max(1, cores - 1))
     try:
         writers.wait(begun + 60 * (WRITING * minutes - spent["writing"]) if on_processor else begun)
         if on_processor:

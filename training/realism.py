@@ -1,6 +1,6 @@
 """Command line: `python -m training.realism --real DIR... --simulated DIR...`: how alike real and simulated touches look.
 
-Both are folders of shards (`touch2touch training-data`), best of the same tools. Prints a table of statistics of imprints and
+Both are folders of shards (`touch2touch-bench training-data`), best of the same tools. Prints a table of statistics of imprints and
 GelSlim difference images; what differs by more than a fifth is marked. Only shape and noise are compared, not where the tool is.
 """
 

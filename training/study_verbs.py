@@ -1,5 +1,7 @@
 """What the study asks of the product: shards, other sensors' data sets, fits, and every figure of every row."""
 
+from pathlib import Path
+
 from benches.program import MODELS, Program, Refused
 
 __all__ = ["MODELS", "Product", "Refused"]
@@ -11,7 +13,8 @@ class Product(Program):
     def shards(self, condition, grasps, seed):
         """The folder of the training shards of a condition; those that are there are not written again."""
         folder = self.place / "shards" / condition
-        self.run("training-data", "simulator", "--grasps", grasps, "--condition", condition, "--seed", seed, "--out", folder)
+        bench = Program(Path(self.path).with_name("touch2touch-bench"), self.place)
+        bench.run("training-data", "simulator", "--grasps", grasps, "--condition", condition, "--seed", seed, "--out", folder)
         return folder
 
     def other(self, name, seed):

@@ -21,7 +21,7 @@ use touch2touch_pipeline::pairs;
 
 /// The data set that a verb reads.
 #[derive(Debug, Clone, Args)]
-pub(super) struct DatasetArgs {
+pub struct DatasetArgs {
     /// The data set: a folder in the lab's layout or of image pairs, or a built-in one: `demo`, `test-set` (46 unseen
     /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
     #[arg(value_name = "PATH", required_unless_present = "input")]
@@ -46,7 +46,7 @@ pub(super) fn parse_readings(text: &str) -> Result<Readings, String> {
 
 impl DatasetArgs {
     /// Path that was named.
-    pub(super) fn path(&self) -> &Path {
+    pub fn path(&self) -> &Path {
         // The parser sees to it that one of them is there.
         self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
     }
@@ -68,7 +68,7 @@ impl DatasetArgs {
     }
 
     /// [`Self::open`] with the unit of the CAD models as the command line has it.
-    pub(super) fn open_with(&self, tool_scale: Option<ToolScale>) -> anyhow::Result<Dataset> {
+    pub fn open_with(&self, tool_scale: Option<ToolScale>) -> anyhow::Result<Dataset> {
         let mut dataset = self.open()?;
         dataset.tool_scale = tool_scale;
         Ok(dataset)
@@ -123,7 +123,7 @@ impl JsonArgs {
 }
 
 /// Reads the key of one of a few things, such as a registration.
-pub(super) fn keyed<T>() -> impl TypedValueParser<Value = T>
+pub fn keyed<T>() -> impl TypedValueParser<Value = T>
 where
     T: IntoEnumIterator + FromStr + Into<&'static str> + Clone + Send + Sync + 'static,
 {

@@ -71,7 +71,6 @@ fn held(verb: &str) -> Option<Held> {
         ]),
         "masks train" => By(&[learned::TESTS[1]]),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
-        "training-data" => Not("only the training in Python reads it"),
         "doctor" => By(&[
             super::what_is_said_of_a_data_set_is_the_same_in_the_panel_and_by_the_verb,
             files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb,

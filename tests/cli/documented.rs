@@ -38,7 +38,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch stats", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch evaluate", How::Run(&[("test-set", "PATH")], "--grasps 1 --steps 1 --resamples 0", &[0])),
     ("touch2touch adapt", How::Run(&[("50", "1"), ("5", "0.01")], "--limit 2 --steps 1", &[0])),
-    ("touch2touch training-data", How::Run(&[], "--limit 1 --grasps 1", &[0])),
     ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),

@@ -1,7 +1,7 @@
-//! What cannot be done is an error that says what: full disks, files that are none, arguments that do nothing.
+//! What cannot be done is an error that says what: files that are none, arguments that do nothing.
 
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 use super::{error_text, json, run};
 
@@ -10,35 +10,6 @@ fn simulate(out: &Path) {
     let args = ["simulate", "--out", out.to_str().unwrap(), "--tools", "pattern_36", "--grasps", "2", "--seed", "7"];
     let made = run(&args, out.parent().unwrap());
     assert!(made.status.success(), "{}", error_text(&made));
-}
-
-/// Runs the program where no file may grow beyond some KiB, which is how a full disk looks to it.
-#[cfg(unix)]
-fn cramped(kib: u32, args: &[&str], folder: &Path) -> Output {
-    let script = format!("trap '' XFSZ; ulimit -f {kib}; exec \"$0\" \"$@\"");
-    Command::new("bash")
-        .args(["-c", &script, env!("CARGO_BIN_EXE_touch2touch")])
-        .args(args)
-        .current_dir(folder)
-        .env("TOUCH2TOUCH_CACHE", folder.join("cache"))
-        .output()
-        .unwrap()
-}
-
-#[cfg(unix)]
-#[test]
-fn a_full_disk_ends_in_an_error_and_leaves_no_halves() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = |name: &str| dir.path().join(name);
-    let set = at("set");
-    simulate(&set);
-    let set = set.to_str().unwrap();
-    let shards = at("shards");
-    let full = cramped(4, &["training-data", set, "--out", shards.to_str().unwrap()], dir.path());
-    let text = error_text(&full);
-    assert_eq!(full.status.code(), Some(2), "{text}");
-    assert!(text.contains("File too large"), "{text}");
-    assert_eq!(std::fs::read_dir(&shards).map_or(0, |list| list.count()), 0);
 }
 
 #[test]

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use sha2::Digest as _;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
+use touch2touch_bench::known::{self, Case, Stratum};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
@@ -19,12 +20,11 @@ use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_pipeline::infer::engine::EngineKind;
 use touch2touch_pipeline::infer::kept_key::KeptKey;
 use touch2touch_pipeline::infer::store::Store;
-use touch2touch_pipeline::io::cases::{Case, Stratum};
 use touch2touch_pipeline::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
 use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
 use touch2touch_pipeline::io::pt::Tensor;
 use touch2touch_pipeline::io::statistics::{Provenance, ShiftStatistics};
-use touch2touch_pipeline::io::{cases, images, npz, pt, stl};
+use touch2touch_pipeline::io::{images, npz, pt, stl};
 
 use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
 
@@ -92,7 +92,7 @@ pub(super) fn all() -> Vec<Target> {
             NPZ_MIB,
             case_seeds(),
             |dir, bytes| put(dir.join("case_000.npz"), bytes),
-            |_, file| cases::read(file).map(drop).map_err(said),
+            |_, file| known::read(file).map(drop).map_err(said),
         ),
         target(
             "stl",
@@ -176,12 +176,12 @@ fn case_seeds() -> Vec<Seed> {
         tool: 7,
         stratum: Stratum::Hard,
     };
-    let whole = opened(&written(|file| cases::write(file, &case).unwrap()));
+    let whole = opened(&written(|file| known::write(file, &case).unwrap()));
     let mut seeds = vec![good("a case", whole)];
     let arrays = |name: &str, with: Tensor| {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("case.npz");
-        cases::write(&file, &case).unwrap();
+        known::write(&file, &case).unwrap();
         let mut arrays = npz::read(&file).unwrap();
         arrays.insert(name.to_owned(), with);
         let list: Vec<(&str, Tensor)> = arrays.iter().map(|(name, tensor)| (name.as_str(), tensor.clone())).collect();

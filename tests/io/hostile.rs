@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::Duration;
 
+use touch2touch_bench::known;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::infer::bundle::Bundle;
 use touch2touch_pipeline::io::dataset::{Dataset, read_in_meters};
 use touch2touch_pipeline::io::masks::MaskStore;
-use touch2touch_pipeline::io::{cases, images, npz, pt, statistics, stl};
+use touch2touch_pipeline::io::{images, npz, pt, statistics, stl};
 
 /// A pipe that nobody writes to, and a link to a device that never ends.
 fn not_files(dir: &Path, name: &str) -> [PathBuf; 2] {
@@ -39,7 +40,7 @@ fn no_reader_waits_for_a_pipe_or_reads_a_device() {
     let readers: [(&str, Read); 10] = [
         ("a.pt", |file| error(pt::read_dict(file))),
         ("a.npz", |file| error(npz::read(file))),
-        ("case_0.npz", |file| error(cases::CaseSet::open(file.parent().unwrap()))),
+        ("case_0.npz", |file| error(known::CaseSet::open(file.parent().unwrap()))),
         ("a.stl", |file| error(stl::read(file))),
         ("unit.txt", |file| error(read_in_meters(&file.with_file_name("t.stl"), None))),
         ("a.png", |file| error(images::read_rgb(file))),

@@ -3,12 +3,12 @@
 use glam::DVec3;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use touch2touch_bench::known::Case;
 use touch2touch_core::align::{AlignReport, Basis, Contacts, PadImage};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::pose::{Registration, register};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::units::angle_error;
-use touch2touch_pipeline::io::cases::Case;
 
 use super::{case, lifted, suite};
 

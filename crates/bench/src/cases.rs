@@ -9,11 +9,11 @@ use serde::Serialize;
 
 use super::generator::timed_run;
 use touch2touch::headless::{Common, Output, VerbResult, condition};
+use touch2touch_bench::known::{self, Suite};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::sim::Condition;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::infer::generator::Generator;
-use touch2touch_pipeline::io::cases::{self, Suite};
 use touch2touch_pipeline::io::stl;
 use touch2touch_pipeline::steps::bundles::{self, BundleKind};
 use touch2touch_pipeline::steps::models::outside_of_pools;
@@ -60,7 +60,7 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
     std::fs::create_dir_all(&args.out)
         .map_err(|err| anyhow::anyhow!("cannot make the folder {}: {err}", args.out.display()))?;
     // Cases of another seed among these would be measured as if they belonged to it.
-    if cases::case_files(&args.out).is_ok() {
+    if known::case_files(&args.out).is_ok() {
         anyhow::bail!("{} already holds cases: name a new folder", args.out.display());
     }
     let count = args.count as usize;
@@ -71,7 +71,7 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
     let generator = args.predicted.then(|| open(args.bundle.as_deref())).transpose()?.map(Mutex::new);
     let output = Output::new(args.common, "simulating", count);
     for (number, tool) in suite.tools().iter().enumerate() {
-        stl::write(&cases::tool_file(&args.out, number), &tool.mesh())?;
+        stl::write(&known::tool_file(&args.out, number), &tool.mesh())?;
     }
     let digits = (count - 1).to_string().len().max(3);
     (0..count).into_par_iter().try_for_each(|i| {
@@ -86,7 +86,7 @@ pub(super) fn run(args: &CasesArgs) -> VerbResult {
             case.predicted = true;
         }
         output.step(&suite.tools()[case.tool].name);
-        anyhow::Ok(cases::write(&args.out.join(format!("case_{i:0digits$}.npz")), &case)?)
+        anyhow::Ok(known::write(&args.out.join(format!("case_{i:0digits$}.npz")), &case)?)
     })?;
     let written = Written {
         out: args.out.clone(),

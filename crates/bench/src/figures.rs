@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
+use touch2touch_bench::known::Stratum;
 use touch2touch_core::metrics::AngleSummary;
-use touch2touch_pipeline::io::cases::Stratum;
 
 /// Beyond this an answer is no answer, degrees.
 pub(super) const GROSS_DEG: f64 = 20.0;

@@ -10,6 +10,8 @@ mod peers;
 mod registration;
 mod reliability;
 mod rows;
+mod shards;
+mod training_data;
 mod trials;
 mod verdict;
 
@@ -42,6 +44,9 @@ enum Benchmark {
     Doctor(doctor::DoctorArgs),
     /// Signs of a fault that need no truth (a wrong tool, swapped fingers, a turned camera), each as a detector.
     Verdict(verdict::VerdictArgs),
+    /// Write training data for the networks: a data set or, with `simulator` as PATH, simulated touches, as shards that
+    /// `training/` reads.
+    TrainingData(Box<training_data::TrainingDataArgs>),
     /// Would a robot that goes by the poses put tools into holes, and a cup on a cup? On simulated grasps.
     Trials(trials::TrialsArgs),
 }
@@ -60,6 +65,7 @@ fn run(benchmark: &Benchmark) -> VerbResult {
         Benchmark::Generator(args) => generator::run(args),
         Benchmark::Cases(args) => cases::run(args),
         Benchmark::Doctor(args) => doctor::run(args),
+        Benchmark::TrainingData(args) => training_data::run(args),
         Benchmark::Trials(args) => trials::run(args),
         Benchmark::Verdict(args) => verdict::run(args),
     }

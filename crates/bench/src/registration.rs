@@ -18,6 +18,7 @@ use super::{Machine, contact_points, peers};
 use touch2touch::headless::says;
 use touch2touch::headless::{JsonArgs, LimitArgs, ModelArgs, at_least_one};
 use touch2touch::headless::{Output, VerbResult};
+use touch2touch_bench::known::{Case, CaseSet};
 use touch2touch_core::align::{AlignError, AlignReport, Ask, Contacts, LabModel, PadImage};
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::field::DistanceField;
@@ -29,7 +30,6 @@ use touch2touch_core::units::angle_error;
 use touch2touch_pipeline::images::canvas;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::atomic;
-use touch2touch_pipeline::io::cases::{Case, CaseSet};
 use touch2touch_pipeline::pairs;
 use touch2touch_pipeline::steps::mask::MaskSource;
 

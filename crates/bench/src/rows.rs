@@ -5,9 +5,9 @@ use serde::Serialize;
 
 use super::figures::Summary;
 use super::reliability::Reliability;
+use touch2touch_bench::known::Stratum;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::manual::PoseDifference;
-use touch2touch_pipeline::io::cases::Stratum;
 
 /// A case ready to be registered.
 pub(super) struct Prepared {

@@ -16,6 +16,7 @@ use super::figures::quantile;
 use super::registration::{Masks, images, masks, points};
 use super::rows::position_error_mm;
 use touch2touch::headless::{JsonArgs, ModelArgs, Output, VerbResult};
+use touch2touch_bench::known::{Case, CaseSet, Suite};
 use touch2touch_core::align::{Ask, Contacts, Evidence};
 use touch2touch_core::catalog::ToolSpec;
 use touch2touch_core::mesh::TriMesh;
@@ -23,7 +24,6 @@ use touch2touch_core::pose::{Registration, ToolModel, register_with};
 use touch2touch_core::units::angle_error;
 use touch2touch_core::verdict::{Grade, Verdict};
 use touch2touch_core::which_tool::which_tool;
-use touch2touch_pipeline::io::cases::{Case, CaseSet, Suite};
 
 /// Arguments of `bench verdict`.
 #[derive(Debug, Args)]

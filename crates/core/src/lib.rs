@@ -30,7 +30,7 @@ pub mod markers;
 pub mod mesh;
 pub mod metrics;
 pub mod moments;
-mod noise;
+pub mod noise;
 pub mod picture;
 pub mod pose;
 pub mod postprocess;

@@ -8,61 +8,72 @@ use super::grid::Grid;
 /// Stream of random numbers by its purpose. Streams of one seed are independent of each other, so that adding a draw to
 /// one effect does not change the others.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Stream {
+pub enum Stream {
+    /// How a tool is held.
     Grasp = 1,
+    /// Drawn tools.
     Tool = 2,
+    /// Drawn sensors.
     Config = 3,
+    /// Place of the sensors.
     Rig = 4,
+    /// Noise of the depth camera.
     Depth = 5,
+    /// Its texture.
     DepthTexture = 6,
+    /// Traits of a gel.
     Gel = 7,
+    /// Noise of its camera.
     GelNoise = 8,
+    /// Its picture without touch.
     GelReference = 9,
+    /// Corrupted masks.
     Mask = 10,
+    /// What is wrong with a pair.
     Condition = 11,
 }
 
 /// A source of random numbers for one purpose and one finger.
-pub(super) struct Noise(ChaCha8Rng);
+pub struct Noise(ChaCha8Rng);
 
 impl Noise {
     /// Source number `lane` (a finger's index, or 0) of the stream `stream` of `seed`.
-    pub(super) fn new(seed: u64, stream: Stream, lane: usize) -> Self {
+    pub fn new(seed: u64, stream: Stream, lane: usize) -> Self {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         rng.set_stream((stream as u64) << 8 | lane as u64);
         Self(rng)
     }
 
     /// Uniform in `[0, 1)`.
-    pub(super) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         (self.0.next_u64() >> 11) as f64 / (1u64 << 53) as f64
     }
 
     /// Uniform in `[lo, hi)`.
-    pub(super) fn uniform(&mut self, lo: f64, hi: f64) -> f64 {
+    pub fn uniform(&mut self, lo: f64, hi: f64) -> f64 {
         lo + (hi - lo) * self.unit()
     }
 
     /// Uniform in `0..n`.
-    pub(super) fn below(&mut self, n: usize) -> usize {
+    pub fn below(&mut self, n: usize) -> usize {
         ((self.unit() * n as f64) as usize).min(n.saturating_sub(1))
     }
 
     /// Nearly normal, mean 0, standard deviation 1, never beyond 3.5: the sum of four uniform numbers. Several
     /// times cheaper than an exact normal, and sensor noise has no far tails (those are separate effects here).
-    pub(super) fn normal(&mut self) -> f32 {
+    pub fn normal(&mut self) -> f32 {
         let bits = self.0.next_u64();
         let sum = (0..4).map(|i| (bits >> (16 * i)) as u16 as f32).sum::<f32>();
         (sum - 131_070.0) / 37_837.2
     }
 
     /// White noise of standard deviation 1.
-    pub(super) fn white(&mut self, width: usize, height: usize) -> Grid<f32> {
+    pub fn white(&mut self, width: usize, height: usize) -> Grid<f32> {
         Grid::from_fn(width, height, |_, _| self.normal())
     }
 
     /// A smooth random field of standard deviation about 1 whose bumps are about `cell` pixels wide.
-    pub(super) fn smooth(&mut self, width: usize, height: usize, cell: f64) -> Grid<f32> {
+    pub fn smooth(&mut self, width: usize, height: usize, cell: f64) -> Grid<f32> {
         let columns = (width as f64 / cell).ceil() as usize + 2;
         let rows = (height as f64 / cell).ceil() as usize + 2;
         let nodes = self.white(columns, rows);
@@ -80,7 +91,7 @@ impl Noise {
 }
 
 /// Blurs an image with the kernel `[side, 1 - 2 side, side]` along both axes; the border repeats.
-pub(super) fn blur3(image: &Grid<f32>, side: f32) -> Grid<f32> {
+pub fn blur3(image: &Grid<f32>, side: f32) -> Grid<f32> {
     let (w, h) = (image.width(), image.height());
     let rows = Grid::from_fn(w, h, |x, y| {
         let row = image.row(y);

@@ -22,23 +22,19 @@ mod lens;
 mod membrane;
 mod rig;
 mod sheet;
-mod spoil;
-mod training;
 
 use glam::{DAffine3, DQuat, DVec3};
 
 pub use condition::{Condition, TEST_GRASPS, test_grasp};
-pub(crate) use config::{BubbleConfig, GelSlimConfig};
-pub use config::{Sensors, SimConfig};
+pub(crate) use config::GelSlimConfig;
+pub use config::{BubbleConfig, Sensors, SimConfig};
 pub use faults::Fault;
 pub(crate) use gelslim::marker_places;
-pub use grasp::{Grasp, grid_grasp, random_grasp};
+pub use grasp::{Grasp, grid_grasp, random_grasp, random_grasp_within};
 pub use lens::Lens;
 pub use membrane::{Dome, Membrane};
 pub(crate) use rig::INTRINSICS;
 pub use rig::{RANGE_M, gelslim_yz, grasp_from_camera, outward};
-pub use spoil::{Spoil, spoil_mask};
-pub use training::{Drawn, Mix, of_any_depth, training_touch};
 
 use super::catalog::ToolSpec;
 use super::noise::{Noise, Stream};

@@ -4,10 +4,9 @@
 
 pub(crate) mod archive;
 pub mod atomic;
-pub mod cases;
 pub mod caught;
 pub mod dataset;
-pub(crate) mod digest;
+pub mod digest;
 pub mod doctor;
 pub mod exchange;
 pub mod files;
@@ -23,7 +22,6 @@ pub mod npz;
 pub mod ply;
 pub mod predicted_id;
 pub mod pt;
-pub mod shards;
 pub mod simulated;
 pub(crate) mod staging;
 pub mod statistics;

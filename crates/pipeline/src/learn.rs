@@ -1,9 +1,8 @@
-//! Networks fitted to the data at hand: the generator, the mask model, and the data that they learn from.
+//! Networks fitted to the data at hand: the generator and the mask model.
 
 pub mod adapt;
 pub mod mask_worth;
 pub mod new_bundle;
 pub mod train;
-pub mod training_data;
 pub mod tuning;
-mod usable;
+pub mod usable;

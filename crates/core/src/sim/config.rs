@@ -66,7 +66,8 @@ pub struct BubbleConfig {
 
 impl BubbleConfig {
     /// This bubble's noise and errors on the nominal bubble's shape.
-    pub(super) fn of_nominal_shape(self) -> Self {
+    #[must_use]
+    pub fn of_nominal_shape(self) -> Self {
         let nominal = Self::default();
         Self {
             press_m: nominal.press_m,

@@ -47,7 +47,7 @@ pub fn random_grasp(seed: u64) -> Grasp {
 }
 
 /// A grasp drawn uniformly: up to `theta_rad` turned either way, up to `position_m` off along x and y.
-pub(super) fn random_grasp_within(seed: u64, theta_rad: f64, position_m: f64) -> Grasp {
+pub fn random_grasp_within(seed: u64, theta_rad: f64, position_m: f64) -> Grasp {
     let mut noise = Noise::new(seed, Stream::Grasp, 0);
     Grasp {
         theta_rad: noise.uniform(-theta_rad, theta_rad),

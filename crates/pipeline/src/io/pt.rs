@@ -69,7 +69,7 @@ impl Tensor {
     }
 
     /// The values as 64-bit floats.
-    pub(crate) fn into_f64(self) -> Vec<f64> {
+    pub fn into_f64(self) -> Vec<f64> {
         match self.values {
             Values::F32(v) => v.into_iter().map(f64::from).collect(),
             Values::F64(v) => v,

@@ -6,7 +6,7 @@ use touch2touch_core::grid::{DepthMap, RgbGrid};
 const MEASURED: f64 = 0.5;
 
 /// Why a touch cannot be fitted or learned from: its GelSlim picture is not finite, or too little of its imprint was measured.
-pub(crate) fn unusable(gelslim: &RgbGrid, imprint: &DepthMap) -> Option<String> {
+pub fn unusable(gelslim: &RgbGrid, imprint: &DepthMap) -> Option<String> {
     if gelslim.as_slice().iter().flatten().any(|v| !v.is_finite()) {
         return Some("its GelSlim image has values that are not numbers".into());
     }

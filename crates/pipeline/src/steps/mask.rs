@@ -364,6 +364,11 @@ impl Contact {
     }
 }
 
+/// Error where a mask model is asked for and there is none.
+pub(crate) fn no_mask_model() -> TaskError {
+    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -19,7 +19,7 @@ use crate::io::caught::caught;
 use crate::job::{JobCx, PreviewPicture};
 use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
 use crate::steps::imprint::in_meters;
-use crate::steps::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe};
+use crate::steps::mask::{self, Contact, MaskChoice, MaskInputs, MaskRecipe, no_mask_model};
 use crate::steps::prediction::{Chains, Prediction};
 use touch2touch_core::contact::ContactMask;
 use touch2touch_core::diffusion::{GenerateConfig, Progress};
@@ -476,10 +476,6 @@ impl Masking<'_> {
     pub fn recipe(&self) -> Result<MaskRecipe, TaskError> {
         self.choice.recipe(self.model.map(|model| &model.id)).ok_or_else(no_mask_model)
     }
-}
-
-fn no_mask_model() -> TaskError {
-    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
 }
 
 /// The images of some items, each once (both fingers of a grasp have their own, many seeds share one), and which is

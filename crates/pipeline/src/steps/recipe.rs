@@ -14,7 +14,7 @@ use crate::infer::engine::EngineChoice;
 use crate::infer::recipe_id::Named;
 use crate::labels::{ImprintOf, ImprintSource};
 use crate::steps::bundles::{BundleInfo, BundleKind, FoundBundles};
-use crate::steps::mask::{MaskChoice, MaskRecipe, MaskSource};
+use crate::steps::mask::{MaskChoice, MaskRecipe, MaskSource, no_mask_model};
 use crate::steps::predict::Generating;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::pose::Registration;
@@ -258,9 +258,4 @@ impl Recipe {
     pub fn mask_recipe(&self) -> Result<MaskRecipe, TaskError> {
         self.mask.recipe(self.mask_model.as_ref().map(|model| &model.id)).ok_or_else(no_mask_model)
     }
-}
-
-/// Error where a mask model is asked for and there is none.
-pub(crate) fn no_mask_model() -> TaskError {
-    TaskError::new("Contact mask", "no mask model was found").with_hint("Name one with an option, or another source.")
 }

@@ -13,6 +13,7 @@
 //! | `predicted` | - | 1 where a model predicted the imprints; may be left out |
 //! | `tool`, `stratum` | - | number of the tool's file; 0 nominal, 1 hard, 2 degenerate |
 
+mod corrupt;
 mod simulated;
 
 use std::collections::BTreeMap;
@@ -20,15 +21,15 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::npz::{self, NpzError};
-use super::pt::Tensor;
-use super::stl::{self, MeshError};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sensor::Intrinsics;
+use touch2touch_pipeline::io::npz::{self, NpzError};
+use touch2touch_pipeline::io::pt::{Tensor, Values};
+use touch2touch_pipeline::io::stl::{self, MeshError};
 
 pub use simulated::{Suite, stratum};
 
@@ -290,7 +291,7 @@ pub fn write(file: &Path, case: &Case) -> Result<(), CaseError> {
         [row(0), row(1), row(2), [0.0, 0.0, 0.0, 1.0]].concat()
     });
     let pose = case.grasp_from_object;
-    let whole = |v: i64| Tensor { shape: vec![], values: super::pt::Values::I64(vec![v]) };
+    let whole = |v: i64| Tensor { shape: vec![], values: Values::I64(vec![v]) };
     npz::write(
         file,
         &[

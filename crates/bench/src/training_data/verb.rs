@@ -1,4 +1,4 @@
-//! `touch2touch training-data`: a data set or the simulator as shards for the trainer.
+//! `touch2touch-bench training-data`: a data set or the simulator as shards for the trainer.
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -6,19 +6,21 @@ use std::time::Instant;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs, at_least_one, keyed};
-use super::{Common, Output, ToolArgs, VerbResult};
+use super::{ShardSetup, TouchSource, WrittenShards, write_shards};
+use touch2touch::headless::{
+    Common, DatasetArgs, LimitArgs, Output, ToolArgs, VerbResult, at_least_one, condition, keyed,
+};
+use touch2touch_bench::training_mix::Mix;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::sim::{Condition, Mix};
+use touch2touch_core::sim::Condition;
 use touch2touch_pipeline::labels::Labels;
-use touch2touch_pipeline::learn::training_data::{ShardSetup, TouchSource, WrittenShards, write_shards};
 
 /// The PATH that means the simulator.
 const SIMULATOR: &str = "simulator";
 
 /// Arguments of `training-data`.
 #[derive(Debug, Args)]
-pub(super) struct TrainingDataArgs {
+pub(crate) struct TrainingDataArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
     /// The folder of the shards. It may hold shards of other data: the trainer mixes what lies in it. Shards that are complete are not
@@ -39,7 +41,7 @@ pub(super) struct TrainingDataArgs {
     #[arg(long, default_value = "train", value_parser = keyed::<Mix>())]
     mix: Mix,
     /// Of the simulator: what is wrong with the pairs, as for `simulate`.
-    #[arg(long, default_value = "plain", value_parser = keyed::<Condition>())]
+    #[arg(long, default_value = "plain", value_parser = condition())]
     condition: Condition,
     /// Of the simulator: the same seed writes the same touches.
     #[arg(long, default_value_t = 1)]
@@ -66,7 +68,7 @@ struct Report {
     seconds: f64,
 }
 
-pub(super) fn run(args: &TrainingDataArgs) -> VerbResult {
+pub(crate) fn run(args: &TrainingDataArgs) -> VerbResult {
     let begin = Instant::now();
     let setup = ShardSetup { pairs_per_shard: args.per_shard, share: args.shard };
     let (written, output) = if args.dataset.path() == Path::new(SIMULATOR) {

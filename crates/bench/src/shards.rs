@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::{atomic, files};
 use touch2touch_core::grid::{DepthMap, Mask, RgbGrid};
+use touch2touch_pipeline::io::{atomic, files};
 
 /// Side of the GelSlim image, pixels.
 pub(crate) const GELSLIM_SIDE: usize = 128;
@@ -25,7 +25,7 @@ const FILES: [&str; 5] = ["gelslim.npy", "imprint.npy", "clean.npy", "contact.np
 
 /// One touch of one pad.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Record {
+pub(crate) struct Record {
     /// The difference image in gray levels, [`GELSLIM_SIDE`] pixels wide and high.
     pub gelslim: RgbGrid,
     /// The measured imprint, meters, raw orientation; not a number where nothing was measured.
@@ -50,7 +50,7 @@ pub struct Record {
 
 /// Whose touch it is: it decides how much the trainer varies the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Origin {
+pub(crate) enum Origin {
     /// Sensors that were drawn.
     Drawn,
     /// The simulator's nominal sensors.
@@ -169,7 +169,7 @@ impl ShardWriter {
 }
 
 /// Description of a complete shard; `None` where there is none, or one that was not finished.
-pub fn about(folder: &Path) -> Option<Value> {
+pub(crate) fn about(folder: &Path) -> Option<Value> {
     serde_json::from_slice(&files::read(&folder.join(DONE), files::SMALL).ok()?).ok()
 }
 

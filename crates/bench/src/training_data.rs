@@ -6,17 +6,8 @@ use rayon::prelude::*;
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use crate::error::{Remark, TaskError};
-use crate::io::dataset::Dataset;
-use crate::io::digest::sha256;
-use crate::io::names;
-use crate::io::shards::{self, GELSLIM_SIDE, Origin, Record, ShardWriter};
-use crate::job::JobCx;
-use crate::labels::{Labels, PairLabels, Review};
-use crate::learn::usable::unusable;
-use crate::steps::mask::{MaskChoice, MaskInputs, MaskRecipe, contact_mask};
-use crate::steps::recipe::no_mask_model;
-use crate::steps::tool::Tools;
+use crate::shards::{self, GELSLIM_SIDE, Origin, Record, ShardWriter};
+use touch2touch_bench::training_mix::{Mix, training_touch};
 use touch2touch_core::catalog;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
@@ -25,7 +16,20 @@ use touch2touch_core::pose::ToolModel;
 use touch2touch_core::resample::{bilinear, bilinear_rgb};
 use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::Sample;
-use touch2touch_core::sim::{Condition, Mix, training_touch};
+use touch2touch_core::sim::Condition;
+use touch2touch_pipeline::error::{Remark, TaskError};
+use touch2touch_pipeline::io::dataset::Dataset;
+use touch2touch_pipeline::io::digest::sha256;
+use touch2touch_pipeline::io::names;
+use touch2touch_pipeline::job::JobCx;
+use touch2touch_pipeline::labels::{Labels, PairLabels, Review};
+use touch2touch_pipeline::learn::usable::unusable;
+use touch2touch_pipeline::steps::mask::{MaskChoice, MaskInputs, MaskRecipe, contact_mask};
+use touch2touch_pipeline::steps::tool::Tools;
+
+mod verb;
+
+pub(crate) use verb::{TrainingDataArgs, run};
 
 const WHAT: &str = "Write training data";
 /// Tells the simulator's touches from those of the simulator before: shards of both do not mix.
@@ -35,7 +39,7 @@ const CHUNK: usize = 64;
 
 /// Source of touches.
 #[derive(Clone, Copy, Debug)]
-pub enum TouchSource<'a> {
+pub(crate) enum TouchSource<'a> {
     /// A data set, with what people said about it.
     Dataset(&'a Dataset, &'a Labels, &'a [PairId]),
     /// The simulator.
@@ -53,7 +57,7 @@ pub enum TouchSource<'a> {
 
 /// Division of the touches.
 #[derive(Clone, Copy, Debug)]
-pub struct ShardSetup {
+pub(crate) struct ShardSetup {
     /// Pairs in a shard.
     pub pairs_per_shard: usize,
     /// Only every `share[1]`-th shard, from number `share[0]` (counted from 1) on: so many machines share the work.
@@ -62,7 +66,7 @@ pub struct ShardSetup {
 
 /// By what the contact is known, in touches.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct ContactCounts {
+pub(crate) struct ContactCounts {
     /// Drawn by hand.
     pub hand: usize,
     /// Near the CAD model at the true pose.
@@ -75,7 +79,7 @@ pub struct ContactCounts {
 
 /// Counts of what was written.
 #[derive(Clone, Debug, Default, Serialize)]
-pub struct WrittenShards {
+pub(crate) struct WrittenShards {
     /// Shards written now.
     pub written: usize,
     /// Shards that an earlier run had written.
@@ -97,7 +101,7 @@ pub struct WrittenShards {
 /// # Errors
 /// If the job was told to stop, the data are not of the lab's rig, nothing can be used, or a shard of that name holds other data or
 /// cannot be written. Shards that are complete stay.
-pub fn write_shards(
+pub(crate) fn write_shards(
     source: TouchSource<'_>,
     setup: ShardSetup,
     out: &Path,
@@ -377,7 +381,8 @@ fn contact(sample: &Sample, pad: PadId, tool: Option<&ToolModel>, labels: &PairL
     let imprint = &sample.pad(pad)?.depth()?.imprint;
     let recipe = MaskRecipe::Cad(MaskChoice::default().cad_distance_m.into());
     let inputs = MaskInputs::measured(sample, tool, Some(labels));
-    let found = contact_mask(&recipe, imprint, pad, inputs, |_| Err(no_mask_model())).ok()?;
+    let found =
+        contact_mask(&recipe, imprint, pad, inputs, |_| Err(TaskError::new(WHAT, "no mask model is asked"))).ok()?;
     let known = match found.basis {
         MaskBasis::Hand => Known::Hand,
         MaskBasis::Source => Known::Cad,

@@ -5,10 +5,9 @@ use std::f64::consts::PI;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
-use super::grasp::{random_grasp, random_grasp_within};
-use super::{BubbleConfig, Condition, SimConfig};
-use crate::catalog;
-use crate::sample::Sample;
+use touch2touch_core::catalog;
+use touch2touch_core::sample::Sample;
+use touch2touch_core::sim::{BubbleConfig, Condition, SimConfig, random_grasp, random_grasp_within};
 
 /// Share of drawn tools in [`Mix::Train`].
 const DRAWN_TOOLS: f64 = 0.4;

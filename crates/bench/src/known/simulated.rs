@@ -3,18 +3,20 @@
 //! Recipe. Tool: for nominal and hard cases the lab's eleven tools that are no rod, in turn; for degenerate ones a
 //! rod and a peg. Pose: uniform in the prior (±22.5°, ±5 mm). Sensors: the simulator's nominal ones with the true
 //! camera off by a deviation of 0.25° and 0.2 mm per axis; hard cases press two thirds as deep and have 1.5 times the
-//! noise. One pixel in a hundred is dropped: it reads 0 on the right finger and NaN on the left. Masks: see [`Spoil`];
+//! noise. One pixel in a hundred is dropped: it reads 0 on the right finger and NaN on the left. Masks: see [`Corruption`];
 //! three of four degenerate cases have nothing at all in the mask of one finger.
 
 use glam::DVec2;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use super::corrupt::{Corruption, corrupt};
 use super::{Case, Stratum};
+use crate::training_mix::of_any_depth;
 use touch2touch_core::catalog::{self, Bar, ToolSpec};
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sample::Sample;
-use touch2touch_core::sim::{self, Condition, Spoil, spoil_mask};
+use touch2touch_core::sim::{self, Condition};
 
 /// Deviation of the camera's true angle and place from the nominal ones, per axis.
 const CALIBRATION_RAD: f64 = 0.25 * std::f64::consts::PI / 180.0;
@@ -117,11 +119,11 @@ impl Suite {
             config.bubble.noise_m *= 1.5;
         }
         if any_depth {
-            config.bubble = sim::of_any_depth(config.bubble, &mut rng);
+            config.bubble = of_any_depth(config.bubble, &mut rng);
         }
         let tool = (tool + position % 2 * plain) % tools.len();
         let sample = condition.simulate(&tools[tool], sim::random_grasp(rng.random()), rng.random(), &config);
-        let spoil = if stratum == Stratum::Hard { Spoil::hard() } else { Spoil::nominal() };
+        let corruption = if stratum == Stratum::Hard { Corruption::hard() } else { Corruption::nominal() };
         let mask_seed: u64 = rng.random();
         // Of the degenerate cases, three of four have one blank finger, either one equally often.
         let blank = (stratum == Stratum::Degenerate && rng.random_bool(0.75)).then(|| rng.random_range(0..2));
@@ -132,7 +134,7 @@ impl Suite {
         let camera = |finger| touch(finger).camera.clone().expect("the simulator's bubbles have cameras");
         let clean =
             lab::PADS.map(|f| touch(f).truth.as_ref().expect("the simulator knows the contact").contact.clone());
-        let mut masks = lab::PADS.map(|f| spoil_mask(&clean[f.index()], &spoil, f, mask_seed));
+        let mut masks = lab::PADS.map(|f| corrupt(&clean[f.index()], &corruption, f, mask_seed));
         if let Some(finger) = blank {
             let finger: usize = finger;
             masks[finger].as_mut_slice().fill(false);

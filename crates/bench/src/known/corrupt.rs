@@ -1,37 +1,37 @@
 //! Contact masks as a learned model gets them wrong: a wavering outline, blobs, halos, missing ends.
 
-use crate::grid::{Grid, Mask};
-use crate::noise::{Noise, Stream};
-use crate::rig::PadId;
+use touch2touch_core::grid::{Grid, Mask};
+use touch2touch_core::noise::{Noise, Stream};
+use touch2touch_core::rig::PadId;
 
 /// Strength of the spoiling of a mask. Lengths in pixels; ranges are drawn from uniformly.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Spoil {
+pub(super) struct Corruption {
     /// Deviation of the outline from its true place, from spot to spot (bumps about 7 pixels wide).
-    pub outline_px: f64,
+    pub(super) outline_px: f64,
     /// Deviation of the whole outline: a mask that is too fat or too thin all over.
-    pub offset_px: f64,
+    pub(super) offset_px: f64,
     /// Blobs that are no contact: expected number and range of their semi-axes.
-    pub blobs: f64,
-    /// See [`Spoil::blobs`].
-    pub blob_px: [f64; 2],
+    pub(super) blobs: f64,
+    /// See [`Corruption::blobs`].
+    pub(super) blob_px: [f64; 2],
     /// Stretches of the outline that are too fat: expected number and range of the additional width.
-    pub halos: f64,
-    /// See [`Spoil::halos`].
-    pub halo_px: [f64; 2],
+    pub(super) halos: f64,
+    /// See [`Corruption::halos`].
+    pub(super) halo_px: [f64; 2],
     /// Ends that are missing: expected number and range of the missing length.
-    pub ends: f64,
-    /// See [`Spoil::ends`].
-    pub end_px: [f64; 2],
+    pub(super) ends: f64,
+    /// See [`Corruption::ends`].
+    pub(super) end_px: [f64; 2],
     /// Share of all pixels that are flipped one by one.
-    pub flipped_share: f64,
+    pub(super) flipped_share: f64,
     /// Probability that everything on one side of a random line through the contact is missing.
-    pub cut: f64,
+    pub(super) cut: f64,
 }
 
-impl Spoil {
+impl Corruption {
     /// An ordinary learned mask: an overlap (IoU) of about 0.8 with the truth.
-    pub fn nominal() -> Self {
+    pub(super) fn nominal() -> Self {
         Self {
             outline_px: 0.5,
             offset_px: 0.35,
@@ -47,7 +47,7 @@ impl Spoil {
     }
 
     /// A bad one: an overlap of about 0.5.
-    pub fn hard() -> Self {
+    pub(super) fn hard() -> Self {
         Self {
             outline_px: 0.9,
             offset_px: 0.6,
@@ -64,33 +64,33 @@ impl Spoil {
 }
 
 /// A spoilt copy of the contact mask of `finger`. The same arguments give the same mask on every machine.
-pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: PadId, seed: u64) -> Mask {
+pub(super) fn corrupt(clean: &Mask, corruption: &Corruption, finger: PadId, seed: u64) -> Mask {
     let [width, height] = clean.size();
     let mut noise = Noise::new(seed, Stream::Mask, finger.index());
     let contact: Vec<[f64; 2]> = pixels(clean);
     let distance = outline_distance(clean);
     let wave = noise.smooth(width, height, 7.0);
-    let offset = spoil.offset_px * f64::from(noise.normal());
-    let mut growth = Grid::from_fn(width, height, |x, y| offset + spoil.outline_px * f64::from(wave[(x, y)]));
+    let offset = corruption.offset_px * f64::from(noise.normal());
+    let mut growth = Grid::from_fn(width, height, |x, y| offset + corruption.outline_px * f64::from(wave[(x, y)]));
     if !contact.is_empty() {
-        for _ in 0..count(&mut noise, spoil.halos) {
+        for _ in 0..count(&mut noise, corruption.halos) {
             let [cx, cy] = contact[noise.below(contact.len())];
-            let (more, reach) = (range(&mut noise, spoil.halo_px), noise.uniform(8.0, 20.0));
+            let (more, reach) = (range(&mut noise, corruption.halo_px), noise.uniform(8.0, 20.0));
             paint(&mut growth, [cx, cy], reach, |v| v + more);
         }
     }
     let mut mask = Mask::from_fn(width, height, |x, y| distance[(x, y)] < growth[(x, y)]);
     if !contact.is_empty() {
-        for _ in 0..count(&mut noise, spoil.ends) {
+        for _ in 0..count(&mut noise, corruption.ends) {
             // The end in a random direction: the contact pixel that lies farthest that way.
             let (s, c) = noise.uniform(0.0, std::f64::consts::TAU).sin_cos();
             let along = |p: &[f64; 2]| c * p[0] + s * p[1];
             if let Some(&end) = contact.iter().max_by(|a, b| along(a).total_cmp(&along(b))) {
-                let reach = range(&mut noise, spoil.end_px);
+                let reach = range(&mut noise, corruption.end_px);
                 paint(&mut mask, end, reach, |_| false);
             }
         }
-        if noise.unit() < spoil.cut {
+        if noise.unit() < corruption.cut {
             let [cx, cy] = contact[noise.below(contact.len())];
             let (s, c) = noise.uniform(0.0, std::f64::consts::TAU).sin_cos();
             for y in 0..height {
@@ -100,9 +100,9 @@ pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: PadId, seed: u64) -> Mask
             }
         }
     }
-    for _ in 0..count(&mut noise, spoil.blobs) {
+    for _ in 0..count(&mut noise, corruption.blobs) {
         let center = [noise.uniform(0.0, width as f64), noise.uniform(0.0, height as f64)];
-        let semi = [range(&mut noise, spoil.blob_px), range(&mut noise, spoil.blob_px)];
+        let semi = [range(&mut noise, corruption.blob_px), range(&mut noise, corruption.blob_px)];
         for y in 0..height {
             for x in 0..width {
                 let (dx, dy) = ((x as f64 - center[0]) / semi[0], (y as f64 - center[1]) / semi[1]);
@@ -111,7 +111,7 @@ pub fn spoil_mask(clean: &Mask, spoil: &Spoil, finger: PadId, seed: u64) -> Mask
         }
     }
     for pixel in mask.as_mut_slice() {
-        *pixel ^= noise.unit() < spoil.flipped_share;
+        *pixel ^= noise.unit() < corruption.flipped_share;
     }
     mask
 }
@@ -179,7 +179,7 @@ fn outline_distance(mask: &Mask) -> Grid<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::lab;
+    use touch2touch_core::rig::lab;
 
     fn bar() -> Mask {
         Mask::from_fn(175, 140, |x, y| (30..140).contains(&x) && (60..72).contains(&y))
@@ -194,13 +194,13 @@ mod tests {
 
     #[test]
     fn masks_are_spoilt_as_much_as_said_and_repeat() {
-        for (spoil, range) in [(Spoil::nominal(), 0.7..0.9), (Spoil::hard(), 0.3..0.65)] {
+        for (corruption, range) in [(Corruption::nominal(), 0.7..0.9), (Corruption::hard(), 0.3..0.65)] {
             let overlaps: Vec<f64> =
-                (0..40).map(|seed| overlap(&spoil_mask(&bar(), &spoil, lab::LEFT, seed), &bar())).collect();
+                (0..40).map(|seed| overlap(&corrupt(&bar(), &corruption, lab::LEFT, seed), &bar())).collect();
             let mean = overlaps.iter().sum::<f64>() / 40.0;
             assert!(range.contains(&mean), "{mean}");
-            assert_eq!(spoil_mask(&bar(), &spoil, lab::LEFT, 3), spoil_mask(&bar(), &spoil, lab::LEFT, 3));
-            assert_ne!(spoil_mask(&bar(), &spoil, lab::LEFT, 3), spoil_mask(&bar(), &spoil, lab::RIGHT, 3));
+            assert_eq!(corrupt(&bar(), &corruption, lab::LEFT, 3), corrupt(&bar(), &corruption, lab::LEFT, 3));
+            assert_ne!(corrupt(&bar(), &corruption, lab::LEFT, 3), corrupt(&bar(), &corruption, lab::RIGHT, 3));
         }
     }
 
@@ -209,13 +209,14 @@ mod tests {
         let d = outline_distance(&bar());
         assert_eq!((d[(80, 60)], d[(80, 59)], d[(80, 62)], d[(80, 50)]), (-0.5, 0.5, -2.5, 9.5));
         let nothing = Mask::filled(9, 7, false);
-        let mask = spoil_mask(&nothing, &Spoil { blobs: 0.0, flipped_share: 0.0, ..Spoil::hard() }, lab::LEFT, 1);
+        let mask =
+            corrupt(&nothing, &Corruption { blobs: 0.0, flipped_share: 0.0, ..Corruption::hard() }, lab::LEFT, 1);
         assert_eq!(mask, nothing, "no contact, no outline");
         let all = Mask::filled(9, 7, true);
         assert_eq!(
-            spoil_mask(
+            corrupt(
                 &all,
-                &Spoil { blobs: 0.0, ends: 0.0, cut: 0.0, flipped_share: 0.0, ..Spoil::hard() },
+                &Corruption { blobs: 0.0, ends: 0.0, cut: 0.0, flipped_share: 0.0, ..Corruption::hard() },
                 lab::LEFT,
                 1
             ),

@@ -1,0 +1,4 @@
+//! Grasps whose truth is known, for the benchmarks and for the tests of the studio.
+
+pub mod known;
+pub mod training_mix;
