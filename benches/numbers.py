@@ -40,7 +40,7 @@ class Bench:
         return self.verbs.run(*words)
 
     def bench(self, name, *words):
-        """A benchmark; its pictures lie beside its file in `out`."""
+        """A benchmark; its file lies in `out`."""
         file = self.out / f"{name}.json"
         return self.benches.write(file, *words)
 

@@ -11,7 +11,6 @@ mod contact_mask;
 mod doctor;
 mod evaluate;
 mod export;
-mod figure;
 mod generate;
 mod guard;
 mod label;
@@ -85,8 +84,6 @@ enum Verb {
     Pose(pose::PoseArgs),
     /// The paper's results table of a data set: generators side by side, with the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
-    /// Draw pairs side by side for a paper: chosen pairs and panes as a grid with one range of colors, as PNG or SVG.
-    Figure(Box<figure::FigureArgs>),
     /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
     Still(Box<still::StillArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
@@ -250,7 +247,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Watch(args)) => watch::run(&args),
         Some(Verb::Pose(args)) => pose::run(&args),
         Some(Verb::Evaluate(args)) => evaluate::run(&args),
-        Some(Verb::Figure(args)) => figure::run(&args),
         Some(Verb::Still(args)) => still::run(&args),
         Some(Verb::Export(args)) => export::run(&args),
         Some(Verb::Adapt(args)) => adapt::run(&args),

@@ -16,16 +16,21 @@ pub use focus::{FILLED, focus};
 mod focus;
 
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::images::space::DrawSpace;
+use touch2touch_pipeline::still::space::{InSpace, SpacePicture, SpaceView};
 
 /// The renderer of stills, on the best graphics device that there is; a software one will do.
 ///
 /// # Errors
 /// If there is no device, or the program was built without a renderer.
-pub fn stills() -> Result<Box<dyn DrawSpace>, TaskError> {
+pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, TaskError> {
     #[cfg(feature = "gui")]
-    return Ok(Box::new(still::Stills::new()?));
+    {
+        let stills = still::Stills::new()?;
+        Ok(move |pair: &InSpace, view: &SpaceView| stills.draw(pair, view))
+    }
     #[cfg(not(feature = "gui"))]
-    return Err(TaskError::new("3D picture", "this program was built without the 3D renderer")
-        .with_hint("Build it with the feature gui."));
+    Err::<fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, _>(
+        TaskError::new("3D picture", "this program was built without the 3D renderer")
+            .with_hint("Build it with the feature gui."),
+    )
 }

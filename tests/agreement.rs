@@ -24,7 +24,7 @@ use touch2touch::app::command::{
     AdaptCommand, Command, DoctorCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
     PredictCommand, ViewCommand,
 };
-use touch2touch::app::export::{FigureForm, FigureRows, Output};
+use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
@@ -76,7 +76,6 @@ fn how(action: Action) -> How {
         A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
-        A::Figure => Verb(&["figure", "demo", "--pairs", "a,b", "--panes", "measured,error", "--out", "a.svg"]),
         A::ExportMeasured => Verb(&["export", "demo", "--pair", "a", "--out", "folder"]),
         A::ExportPredicted => Verb(&["export", "demo", "--pair", "a", "--imprint", "predicted", "--out", "folder"]),
         A::ExportMasks => Verb(&["masks", "export", "demo", "--out", "folder"]),
@@ -127,7 +126,6 @@ fn how(action: Action) -> How {
         A::Distances | A::NextLayer => Options(&["pose", "demo", "--trace", "--json"]),
         A::CancelJobs | A::Undo | A::Redo => Shell,
         A::PreviousPair | A::NextPair | A::TenBack | A::TenForward | A::FirstPair | A::LastPair => Window,
-        A::TickPair => Options(&["figure", "demo", "--pairs", "a,b", "--out", "a.png"]),
         A::NextUnfinished | A::NextWorst | A::OtherFinger | A::BothFingers | A::FindPair => Window,
         A::Brush | A::Eraser | A::Lasso | A::Polygon | A::RectangleTool | A::Wand => Verb(&[
             "label",
@@ -153,7 +151,6 @@ fn how(action: Action) -> How {
             Window
         }
         A::ResetWorkspace | A::MaximizePane | A::Fullscreen | A::Screenshot | A::CopyHovered => Window,
-        // Image panes are drawn by `figure`; these are photographs of the window.
         A::SavePane | A::CopyPane => Window,
         A::Palette | A::ShortcutSheet | A::ResetSettings => Window,
     }
@@ -485,45 +482,6 @@ fn on_a_folder_of_pictures_the_figures_are_of_the_files_own_pixels_in_both() {
 }
 
 #[test]
-fn figures_and_pictures_are_the_same_files_in_both() {
-    let home = tempfile::tempdir().unwrap();
-    let at = |name: &str| home.path().join(name);
-    let mut studio = Studio::open(Place::Demo, home.path());
-    studio.send(ViewCommand::ShowBothFingers(false).into());
-    let names: Vec<String> = {
-        let library = &studio.state.library;
-        let names = library.order.iter().take(2).filter_map(|pair| library.entry(*pair));
-        names.map(|entry| entry.name.clone()).collect()
-    };
-    let form = FigureForm { rows: FigureRows::First(2), scale: 1, ..FigureForm::default() };
-    studio.send(ExportCommand::SetForm(form).into());
-    studio.send(ExportCommand::Write(Output::Figure, at("studio.png")).into());
-    let picture = Output::Picture { pane: Pane::Predicted, scale: None, error_m: 0.004 };
-    studio.send(ExportCommand::Write(picture, at("studio")).into());
-    let entry = studio.state.log.entries.back().unwrap();
-    assert_eq!(entry.place, Some(at("studio.svg")), "{entry:?}");
-    let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
-
-    let verb = |arguments: &[&str], file: &Path| {
-        let all = [&["figure", "demo", "--finger", &finger, "--scale", "1"], arguments].concat();
-        json(&[&all[..], &["--out", file.to_str().unwrap()]].concat(), home.path())
-    };
-    let said = verb(&["--pairs", &names.join(",")], &at("verb.png"));
-    assert_eq!((said["rows"].as_array().unwrap().len(), &said["range_mm"][1]), (2, &18.0.into()), "{said}");
-    let one = ["--panes", "predicted", "--pairs", studio.state.pair_name()];
-    verb(&one, &at("verb.svg"));
-    for ending in ["png", "svg"] {
-        let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}.{ending}"))).unwrap());
-        assert!(a.len() > 5000 && a == b, "{ending}: {} and {} bytes", a.len(), b.len());
-    }
-    // What cannot be drawn is said before anything is predicted.
-    for wrong in [["--scale", "900"], ["--panes", "colors"], ["--range", "18..0"], ["--out", "a.gif"]] {
-        let arguments = [&["figure", "demo", "--pairs", &names[0], "--out", "a.png"], &wrong[..]].concat();
-        assert_eq!(run(&arguments, home.path()).status.code(), Some(2), "{wrong:?}");
-    }
-}
-
-#[test]
 fn a_pair_in_files_is_the_same_in_both() {
     let home = tempfile::tempdir().unwrap();
     let folder = lab_folder(home.path());
@@ -562,7 +520,7 @@ fn every_pane_says_a_command_that_the_program_understands() {
             let choice = MaskChoice { source, ..MaskChoice::default() };
             studio.send(prefer(move |s| s.mask = MaskSettings { choice, ..MaskSettings::default() }).into());
             for pane in Pane::iter() {
-                let Some(words) = export::equivalent_words(&studio.state, pane, 0.004) else { continue };
+                let Some(words) = export::equivalent_words(&studio.state, pane) else { continue };
                 said += 1;
                 if let Err(err) = touch2touch::headless::check_command(&words) {
                     panic!("{pane:?}: {words:?}: {err}");
@@ -570,12 +528,12 @@ fn every_pane_says_a_command_that_the_program_understands() {
             }
         }
     }
-    assert!(said > 18 * 12, "{said}");
+    assert!(said > 18 * 9, "{said}");
     // One of them, run: it answers with the number that the studio shows.
     studio.send(prefer(|s| s.shift = ShiftMode::ExactInverse).into());
     studio.send(prefer(|s| s.mask = MaskSettings::default()).into());
     studio.predict(3);
-    let words = export::equivalent_words(&studio.state, Pane::Metrics, 0.004).unwrap();
+    let words = export::equivalent_words(&studio.state, Pane::Metrics).unwrap();
     let words: Vec<&str> = words[1..].iter().map(String::as_str).collect();
     let report = json(&words, home.path());
     for (case, source) in report["cases"].as_array().unwrap().iter().zip(ImprintSource::iter()) {
@@ -586,7 +544,7 @@ fn every_pane_says_a_command_that_the_program_understands() {
 
 /// The value of an option in the command of a pane.
 fn said(studio: &Studio, pane: Pane, option: &str) -> Option<String> {
-    let words = export::equivalent_words(&studio.state, pane, 0.004)?;
+    let words = export::equivalent_words(&studio.state, pane)?;
     touch2touch::headless::check_command(&words).unwrap();
     let at = words.iter().position(|word| word == option)?;
     words.get(at + 1).cloned()
@@ -616,5 +574,5 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), Some(listed.join(",")));
     // Nothing is marked done: there is nothing to fit, and no command for it.
     studio.send(AdaptCommand::Choose(AdaptPairs::Done).into());
-    assert_eq!(export::equivalent_words(&studio.state, Pane::Adapt, 0.004), None);
+    assert_eq!(export::equivalent_words(&studio.state, Pane::Adapt), None);
 }

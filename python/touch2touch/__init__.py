@@ -28,7 +28,6 @@ from ._native import (
     export_masks,
     estimate,
     estimate_many,
-    figure,
     frechet,
     label,
     open,
@@ -42,7 +41,7 @@ from ._many import predict, predict_many, table
 
 __all__ = [
     "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
-    "estimate", "estimate_many", "evaluate", "export_masks", "figure", "frechet", "label", "open", "predict", "predict_many", "psnr",
+    "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "label", "open", "predict", "predict_many", "psnr",
     "register", "register_many", "simulate", "ssim", "table",
 ]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
-    "bundles", "estimate", "estimate_many", "evaluate", "export_masks", "figure", "frechet", "label", "open", "psnr", "register",
+    "bundles", "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "label", "open", "psnr", "register",
     "register_many", "simulate", "ssim",
 ]
 __version__: str
@@ -76,7 +76,7 @@ class Pair:
     def note(self) -> str: ...
     @property
     def notes(self) -> list[str]: ...
-    def _repr_svg_(self) -> str | None: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Tool:
@@ -144,7 +144,7 @@ class Estimate:
     def verdict(self) -> str | None: ...
     @property
     def pair(self) -> Pair: ...
-    def _repr_svg_(self) -> str: ...
+    def _repr_html_(self) -> str: ...
 
 @final
 class Scores:
@@ -176,7 +176,6 @@ def register_many(
     evidence: bool = True,
     progress: _Progress = None,
 ) -> list[Pose | None]: ...
-def figure(pair: Pair, recipe: Recipe | None = None, *, columns: Sequence[str] | None = None) -> str: ...
 def label(
     pair: Pair,
     *,

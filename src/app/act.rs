@@ -159,8 +159,6 @@ fn cancel(state: &State) -> Option<Command> {
         does(ExportCommand::AskImport(None))
     } else if state.export.asking_masks {
         does(ExportCommand::AskMasks(false))
-    } else if state.export.asking {
-        does(ExportCommand::Ask(false))
     } else if results::proposes(state) {
         does(ViewCommand::Propose(false))
     } else if let Some(command) = escape(state) {

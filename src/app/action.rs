@@ -65,8 +65,6 @@ macro_rules! actions {
             state => opened(state, DoctorCommand::Show(!state.doctor.shown));
         Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
-        Figure, File, "Figure…", "Draws pairs side by side for a paper, with one range of colors, as PNG or SVG", [ctrl_shift(K::E)],
-            state => when(export::can_draw(state), ExportCommand::Ask(!state.export.asking));
         ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [],
             state => export(state, ImprintSource::Measured);
         ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [],
@@ -92,8 +90,6 @@ macro_rules! actions {
             state => listed(state, LibraryCommand::NextUnfinished);
         NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)],
             state => listed(state, LibraryCommand::NextWorst).filter(|_| state.table.by().is_some());
-        TickPair, Navigate, "Tick the pair", "Ticks the pair on screen for figures, or no longer; Ctrl+click in the list does the same", [ctrl(K::T)],
-            state => state.selection.pair.and_then(|pair| does(LibraryCommand::Tick(pair)));
         OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)],
             state => does(ViewCommand::SelectFinger(state.other_finger()));
         BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)],
@@ -475,8 +471,8 @@ impl Action {
             Self::Parallel => "orthographic perspective camera",
             Self::Footprint => "rectangle outline crop",
             Self::SwitchTheme => "mode bright black white appearance",
-            Self::Screenshot | Self::SavePane => "png picture image figure save export",
-            Self::CopyPane => "png picture image figure clipboard",
+            Self::Screenshot | Self::SavePane => "png picture image save export",
+            Self::CopyPane => "png picture image clipboard",
             Self::CopyHovered => "clipboard number",
             Self::ShortcutSheet => "keys keyboard help bindings hotkeys",
             Self::ResetSettings => "defaults factory settings",

@@ -14,7 +14,6 @@ use super::source::DataSource;
 use super::state::State;
 use super::state::doctor::DoctorState;
 use super::state::evaluate::ScoreChoice;
-use super::state::export::FigureRows;
 use super::state::labels::{Document, Review};
 use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
@@ -58,10 +57,6 @@ pub enum LibraryCommand {
     SetScore(ScoreChoice),
     /// Sorts it by what is uncertain.
     SetUncertainBy(QueueBy),
-    /// Ticks a pair for figures, or no longer.
-    Tick(PairId),
-    /// Takes all ticks away.
-    Untick,
     /// The rows of the list that are on screen.
     ShowRows(Range<usize>),
     /// Shows a pair.
@@ -119,17 +114,6 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
             state.table.uncertain_by = by;
             state.library.sort = Sort::Uncertain;
             state.reorder();
-        }
-        LibraryCommand::Tick(pair) => {
-            if !state.library.ticked.remove(&pair) {
-                state.library.ticked.insert(pair);
-            }
-            let any = !state.library.ticked.is_empty();
-            state.export.form.rows = if any { FigureRows::Ticked } else { FigureRows::Selected };
-        }
-        LibraryCommand::Untick => {
-            state.library.ticked.clear();
-            state.export.form.rows = FigureRows::Selected;
         }
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,
         LibraryCommand::Select(pair) => select(state, pair, effects),
@@ -352,7 +336,6 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.result = None;
     state.table.looked_up = None;
     state.table.scores = Arc::default();
-    state.library.ticked.clear();
     state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
     let own = opened.source.root().is_some() && !resumed;

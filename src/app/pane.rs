@@ -268,14 +268,6 @@ impl Pane {
     }
 }
 
-impl Pane {
-    /// The name that a picture of it is offered under.
-    pub(in crate::app) fn picture_name(self, pixels: bool) -> String {
-        let name = self.title().to_lowercase().replace(' ', "-");
-        format!("{name}.{}", if pixels { "png" } else { "svg" })
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

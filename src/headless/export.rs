@@ -16,10 +16,10 @@ use touch2touch_core::findings::Finding;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::pair_files::{PairFile, PairParts, write};
-use touch2touch_pipeline::images::figure::note;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
 use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::prediction::predicted_by;
 use touch2touch_pipeline::steps::recipe::Stage;
 use touch2touch_pipeline::steps::tool::load_tool;
 
@@ -110,7 +110,7 @@ pub(super) fn run(args: &ExportArgs) -> VerbResult {
         found => Some(found.map_err(Clone::clone)?),
     };
     let mask = contact.made_of();
-    let prediction = recipe.generator.as_ref().map(|(bundle, config)| note(&bundle.name, config, recipe.shift));
+    let prediction = recipe.generator.as_ref().map(|(bundle, config)| predicted_by(&bundle.name, config, recipe.shift));
     let parts = PairParts {
         name: &entry.name,
         source: args.imprint,

@@ -13,9 +13,9 @@ use crate::spatial;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::images::space::{Ground, SpacePane, ViewAngles};
-use touch2touch_pipeline::images::still::{StillFiles, StillSetup, WIDTH_PX, still};
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
+use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
+use touch2touch_pipeline::still::{StillFiles, StillSetup, WIDTH_PX, still};
 
 /// Arguments of `still`.
 #[derive(Debug, Args)]
@@ -107,7 +107,7 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
     setup.check()?;
     let drawer = spatial::stills()?;
     let models = args.model.models();
-    let report = Report { pair: &name, still: still(&dataset, &setup, &models, &*drawer, &args.out, &output.job())? };
+    let report = Report { pair: &name, still: still(&dataset, &setup, &models, drawer, &args.out, &output.job())? };
     output.finish(&report, || {
         let [width, height] = report.still.size_px;
         let count = report.still.files.len();

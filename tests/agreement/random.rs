@@ -121,7 +121,7 @@ impl Both {
     /// The words of *Copy command*, with what they write in the home of the verbs.
     fn words(&self, pane: Pane) -> Vec<String> {
         let words =
-            export::equivalent_words(&self.studio.state, pane, 0.004).unwrap_or_else(|| panic!("{pane:?}: no command"));
+            export::equivalent_words(&self.studio.state, pane).unwrap_or_else(|| panic!("{pane:?}: no command"));
         let mut out = false;
         let placed = words.into_iter().skip(1).map(|word| {
             let placed = if std::mem::replace(&mut out, word == "--out") { self.at(&word) } else { word };

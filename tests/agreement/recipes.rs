@@ -131,7 +131,7 @@ pub(super) fn put(studio: &mut Studio, recipe: &Recipe) {
 fn same(studio: &Studio, home: &Path) -> usize {
     let (state, mut compared) = (&studio.state, 0);
     let said = |pane| {
-        let words = export::equivalent_words(state, pane, 0.004).unwrap();
+        let words = export::equivalent_words(state, pane).unwrap();
         // What it writes goes where the test's files are.
         let out = home.join("predictions").display().to_string();
         let words = words[1..].iter().map(|word| if word == "predictions" { &out } else { word });
@@ -217,7 +217,7 @@ pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_
         let mut recipe = recipe().new_tree(&mut runner).unwrap().current().of(ImprintSource::Predicted);
         recipe.generator.get_or_insert_with(|| (model("generator"), GenerateConfig::default()));
         put(&mut studio, &recipe);
-        let words = export::equivalent_words(&studio.state, Pane::Results, 0.004).unwrap();
+        let words = export::equivalent_words(&studio.state, Pane::Results).unwrap();
         studio.send(EvaluateCommand::Start.into());
         let shown = studio.state.table.result.clone().expect("the table was made");
         let said = json(&words[1..].iter().map(String::as_str).collect::<Vec<_>>(), other.path());

@@ -1,10 +1,9 @@
 //! Pictures in 3D: the same bytes by the menu of a pane and by the verbs.
 
 use touch2touch::app::command::WorkbenchCommand;
-use touch2touch::app::export::{FigureRows, StillAsked};
+use touch2touch::app::export::StillAsked;
 use touch2touch::app::workbench::Layer;
-use touch2touch_pipeline::images::figure::FigurePane;
-use touch2touch_pipeline::images::space::{Ground, SpacePane, ViewAngles};
+use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 
 use super::*;
 #[cfg(feature = "gui")]
@@ -27,14 +26,6 @@ pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
     studio.send(WorkbenchCommand::SetLayer(Layer::None).into());
     let turned = StillAsked { turntable: Some(2), ..asked };
     studio.send(ExportCommand::Write(Output::Still(turned), at("studio-turn")).into());
-    let form = FigureForm {
-        rows: FigureRows::Selected,
-        scale: 1,
-        panes: vec![FigurePane::SpaceMeasured],
-        ..FigureForm::default()
-    };
-    studio.send(ExportCommand::SetForm(form).into());
-    studio.send(ExportCommand::Write(Output::Figure, at("studio-figure.png")).into());
     let name = studio.state.pair_name().to_owned();
     let verb = |arguments: &[&str], file: &str| {
         json(&[arguments, &["--out", at(file).to_str().unwrap()]].concat(), home.path())
@@ -42,12 +33,9 @@ pub(super) fn pictures_in_3d_are_the_same_files_in_both() {
     let still = ["still", "demo", "--pair", &name, "--width", "320", "--ground", "transparent", "--view", "40,12.5"];
     let said = verb(&still, "verb.png");
     assert_eq!(said["size_px"], serde_json::json!([320, 320]), "{said}");
-    let finger = studio.state.finger_name(studio.state.selection.finger).to_string();
-    let figure = ["figure", "demo", "--pairs", &name, "--panes", "3d:measured", "--scale", "1", "--finger", &finger];
-    verb(&figure, "verb-figure.png");
     verb(&[&still[..], &["--distance", "1"]].concat(), "verb-apart.png");
     verb(&[&still[..], &["--turntable", "2"]].concat(), "verb-turn");
-    for end in [".png", "-apart.png", "-turn/frame_0001.png", "-turn/frame_0002.png", "-figure.png"] {
+    for end in [".png", "-apart.png", "-turn/frame_0001.png", "-turn/frame_0002.png"] {
         let [a, b] = ["studio", "verb"].map(|by| std::fs::read(at(&format!("{by}{end}"))).unwrap());
         assert!(a.len() > 5000 && a == b, "{end}: {} and {} bytes", a.len(), b.len());
     }

@@ -44,10 +44,6 @@ fn held(verb: &str) -> Option<Held> {
             watched::what_arrives_is_followed_by_the_studio_to_the_numbers_that_watch_writes,
         ]),
         "evaluate" => By(&[recipes::a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb]),
-        "figure" => By(&[
-            files::a_random_recipe_draws_the_same_pictures_by_button_and_verb,
-            super::figures_and_pictures_are_the_same_files_in_both,
-        ]),
         "still" => By(&[stills::pictures_in_3d_are_the_same_files_in_both]),
         "export" => By(&[
             files::a_random_recipe_exports_the_same_files_by_button_and_verb,

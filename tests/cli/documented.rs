@@ -41,7 +41,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch pose", How::Run(&[], "--limit 1", &[0])),
     // The first of the faults may well have no pose.
     ("touch2touch pose faults", How::Run(&[], "--limit 1", &[0, 1])),
-    ("touch2touch figure", How::Run(&[], "--steps 1", &[0])),
     ("touch2touch still", How::Run(&[("4", "1"), ("180", "2")], "--steps 1", &[0])),
     ("touch2touch export", How::Run(&[], "", &[0])),
     ("touch2touch label", How::Run(&[], "", &[0])),
@@ -128,7 +127,6 @@ impl Stage {
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
                 ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.md", _) => at(&format!("{number} {word}")),
                 ("STILL.png", _) => at(&format!("{number} still.png")),
-                ("FIGURE.svg", _) => at(&format!("{number} figure.svg")),
                 ("PY", _) => "/no/such/python".to_owned(),
                 (json, _) if json.starts_with("--json=") => format!("--json={}", at(&format!("{number} OUT.json"))),
                 (path, _) if path.starts_with("assets/") => repository().join(path).to_str().unwrap().to_owned(),

@@ -1,17 +1,14 @@
 //! A control costs everyone who does not need it: each workspace shows few of them, and what they had is still there.
 
 use eframe::egui::accesskit::Role;
-use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT as _, Queryable as _};
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
-use touch2touch::app::export::{FigureRows, Output};
+use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, PredictCommand, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{MaskSource, MaskTool, SpacePane, Workspace, prefer};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
-use touch2touch_pipeline::io::images;
 
 use super::rig::Rig;
 
@@ -138,32 +135,4 @@ fn nothing_in_the_mask_pane_moves_under_the_pointer() {
         assert_eq!(place(&rig), before, "{source:?}");
         rig.send(ViewCommand::Propose(false));
     }
-}
-
-/// Pairs ticked in the list are the rows of the next figure.
-#[test]
-fn ticked_pairs_are_the_rows_of_a_figure() {
-    let Some(mut rig) = Rig::new(SIZE, 3) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    for pair in [PairId(4), PairId(1)] {
-        rig.send(LibraryCommand::Select(pair));
-        rig.harness.key_press_modifiers(Modifiers::CTRL, Key::T);
-        rig.harness.step();
-        rig.settle();
-    }
-    let state = rig.harness.state().state();
-    assert_eq!(state.export.form.rows, FigureRows::Ticked);
-    assert_eq!(state.library.ticked.iter().copied().collect::<Vec<_>>(), [PairId(1), PairId(4)]);
-    // The figure has two rows, and is the one that the verb draws of these pairs.
-    let file = rig.data.join("figure.png");
-    rig.send(ExportCommand::Write(Output::Figure, file.clone()));
-    let drawn = images::read_rgb(&file).unwrap();
-    rig.send(LibraryCommand::Tick(PairId(2)));
-    rig.send(ExportCommand::Write(Output::Figure, file.clone()));
-    let more = images::read_rgb(&file).unwrap();
-    assert!(more.height() > drawn.height() && more.width() == drawn.width(), "{:?} {:?}", drawn.size(), more.size());
-    rig.harness.get_by_label("Take all ticks away").click();
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(rig.harness.state().state().export.form.rows, FigureRows::Selected);
 }

@@ -219,7 +219,7 @@ fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_onc
     let letters = [Key::T, Key::H, Key::K, Key::Delete];
     for (workspace, asking) in [(Workspace::Inspect, false), (Workspace::Inspect, true), (Workspace::Label, true)] {
         rig.send(prefer(move |s| s.workspace = workspace));
-        rig.send(ExportCommand::Ask(asking));
+        rig.send(ExportCommand::AskMasks(asking));
         rig.settle();
         let before = rig.mask(lab::RIGHT);
         for key in letters {
@@ -230,7 +230,7 @@ fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_onc
         assert_eq!((rig.mask(lab::RIGHT), reviewed(&rig)), (before, Review::Todo), "{workspace:?} {asking}");
         rig.harness.key_press(Key::Escape);
         rig.settle();
-        assert!(!rig.harness.state().state().export.asking, "Escape closes the form");
+        assert!(!rig.harness.state().state().export.asking_masks, "Escape closes the form");
     }
     rig.send(prefer(|s| s.workspace = Workspace::Inspect));
     rig.send(LabelsCommand::SetReview(Review::Flagged));

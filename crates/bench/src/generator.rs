@@ -15,14 +15,13 @@ pub(super) use self::timing::timed_run;
 use self::timing::{First, Overhead};
 use super::Machine;
 use super::figures::quantile;
-use super::front::{self, Axis, FrontPoint, Picture};
+use super::front::{self, FrontPoint};
 use touch2touch::headless::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
-use touch2touch_pipeline::images::canvas;
 use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind, resolve};
 use touch2touch_pipeline::infer::generator::Generator;
 use touch2touch_pipeline::infer::mask::MaskModel;
@@ -337,25 +336,7 @@ fn points(rows: &[Row], error: impl Fn(&Row) -> Option<(f64, f64)>) -> Vec<Front
 
 fn write(file: &std::path::Path, report: &Report) -> anyhow::Result<()> {
     atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-        .with_context(|| format!("cannot write {}", file.display()))?;
-    let engine = report.first.first().map_or("", |first| first.engine.label());
-    let default = name(&report.defaults, EngineKind::Rten, false);
-    for (what, unit, points, suffix) in [
-        ("pose angle error", "°", &report.front_angle, ""),
-        ("error of the imprint (rms)", " mm", &report.front_rmse, "_rmse"),
-    ] {
-        let title = format!("Generator: {what} against time, {} grasps, {engine}", report.grasps);
-        let axis = Axis {
-            title: &title,
-            time: "both fingers, image to meters: time, median over the grasps, ms",
-            unit,
-            legend: &[],
-        };
-        let picture = Picture { axis, points, default: &default };
-        let stem = file.file_stem().map_or_else(String::new, |s| s.to_string_lossy().into_owned());
-        canvas::write(&picture, &file.with_file_name(format!("{stem}{suffix}.svg")))?;
-    }
-    Ok(())
+        .with_context(|| format!("cannot write {}", file.display()))
 }
 
 fn text(report: &Report) -> String {

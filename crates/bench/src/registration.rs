@@ -11,8 +11,8 @@ use serde::Serialize;
 use strum::IntoEnumIterator as _;
 
 use super::figures::{Outcome, Summary, quantile};
-use super::front::{self, Axis, FrontPoint, Picture};
-use super::reliability::{self, Reliability, scores};
+use super::front::{self, FrontPoint};
+use super::reliability::{Reliability, scores};
 use super::rows::{EngineRow, Prepared, offset, position_error_mm};
 use super::{Machine, contact_points, peers};
 use touch2touch::headless::says;
@@ -27,7 +27,6 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::pose::{Registration, ToolModel, register, register_with};
 use touch2touch_core::rig::Rig;
 use touch2touch_core::units::angle_error;
-use touch2touch_pipeline::images::canvas;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::atomic;
 use touch2touch_pipeline::pairs;
@@ -460,25 +459,7 @@ fn outcome(case: &Prepared, timed: Timed<Result<AlignReport, AlignError>>) -> Ou
 
 fn write(file: &Path, report: &Report) -> anyhow::Result<()> {
     atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-        .with_context(|| format!("cannot write {}", file.display()))?;
-    let title = format!(
-        "Registration: error against time, {} cases, one thread ({})",
-        report.cases.len(),
-        report.machine.cpu.as_deref().unwrap_or("unknown processor")
-    );
-    let axis = if front::uses_processor_time(&report.engines) {
-        "points to pose: processor time, mean over the cases, ms"
-    } else {
-        "points to pose: time, median over the cases, ms"
-    };
-    let axis = Axis { title: &title, time: axis, unit: "°", legend: &front::PEERS };
-    let picture = Picture { axis, points: &report.front, default: &report.default };
-    canvas::write(&picture, &file.with_extension("svg"))?;
-    let by_field = |row: &&EngineRow| row.name.parse().is_ok_and(Registration::uses_field);
-    let lines = report.engines.iter().filter(by_field).filter_map(|row| Some((&*row.name, row.reliability.as_ref()?)));
-    let title = format!("Standard deviation of the angle, {} cases, {} masks", report.cases.len(), report.masks);
-    let picture = reliability::Picture { title: &title, lines: lines.collect() };
-    canvas::write(&picture, &beside(file, "reliability", "svg"))
+        .with_context(|| format!("cannot write {}", file.display()))
 }
 
 fn text(report: &Report) -> String {

@@ -1,14 +1,10 @@
 //! Reliability of the standard deviations that poses come with: how often an error stays within so many of them.
 
-use plotters::prelude::*;
-use plotters::style::text_anchor::{HPos, Pos, VPos};
 use serde::Serialize;
 
-use super::front::{FAINT, FRONT, INK, OURS, PEER};
 use touch2touch_core::align::Evidence;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::units::wrap_angle;
-use touch2touch_pipeline::images::canvas::{Drawing, Drawn, Paper};
 
 /// Errors in standard deviations: angle, y, z.
 pub(super) type Scores = [f64; 3];
@@ -69,57 +65,6 @@ fn normal_within(limit: f64) -> f64 {
     libm::erf(limit / std::f64::consts::SQRT_2)
 }
 
-const COLORS: [RGBColor; 4] = [OURS, PEER, FRONT, RGBColor(150, 60, 160)];
-
-/// The picture: observed over foretold shares of the angle's errors, a line for each engine.
-pub(super) struct Picture<'a> {
-    pub(super) title: &'a str,
-    pub(super) lines: Vec<(&'a str, &'a Reliability)>,
-}
-
-impl Drawing for Picture<'_> {
-    fn size(&self) -> [u32; 2] {
-        [620, 620]
-    }
-
-    fn draw<B: DrawingBackend>(&self, paper: &Paper<'_, B>) -> Drawn<B> {
-        paper.text([80.0, 16.0], &paper.letters(17.0, INK), self.title)?;
-        let mut chart = ChartBuilder::on(paper.area)
-            .margin_top(paper.px(50.0))
-            .margin_left(paper.px(10.0))
-            .margin_right(paper.px(30.0))
-            .margin_bottom(paper.px(10.0))
-            .x_label_area_size(paper.px(60.0))
-            .y_label_area_size(paper.px(70.0))
-            .build_cartesian_2d(0.0..100.0, 0.0..100.0)?;
-        let percent = |share: &f64| format!("{share:.0} %");
-        chart
-            .configure_mesh()
-            .bold_line_style(paper.stroke(FAINT, 1.0))
-            .light_line_style(paper.stroke(FAINT, 0.4))
-            .axis_style(paper.stroke(INK, 1.5))
-            .label_style(paper.letters(15.0, INK))
-            .axis_desc_style(paper.letters(16.0, INK))
-            .x_desc("errors that the standard deviation foretells within a limit")
-            .y_desc("errors within it")
-            .x_label_formatter(&percent)
-            .y_label_formatter(&percent)
-            .draw()?;
-        chart.draw_series([PathElement::new([(0.0, 0.0), (100.0, 100.0)], paper.stroke(INK, 1.0))])?;
-        for (number, (name, line)) in self.lines.iter().enumerate() {
-            let color = COLORS[number % COLORS.len()];
-            let points = line.curve.iter().map(|[foretold, seen]| (*foretold, *seen));
-            chart.draw_series(LineSeries::new(points, paper.stroke(color, 2.5)))?;
-            let label = format!("{name}: {}", line.text());
-            // Below the diagonal, where lines are only of deviations that promise far too much.
-            let (right, bottom) = chart.backend_coord(&(98.0, 3.0));
-            let style = paper.letters(14.0, color).pos(Pos::new(HPos::Right, VPos::Bottom));
-            paper.area.draw_text(&label, &style, (right, bottom - paper.px(20.0 * number as f64)))?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -143,8 +88,5 @@ mod tests {
         assert!((found.rms[0] - 1.0).abs() < 0.01 && (found.within_2[2] - 95.4).abs() < 0.1, "{found:?}");
         assert!(found.curve.iter().all(|[foretold, seen]| (foretold - seen).abs() < 0.1), "{found:?}");
         assert!(Reliability::of(&[]).is_none());
-        let svg =
-            touch2touch_pipeline::images::canvas::svg(&Picture { title: "t", lines: vec![("joint", &found)] }).unwrap();
-        assert!(svg.contains("joint: angle 1.00 (95 %)"), "{svg}");
     }
 }

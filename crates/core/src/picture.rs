@@ -1,4 +1,4 @@
-//! Pictures as people see them: depth through a color map, color pictures and differences as bytes. Panes, figures and
+//! Pictures as people see them: depth through a color map, color pictures and differences as bytes. Panes and
 //! files take these, so that the same pixel has the same color everywhere.
 
 use super::colormap::{ColorMap, Range};

@@ -12,6 +12,7 @@ pub mod exchange;
 pub mod files;
 pub mod folders;
 pub mod follow;
+pub mod fonts;
 pub mod home;
 pub mod images;
 pub mod masks;

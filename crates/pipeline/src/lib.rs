@@ -10,7 +10,7 @@
 //! * [`job`], [`error`]: how work is watched, stopped, and how it fails. [`pairs`]: the choice of pairs for a pass over a data set.
 //! * [`labels`]: what people said about pairs. [`follow`]: a folder that is still being recorded.
 //! * [`steps`]: from a pair to its pose ([`steps::recipe`], [`steps::estimate`]).
-//! * [`scores`], [`compare`], [`images`]: results as tables, beside each other, as pictures.
+//! * [`scores`], [`compare`], [`still`]: results as tables, beside each other, in 3D.
 //! * [`masks`]: proposals and edits of contact masks. [`mod@export`]: results and labels as files.
 //! * [`doubts`]: what of a data set contradicts itself.
 //! * [`learn`]: networks fitted to the data at hand.
@@ -22,7 +22,6 @@ pub mod doubts;
 pub mod error;
 pub mod export;
 pub mod follow;
-pub mod images;
 pub mod infer;
 pub mod io;
 pub mod job;
@@ -32,3 +31,4 @@ pub mod masks;
 pub mod pairs;
 pub mod scores;
 pub mod steps;
+pub mod still;

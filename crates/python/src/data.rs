@@ -19,7 +19,6 @@ use touch2touch_pipeline::io::dataset::{Dataset as Source, ToolScale};
 use touch2touch_pipeline::labels::filter::Filter;
 use touch2touch_pipeline::labels::{Labels, PairLabels, Review};
 use touch2touch_pipeline::steps::estimate::Touch;
-use touch2touch_pipeline::steps::recipe::Recipe;
 use touch2touch_pipeline::steps::tool::load_tool;
 
 use crate::arrays::{Array, array, stack, stack_rgb, transform, transforms};
@@ -465,8 +464,9 @@ impl Pair {
         }
     }
 
-    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<Option<String>> {
-        self.place().map(|_| picture::filled(py, self, &Recipe::default())).transpose()
+    fn _repr_html_(&self) -> PyResult<String> {
+        let depth = self.sample.pads.entries().filter_map(|(_, touch)| touch.depth());
+        picture::html("Measured imprint", depth.map(|touch| &touch.imprint))
     }
 
     fn __repr__(&self) -> String {

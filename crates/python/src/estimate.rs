@@ -203,8 +203,10 @@ impl Estimate {
         self.pair.clone()
     }
 
-    fn _repr_svg_(&self, py: Python<'_>) -> PyResult<String> {
-        picture::filled(py, &self.pair, self.results.recipe())
+    fn _repr_html_(&self) -> PyResult<String> {
+        let imprints = self.results.imprints.entries().map(|(_, imprint)| imprint);
+        let pose = self.pose().map(|pose| pose._repr_html_()).unwrap_or_default();
+        Ok(picture::html(&format!("{} imprint", self.results.recipe().imprint.name()), imprints)? + &pose)
     }
 
     fn __repr__(&self) -> String {

@@ -28,8 +28,6 @@ mod _native {
     #[pymodule_export]
     use crate::measures::{frechet, psnr, ssim};
     #[pymodule_export]
-    use crate::picture::figure;
-    #[pymodule_export]
     use crate::process::{Cancelled, Refused};
     #[pymodule_export]
     use crate::recipe::Recipe;

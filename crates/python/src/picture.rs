@@ -1,81 +1,37 @@
-//! Pictures of pairs: the figure that `touch2touch figure` draws.
+//! Pictures of imprints as a notebook shows them.
 
-use std::sync::Arc;
+use pyo3::PyResult;
+use touch2touch_core::colormap::{ColorMap, Range};
+use touch2touch_core::grid::DepthMap;
+use touch2touch_core::picture::colored;
+use touch2touch_pipeline::io::images::png_bytes;
 
-use pyo3::prelude::*;
-use strum::IntoEnumIterator as _;
-use touch2touch_core::rig::PerPad;
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::images::figure::{FigureLook, FigureMakers, FigurePane, FigureSetup, figure as draw, note};
-use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::steps::recipe::Recipe as Whole;
+use crate::process::refused;
 
-use crate::data::Pair;
-use crate::process::{refused, watched};
-use crate::recipe::{Recipe, given_or};
+/// The color range of imprints, meters.
+const RANGE: Range = Range { lo: 0.0, hi: 0.018 };
 
-/// Columns that need a renderer or a second recipe, which a package without a window has not.
-fn can_draw(pane: FigurePane) -> bool {
-    pane.space().is_none() && pane != FigurePane::Compare
-}
-
-/// Both fingers of a pair as SVG text: the figure of `touch2touch figure`.
-///
-/// `columns`: some of "gelslim", "raw", "reference", "measured", "predicted", "error"; the last two need a recipe with
-/// `imprint="predicted"`.
-#[pyfunction]
-#[pyo3(signature = (pair, recipe=None, *, columns=None))]
-pub(crate) fn figure(
-    py: Python<'_>,
-    pair: &Pair,
-    recipe: Option<&Recipe>,
-    columns: Option<Vec<String>>,
-) -> PyResult<String> {
-    let whole = given_or(py, recipe, "measured")?;
-    let Some(columns) = columns else { return filled(py, pair, &whole) };
-    let panes = columns.iter().map(|name| {
-        let pane = name.parse::<FigurePane>().ok().filter(|pane| can_draw(*pane));
-        pane.ok_or_else(|| {
-            let all: Vec<&str> = FigurePane::iter().filter(|pane| can_draw(*pane)).map(FigurePane::key).collect();
-            refused(format!("columns: there is no {name:?}; there are {}", all.join(", ")))
-        })
-    });
-    svg(py, pair, &whole, panes.collect::<PyResult<_>>()?)
-}
-
-/// The figure with the columns that a recipe fills: a prediction and its error where it makes one.
-pub(crate) fn filled(py: Python<'_>, pair: &Pair, recipe: &Whole) -> PyResult<String> {
-    let mut panes = vec![FigurePane::GelSlim, FigurePane::Measured];
-    if recipe.generator.is_some() {
-        panes.extend([FigurePane::Predicted, FigurePane::Error]);
+/// Imprints side by side below a caption, as HTML with the pictures in it.
+pub(crate) fn html<'a>(caption: &str, imprints: impl Iterator<Item = &'a DepthMap>) -> PyResult<String> {
+    let mut out = format!("<div>{caption}</div>");
+    for imprint in imprints {
+        let png = png_bytes(&colored(imprint, ColorMap::Viridis, RANGE)).map_err(|err| refused(err.to_string()))?;
+        out += &format!("<img style=\"margin-right:4px\" src=\"data:image/png;base64,{}\">", base64(&png));
     }
-    svg(py, pair, recipe, panes)
+    Ok(out)
 }
 
-fn svg(py: Python<'_>, pair: &Pair, recipe: &Whole, panes: Vec<FigurePane>) -> PyResult<String> {
-    let Some((dataset, id)) = pair.place() else {
-        return Err(refused("a grasp that was simulated here has no figure: it lies in no data set"));
-    };
-    let predicted = panes.iter().any(|pane| pane.is_predicted());
-    let made = recipe.generator.as_ref().filter(|_| predicted);
-    let setup = FigureSetup {
-        pairs: vec![id],
-        fingers: dataset.rig.pads().collect(),
-        shift: recipe.shift,
-        look: FigureLook { panes, ..FigureLook::default() },
-        note: made.map_or_else(String::new, |(bundle, config)| note(&bundle.name, config, recipe.shift)),
-    };
-    watched(py, None, |process, cx| {
-        let nothing = || TaskError::new("Figure", "there is no renderer in the package");
-        let makers = FigureMakers {
-            predict: |_, sample: &Arc<Sample>, cx: &JobCx| recipe.generating()?.pair(&process.models, sample, cx),
-            space: |_, _: &Sample, _: &_, _: &JobCx| Err(nothing()),
-            apart: |_, _: &Arc<Sample>, _: &JobCx| Ok(PerPad::default()),
-        };
-        if made.is_some() {
-            process.run_models(recipe.engine)?;
+/// Bytes as text of 64 letters (RFC 4648).
+fn base64(bytes: &[u8]) -> String {
+    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for group in bytes.chunks(3) {
+        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
+        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for i in 0..4 {
+            let letter = char::from(LETTERS[(bits >> (18 - 6 * i) & 63) as usize]);
+            out.push(if i <= group.len() { letter } else { '=' });
         }
-        draw(dataset, &setup, makers, cx)?.svg()
-    })
+    }
+    out
 }

@@ -5,14 +5,11 @@ use super::super::pane::{Kind, Pane};
 use super::super::state::State;
 use super::super::state::adapt::AdaptPairs;
 use super::super::state::library::Place;
-use super::super::state::settings::ColorMap;
 use super::super::{adapt, recipe, results};
-use super::column::in_figure;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::compare::subject::{RecipeChange, Subject};
-use touch2touch_pipeline::images::figure::FigurePane;
 use touch2touch_pipeline::learn::train::MasksFrom;
 use touch2touch_pipeline::steps::bundles::BundleKind;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage, Words, quoted};
@@ -35,8 +32,7 @@ fn read_as(value: f64, near: f64, read: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// The words of the command that does what a pane shows, with the settings in force; `None` for panes that only choose.
-/// `error_m` is half the range of the colors of errors, meters.
-pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<String>> {
+pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
     let open = state.library.open.as_ref()?;
     let path = match &open.place {
         Place::Demo => "demo".to_owned(),
@@ -46,7 +42,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
     };
     let verb = |verb: &str| command(verb).word(&path);
     let of_pair = |name: &str| Some(verb(name).option("--pair", state.entry()?.name.clone()));
-    let finger = state.finger_name(state.selection.finger).into_owned();
     let side = pane.side().unwrap_or(state.inspect.source);
     let drawn = || recipe_shown(state, ImprintSource::Predicted).words(Stage::Imprint);
     let posed = |words: Words, side: ImprintSource| {
@@ -54,24 +49,6 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
     };
     let words = match (pane, pane.kind()) {
         (Pane::Browser | Pane::Log, _) => verb("doctor"),
-        // Of two imprints against each other the figures are the answer, and a picture is one of its files.
-        (_, Kind::Color | Kind::Imprint(_) | Kind::Versus)
-            if in_figure(state, pane).is_some_and(|shown| shown != FigurePane::Compare) =>
-        {
-            let shown = in_figure(state, pane)?;
-            let both = state.selection.both_fingers;
-            let range = state.settings.range;
-            let words = verb("figure")
-                .option("--pairs", state.entry()?.name.clone())
-                .option("--panes", shown.key())
-                .option("--finger", if both { "both" } else { &finger })
-                .option("--out", pane.picture_name(true))
-                .option("--range", format!("{}..{}", range.min_m * 1e3, range.max_m * 1e3))
-                .option_if("--error-range-mm", shown.is_difference().then_some(error_m * 1e3))
-                .word_if(state.settings.color_map == ColorMap::Gray, "--gray")
-                .word_if(!state.settings.footprint_visible, "--no-window");
-            if shown.is_predicted() { words.then(drawn()) } else { words }
-        }
         (_, Kind::Scene) => posed(of_pair("export")?.option("--out", "exported"), state.workbench.side),
         (Pane::TimeMachine, _) => {
             let start = state.inspect.start.map(|start| start_text(start.get()));
@@ -81,7 +58,7 @@ pub fn equivalent_words(state: &State, pane: Pane, error_m: f32) -> Option<Vec<S
             let recipe = recipe_shown(state, ImprintSource::Predicted);
             of_pair("pose")?.option("--imprint", "both").then(recipe.words(Stage::Pose))
         }
-        (Pane::Generate, _) => {
+        (Pane::Generate | Pane::Predicted, _) => {
             of_pair("generate")?.option("--finger", "both").option("--out", "predictions").then(drawn())
         }
         (Pane::Compare, _) => {
@@ -139,8 +116,8 @@ fn train_words(state: &State, words: Words) -> Words {
 }
 
 /// [`equivalent_words`] as one line for a shell.
-pub fn equivalent(state: &State, pane: Pane, error_m: f32) -> Option<String> {
-    let words: Vec<String> = equivalent_words(state, pane, error_m)?.iter().map(|word| quoted(word)).collect();
+pub fn equivalent(state: &State, pane: Pane) -> Option<String> {
+    let words: Vec<String> = equivalent_words(state, pane)?.iter().map(|word| quoted(word)).collect();
     Some(words.join(" "))
 }
 

@@ -1,6 +1,5 @@
 //! The open data set, and the list of pairs as the browser shows it.
 
-use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -128,8 +127,6 @@ pub struct Library {
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
     /// `has:note` are pairs with one; `angle>5` is a condition on a score.
     pub filter: String,
-    /// The pairs that a person ticked, for figures.
-    pub ticked: BTreeSet<PairId>,
     /// Shows only this tool.
     pub tool: Option<String>,
     /// The order.
@@ -163,13 +160,6 @@ impl Library {
     /// The row of `pair` in the list, if it passes the filter.
     pub(crate) fn row_of(&self, pair: PairId) -> Option<usize> {
         self.order.iter().position(|p| *p == pair)
-    }
-
-    /// The ticked pairs in the order of the list, then those that the filter hides.
-    pub(crate) fn ticked_pairs(&self) -> Vec<PairId> {
-        let listed: Vec<PairId> = self.order.iter().copied().filter(|pair| self.ticked.contains(pair)).collect();
-        let hidden: Vec<PairId> = self.ticked.iter().copied().filter(|pair| !listed.contains(pair)).collect();
-        listed.into_iter().chain(hidden).collect()
     }
 
     /// The bundle with this identity.

@@ -13,18 +13,16 @@ use super::super::keys::{Preset, Registration, Sampler, ShiftMode, Spacing};
 use super::super::pane::Workspace;
 use super::library::Place;
 use scene::SceneLook;
-use touch2touch_core::colormap;
 use touch2touch_core::diffusion::{GUIDANCE, GenerateConfig};
 use touch2touch_core::label::{CleanKind, CleanUp, DrawTool, Layers, Paint};
 use touch2touch_core::postprocess::RefitShift;
 use touch2touch_core::units::clamp_or;
-use touch2touch_pipeline::images::figure::{FigureLook, FigurePane, FigureTheme};
-pub use touch2touch_pipeline::images::space::SpacePane;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::labels::system_person;
 pub use touch2touch_pipeline::masks::propose::ProposalSource;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
 pub use touch2touch_pipeline::steps::mask::{MaskChoice, MaskSource};
+pub use touch2touch_pipeline::still::space::SpacePane;
 use versus::Versus;
 
 /// The version of the settings file: a file of another version is set aside and defaults are used.
@@ -208,30 +206,6 @@ impl Settings {
     /// The comparison in the workspace in front.
     pub fn compared(&self) -> Versus {
         self.versus.get(&self.workspace).cloned().unwrap_or_default()
-    }
-
-    /// The look of figures, in the colors of the panes.
-    pub(in crate::app) fn figure_look(
-        &self,
-        panes: Vec<FigurePane>,
-        error_m: f32,
-        theme: FigureTheme,
-        scale: f64,
-    ) -> FigureLook {
-        let (range, window) = (self.range, self.footprint_visible);
-        let map = match self.color_map {
-            ColorMap::Viridis => colormap::ColorMap::Viridis,
-            ColorMap::Gray => colormap::ColorMap::Gray,
-        };
-        FigureLook {
-            panes,
-            map,
-            range: colormap::Range { lo: range.min_m, hi: range.max_m },
-            error_m,
-            theme,
-            window,
-            scale,
-        }
     }
 }
 

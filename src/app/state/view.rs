@@ -95,8 +95,13 @@ pub enum UiRequest {
         /// To the clipboard instead of a file.
         copied: bool,
     },
-    /// Copy a picture of a pane.
-    PictureOf(Pane),
+    /// Save a picture of a pane, or copy it.
+    PictureOf {
+        /// The pane.
+        pane: Pane,
+        /// To the clipboard instead of a file.
+        copied: bool,
+    },
     /// Fill the screen, or stop it.
     ToggleFullscreen,
     /// Let one pane fill the window, or stop it.

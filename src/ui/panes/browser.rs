@@ -279,16 +279,8 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// Ticked pairs, and the progress of the scoring.
+/// The progress of the scoring.
 fn scoring(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let ticked = cx.state.library.ticked.len();
-    if ticked > 0 {
-        let button = ui.add(egui::Button::new(format!("{ticked} ticked ×")).selected(true));
-        let tip = "The rows of the next figure. Takes all ticks away";
-        if button.accessible_name("Take all ticks away").on_hover_text(tip).clicked() {
-            cx.push(LibraryCommand::Untick);
-        }
-    }
     let total = cx.state.library.pairs().len();
     let scored = cx.state.table.by().map_or(0, |(source, _)| source.scored);
     let possible = Action::PredictAll.command(cx.state).is_some();
@@ -363,9 +355,6 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         } else {
             painter.circle_filled(dot, 4.0, color);
         }
-        if cx.state.library.ticked.contains(&id) {
-            tick_mark(&painter, thumb.left_top() + vec2(7.0, 7.0), p);
-        }
         let noted = !cx.state.document.note(&entry.name).is_empty();
         if noted {
             note_mark(&painter, pos2(rect.right() - 10.0, rect.top() + 9.0), p.caution);
@@ -398,17 +387,9 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
         let worse = (100.0 * part.rank).round();
         tip += &format!("\n{}: more than {worse:.0} % of the others", part.text());
     }
-    let ticks = ui.input(|i| i.modifiers.command || i.modifiers.ctrl);
     if response.on_hover_text(tip).clicked() {
-        cx.push(if ticks { LibraryCommand::Tick(id) } else { LibraryCommand::Select(id) });
+        cx.push(LibraryCommand::Select(id));
     }
-}
-
-/// A tick on the corner of a thumbnail.
-fn tick_mark(painter: &egui::Painter, center: egui::Pos2, p: &Palette) {
-    painter.circle_filled(center, 6.5, p.accent);
-    let line = [vec2(-3.0, 0.0), vec2(-1.0, 2.5), vec2(3.0, -2.5)].map(|v| center + v);
-    painter.line(line.to_vec(), Stroke::new(1.6, p.on_accent));
 }
 
 /// A sheet with lines: the pair has a note.

@@ -41,8 +41,8 @@ use crate::ui::parts::theme::SMALL;
 use crate::ui::parts::widget::empty;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::units;
-use touch2touch_pipeline::images::space::ViewAngles;
 use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::still::space::ViewAngles;
 
 pub(crate) use build::{SceneMesh, guides, model_edges, parts, update_mesh};
 pub(crate) use layers::outline;

@@ -17,7 +17,7 @@ use crate::app::state::State;
 use crate::app::state::tasks::Task;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::SensorKind;
-use touch2touch_pipeline::images::space::ViewAngles;
+use touch2touch_pipeline::still::space::ViewAngles;
 
 /// Context of a pane while it is drawn.
 pub(crate) struct Cx<'a> {

@@ -246,14 +246,23 @@ mod system {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::app::export::StillAsked;
+    use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
 
     #[test]
     fn a_path_that_cannot_be_what_is_asked_for_is_refused_in_words() {
         let dir = tempfile::tempdir().unwrap();
         let (file, new) = (dir.path().join("file"), dir.path().join("new"));
         std::fs::write(&file, "").unwrap();
-        let figure = Purpose::Output(Output::Figure);
-        assert!(Output::Figure.file_name().is_some());
+        let output = Output::Still(StillAsked {
+            pane: SpacePane::Both,
+            width_px: 960,
+            ground: Ground::White,
+            angles: ViewAngles::default(),
+            turntable: None,
+        });
+        assert!(output.file_name().is_some());
+        let picture = Purpose::Output(output);
         for (purpose, path, said) in [
             (Purpose::Folder, dir.path(), None),
             (Purpose::Folder, &new, Some("nothing at")),
@@ -262,10 +271,10 @@ mod tests {
             (Purpose::File, &file, None),
             (Purpose::Labels, &new, None),
             (Purpose::Labels, &file, Some("is a file")),
-            (figure, &new, None),
-            (figure, dir.path(), Some("is a folder")),
-            (figure, &new.join("a"), Some("no folder")),
-            (figure, Path::new("a"), None),
+            (picture, &new, None),
+            (picture, dir.path(), Some("is a folder")),
+            (picture, &new.join("a"), Some("no folder")),
+            (picture, Path::new("a"), None),
         ] {
             let why = purpose.objection(path);
             assert_eq!(why.is_some(), said.is_some(), "{purpose:?} {}: {why:?}", path.display());

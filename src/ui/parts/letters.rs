@@ -5,7 +5,7 @@ use std::sync::mpsc::{Receiver, channel};
 
 use eframe::egui::epaint::text::{FallbackRequest, FontInsert};
 use eframe::egui::{Context, FontData};
-use touch2touch_pipeline::images::fonts;
+use touch2touch_pipeline::io::fonts;
 
 /// Lets `ctx` draw East Asian letters; those that no font has are received.
 pub(crate) fn install(ctx: &Context) -> Receiver<char> {

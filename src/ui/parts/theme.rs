@@ -156,9 +156,7 @@ pub fn install(ctx: &egui::Context) {
 fn fonts() -> FontDefinitions {
     let mut fonts = FontDefinitions::default();
     let bold = include_bytes!("../../../assets/fonts/Roboto-Medium.ttf");
-    fonts
-        .font_data
-        .insert("regular".into(), Arc::new(FontData::from_static(touch2touch_pipeline::images::fonts::REGULAR)));
+    fonts.font_data.insert("regular".into(), Arc::new(FontData::from_static(touch2touch_pipeline::io::fonts::REGULAR)));
     fonts.font_data.insert("medium".into(), Arc::new(FontData::from_static(bold)));
     // The fonts that come with the toolkit stay as fallbacks: they have the symbols.
     let fallback = fonts.families.get(&FontFamily::Proportional).cloned().unwrap_or_default();

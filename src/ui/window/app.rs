@@ -42,8 +42,8 @@ use crate::ui::parts::theme;
 use crate::ui::parts::theme::{DARK, LIGHT};
 use touch2touch_core::rig::SensorKind;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::images::fonts;
 use touch2touch_pipeline::io::caught::caught;
+use touch2touch_pipeline::io::fonts;
 
 /// Options that the studio is started with.
 pub struct Options {
@@ -378,9 +378,9 @@ impl StudioApp {
                 let part = self.panes.hovered.and_then(|pane| self.panes.places.get(&pane).copied());
                 self.shoot(ctx, part, copied);
             }
-            UiRequest::PictureOf(pane) => {
+            UiRequest::PictureOf { pane, copied } => {
                 if let Some(place) = self.panes.places.get(&pane).copied() {
-                    self.shoot(ctx, Some(place), true);
+                    self.shoot(ctx, Some(place), copied);
                 }
             }
             UiRequest::ToggleFullscreen => {
@@ -526,10 +526,7 @@ impl eframe::App for StudioApp {
             let export = &state.export;
             let place = shortcuts::Place {
                 covered,
-                dialog: export.asking
-                    || export.asking_masks
-                    || export.importing.is_some()
-                    || cx.shared.dialogs.is_waiting(),
+                dialog: export.asking_masks || export.importing.is_some() || cx.shared.dialogs.is_waiting(),
                 labeling: state.is_labeling(),
             };
             let possible = |action: Action| action.command(state).is_some() && shortcuts::fits_pane(action, over);
@@ -563,7 +560,6 @@ impl eframe::App for StudioApp {
             });
             bars::hint(&mut cx, &ctx);
             doctor::panel(&mut cx, &ctx);
-            export::form(&mut cx, &ctx);
             export::masks::form(&mut cx, &ctx);
             export::import::form(&mut cx, &ctx);
             palette::show(&mut cx, &ctx, &mut self.palette);

@@ -69,7 +69,6 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.separator();
         for action in [
             Action::AboutData,
-            Action::Figure,
             Action::ExportMeasured,
             Action::ExportPredicted,
             Action::ExportMasks,

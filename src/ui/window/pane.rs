@@ -114,7 +114,7 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
         ui.menu_button("Mouse and keys", |ui| help::list(ui, pane.title(), controls));
     }
     ui.separator();
-    super::export::menu(cx, ui, pane, cx.shared.views.error_m());
+    super::export::menu(cx, ui, pane);
 }
 
 /// The button in a pane's title that opens its menu.

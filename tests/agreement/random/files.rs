@@ -1,4 +1,4 @@
-//! Files: a pair for other programs, pictures.
+//! Files: a pair for other programs.
 
 use strum::IntoEnumIterator as _;
 use touch2touch::app::command::{ExportCommand, WorkbenchCommand};
@@ -41,36 +41,6 @@ pub(in crate::agreement) fn a_random_recipe_exports_the_same_files_by_button_and
         counts.push(count);
     }
     compared(&counts, 100_000);
-}
-
-#[test]
-pub(in crate::agreement) fn a_random_recipe_draws_the_same_pictures_by_button_and_verb() {
-    let home = tempfile::tempdir().unwrap();
-    let mut draws = Draws::new(11);
-    let mut counts = Vec::new();
-    let panes = [Pane::GelSlim, Pane::Measured, Pane::Predicted, Pane::Compare];
-    for mut both in Both::places(home.path()) {
-        both.show(&panes);
-        let mut count = 0;
-        let recipe = draws.recipe();
-        both.predict(&recipe, 57);
-        both.studio.send(ViewCommand::ShowBothFingers(draws.of(&[true, false])).into());
-        for pane in panes {
-            let what = format!("{} {pane:?}, {recipe:?}", both.studio.state.pair_name());
-            let file = both.home.parent().unwrap().join(format!("{pane:?}.png"));
-            let picture = Output::Picture { pane, scale: Some(2), error_m: 0.004 };
-            both.studio.send(ExportCommand::Write(picture, file.clone()).into());
-            let said = both.said(pane);
-            // Such as a raw picture, of which only the difference is there.
-            assert_eq!(file.is_file(), said.is_ok(), "{what}: {said:?}");
-            let Ok(said) = said else { continue };
-            let [a, b] = [&file, Path::new(said["file"].as_str().unwrap())].map(|f| std::fs::read(f).unwrap());
-            assert!(a == b, "{what}: {} and {} bytes", a.len(), b.len());
-            count += a.len();
-        }
-        counts.push(count);
-    }
-    compared(&counts, 20_000);
 }
 
 #[test]

@@ -17,7 +17,7 @@ use touch2touch::app::command::{
 use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
 use touch2touch::app::evaluate::{Score, ScoreChoice};
-use touch2touch::app::export::{FigureForm, FigureRows, Output, StillAsked};
+use touch2touch::app::export::{Output, StillAsked};
 use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
@@ -49,8 +49,6 @@ use touch2touch_pipeline::doctor::{Cure, Examined, Worth};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::import::Import;
 use touch2touch_pipeline::export::{ExportChoice, Which};
-use touch2touch_pipeline::images::figure::FigurePane;
-use touch2touch_pipeline::images::space::{Ground, ViewAngles};
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::ToolUnit;
 use touch2touch_pipeline::io::exchange::Format;
@@ -62,6 +60,7 @@ use touch2touch_pipeline::masks::propose::Batch;
 use touch2touch_pipeline::masks::queue::QueueBy;
 use touch2touch_pipeline::scores::evaluate::{Evaluation, Setup};
 use touch2touch_pipeline::steps::tool::UnitSet;
+use touch2touch_pipeline::still::space::{Ground, ViewAngles};
 
 use super::super::answered::{adapted, trained};
 use super::super::double::Double;
@@ -253,19 +252,6 @@ fn registration() -> impl Strategy<Value = Registration> {
     ]
 }
 
-fn form() -> impl Strategy<Value = FigureForm> {
-    let panes = proptest::collection::vec(any_of::<FigurePane>(), 0..9);
-    let rows =
-        prop_oneof![Just(FigureRows::Selected), Just(FigureRows::Ticked), any::<usize>().prop_map(FigureRows::First)];
-    (rows, panes, any::<u8>(), number()).prop_map(|(rows, panes, scale, error_m)| FigureForm {
-        rows,
-        panes,
-        scale,
-        error_m,
-        ..FigureForm::default()
-    })
-}
-
 fn mask_choice() -> impl Strategy<Value = ExportChoice> {
     let flags = (any_of::<Which>(), any::<[bool; 3]>(), any::<u64>(), any_of::<Format>());
     flags.prop_map(|(which, [test_in_train, by_tool, manual_checked], seed, format)| ExportChoice {
@@ -279,19 +265,12 @@ fn mask_choice() -> impl Strategy<Value = ExportChoice> {
 }
 
 fn output() -> impl Strategy<Value = Output> {
-    let picture = (any_of::<Pane>(), proptest::option::of(any::<u8>()), number());
     let still = (any_of::<SpacePane>(), any::<u32>(), any_of::<Ground>(), any::<[f64; 2]>(), any::<Option<u32>>());
     let still = still.prop_map(|(pane, width_px, ground, [yaw_deg, pitch_deg], turntable)| {
         let angles = ViewAngles { yaw_deg, pitch_deg };
         StillAsked { pane, width_px, ground, angles, turntable }
     });
-    prop_oneof![
-        Just(Output::Figure),
-        Just(Output::Masks),
-        source().prop_map(Output::Pair),
-        still.prop_map(Output::Still),
-        picture.prop_map(|(pane, scale, error_m)| Output::Picture { pane, scale, error_m }),
-    ]
+    prop_oneof![Just(Output::Masks), source().prop_map(Output::Pair), still.prop_map(Output::Still),]
 }
 
 fn statistics() -> ShiftStatistics {
@@ -416,8 +395,6 @@ draws! {
             best_first,
             ..ScoreChoice::default()
         })),
-        1 Tick(pair()),
-        1 Untick,
         1 ShowRows((0usize..20, 0usize..40).prop_map(|(a, b)| a..b)),
         4 Select(pair()),
         1 Step(any::<i64>()),
@@ -514,8 +491,6 @@ draws! {
         1 Export(Just(PathBuf::from("table"))),
     }
     export: ExportCommand {
-        1 Ask(any::<bool>()),
-        1 SetForm(form()),
         1 AskMasks(any::<bool>()),
         1 SetMasks(mask_choice()),
         1 AskImport(select(vec![None, Some(PathBuf::from("/dev/null/folder"))])),

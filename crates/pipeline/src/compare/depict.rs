@@ -1,20 +1,17 @@
-//! Imprints that the subjects of a comparison stand for ([`depict`]), and one subject minus another ([`apart`]).
+//! Imprints that the subjects of a comparison stand for ([`depict`]).
 
 use std::borrow::Cow;
-use std::sync::Arc;
 
-use crate::compare::subject::{MadeFrom, Subject};
-use crate::compare::{Comparison, Depicted, beside, between, tile_of};
+use crate::compare::subject::MadeFrom;
+use crate::compare::{Depicted, beside, tile_of};
 use crate::error::TaskError;
-use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::labels::{ImprintSource, PairLabels};
+use crate::labels::ImprintSource;
 use crate::steps::estimate::{Estimate, Touch, estimate};
 use crate::steps::imprint::imprint_of;
 use crate::steps::models::Models;
 use crate::steps::on_pad::OnPad;
 use crate::steps::recipe::{Recipe, Stage};
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::ensemble::Spread;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::{PadId, PerPad};
@@ -104,49 +101,4 @@ pub fn depict(
 pub fn mean(imprints: &[&DepthMap]) -> Result<DepthMap, TaskError> {
     let spread = Spread::of(imprints).map(|spread| spread.mean);
     spread.ok_or_else(|| TaskError::new("Mean of the seeds", "the predictions differ in size"))
-}
-
-/// Two subjects with the origin of their imprints, ready to be made.
-#[derive(Clone, Debug)]
-pub struct Compared {
-    /// One and the other.
-    pub subjects: [Subject; 2],
-    /// Their origins.
-    pub from: [MadeFrom; 2],
-    /// Recipe of what is not predicted.
-    pub recipe: Recipe,
-}
-
-impl Compared {
-    /// The line below a figure: what made its predictions, then what is compared.
-    pub fn note(&self, made: &str) -> String {
-        let [a, b] = &self.subjects;
-        let compared = format!("A {}, B {}", a.label(), b.label());
-        [made, &compared].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join(" · ")
-    }
-}
-
-/// The first subject minus the second, of each pad that has both.
-///
-/// # Errors
-/// As [`depict`] and [`between`].
-pub fn apart(
-    compared: &Compared,
-    (dataset, pair): (&Dataset, PairId),
-    sample: &Arc<Sample>,
-    models: &Models,
-    cx: &JobCx,
-) -> Result<PerPad<Comparison>, TaskError> {
-    let (lacks, labels) = (TaskError::new(WHAT, "no tool is needed"), PairLabels::default());
-    let touch = Touch { dataset, pair, sample, tool: Err(&lacks), labels: &labels };
-    let [a, b] = compared.from.each_ref().map(|from| depict(from, &compared.recipe, touch, models, cx));
-    let (a, b, tile) = (a?, b?, tile_of(dataset, pair, sample)?);
-    let mut found = PerPad::default();
-    for pad in sample.rig.pads() {
-        let [a, b] = [&a, &b].map(|subject| subject.of_pad(sample, pad, tile.as_ref()));
-        if let (Some(a), Some(b)) = (a?, b?) {
-            found[pad] = Some(between(&a, &b, sample, pad)?);
-        }
-    }
-    Ok(found)
 }

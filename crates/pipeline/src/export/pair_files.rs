@@ -58,7 +58,7 @@ pub struct PairParts<'a> {
     pub name: &'a str,
     /// Source of the imprint.
     pub source: ImprintSource,
-    /// Origin of the prediction, as [`crate::images::figure::note`] says it; `None` of a measured one.
+    /// Origin of the prediction, as [`crate::steps::prediction::predicted_by`] says it; `None` of a measured one.
     pub prediction: Option<&'a str>,
     /// Sensors of the pair.
     pub rig: &'a Rig,

@@ -269,7 +269,7 @@ pub(crate) fn through_jpeg(picture: &Grid<u8>, quality: u8) -> Result<Grid<u8>, 
 ///
 /// # Errors
 /// As the encoder says; an empty picture has no file.
-pub(crate) fn png_bytes(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, image::ImageError> {
+pub fn png_bytes(picture: &Grid<[u8; 3]>) -> Result<Vec<u8>, image::ImageError> {
     png(picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgb8)
 }
 

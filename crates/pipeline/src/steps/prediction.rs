@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
+use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::fit::Fitted;
 use touch2touch_core::postprocess::{ColorChain, DepthChain, RawPrediction, ShiftMode};
 
@@ -28,4 +29,9 @@ pub struct Prediction {
     pub seconds: f64,
     /// True where it was made earlier and only read now.
     pub kept: bool,
+}
+
+/// What made predictions, in words.
+pub fn predicted_by(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
+    format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }

@@ -1,4 +1,4 @@
-//! The typeface of the window and of drawn figures, once in the program; and fonts of this computer for East Asian letters,
+//! The typeface of the window; and fonts of this computer for East Asian letters,
 //! which it lacks.
 
 use std::path::{Path, PathBuf};
@@ -43,11 +43,6 @@ pub fn is_east_asian(letter: char) -> bool {
         | 0xFF00..=0xFFEF | 0x20000..=0x3FFFF)
 }
 
-/// The East Asian letters of a text.
-pub(crate) fn east_asian(text: &str) -> Vec<char> {
-    text.chars().filter(|letter| is_east_asian(*letter)).collect()
-}
-
 /// The font of this computer that has all `letters`; its file is read at the first call that needs it, and kept.
 pub fn covering(letters: &[char]) -> Option<&'static SystemFont> {
     static INSTALLED: OnceLock<Vec<Candidate>> = OnceLock::new();
@@ -70,7 +65,7 @@ fn first_with(candidates: &[Candidate], letters: &[char]) -> Option<&'static Sys
 /// A file that may be read.
 struct Candidate {
     file: PathBuf,
-    /// The font, once it was asked for; it stays for the rest of the run, as those who draw want it.
+    /// The font, once it was asked for; it stays for the rest of the run, as the window wants it.
     font: Mutex<Option<Option<&'static SystemFont>>>,
 }
 
@@ -165,6 +160,6 @@ mod tests {
 
     #[test]
     fn letters_of_three_languages_are_east_asian_and_those_of_others_are_not() {
-        assert_eq!(east_asian("a漢é仮カ한°ｱ、Ж").len(), 6);
+        assert_eq!("a漢é仮カ한°ｱ、Ж".chars().filter(|letter| is_east_asian(*letter)).count(), 6);
     }
 }

@@ -1,5 +1,4 @@
-//! A pair in 3D, made for stills: membranes, contact points and poses ([`in_space`]), and the picture of them that a renderer
-//! gives back ([`DrawSpace`]).
+//! A pair in 3D, made for stills: membranes, contact points and poses ([`in_space`]).
 
 use std::sync::Arc;
 
@@ -15,15 +14,14 @@ use crate::labels::{ImprintSource, PairLabels};
 use crate::steps::estimate::{Touch, estimate};
 use crate::steps::models::Models;
 use crate::steps::pose::PoseResult;
+use crate::steps::prediction::predicted_by;
 use crate::steps::recipe::{Recipe, Stage};
 use crate::steps::tool::load_tool;
 use touch2touch_core::cloud::membrane;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
-use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PerPad, Rig};
 use touch2touch_core::sample::Sample;
 use touch2touch_core::units;
@@ -121,15 +119,6 @@ pub struct SpacePicture {
     pub px_per_m: f64,
 }
 
-/// Something that draws pairs in 3D.
-pub trait DrawSpace {
-    /// Draws a pair.
-    ///
-    /// # Errors
-    /// If the graphics device fails.
-    fn draw(&self, pair: &InSpace, view: &SpaceView) -> Result<SpacePicture, TaskError>;
-}
-
 /// An imprint of a pair in 3D: meters, grasp frame.
 #[derive(Clone, Debug)]
 pub struct SpaceSide {
@@ -223,11 +212,6 @@ pub fn in_space(
     })
 }
 
-/// The line below a figure: what made its predictions.
-pub fn note(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
-    format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
-}
-
 /// `measured 3.2° ± 0.5° (true 3.1°), joint`.
 fn side_note(recipe: &Recipe, pose: Option<&PoseResult>) -> String {
     let mut text = recipe.imprint.key().to_owned();
@@ -243,22 +227,8 @@ fn side_note(recipe: &Recipe, pose: Option<&PoseResult>) -> String {
     }
     match (&recipe.generator, recipe.imprint) {
         (Some((bundle, config)), ImprintSource::Predicted) => {
-            format!("{text} · {}", note(&bundle.name, config, recipe.shift))
+            format!("{text} · {}", predicted_by(&bundle.name, config, recipe.shift))
         }
         _ => text,
     }
-}
-
-/// Makes a pair in 3D and has it drawn.
-///
-/// # Errors
-/// As [`in_space`] and the renderer.
-pub fn pictured(
-    input: SpaceInput<'_>,
-    sample: &Sample,
-    view: &SpaceView,
-    by: &dyn DrawSpace,
-    cx: &JobCx,
-) -> Result<SpacePicture, TaskError> {
-    by.draw(&in_space(input, sample, view.pane.sides(), view.distance_m.is_some(), cx)?, view)
 }
