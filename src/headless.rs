@@ -5,7 +5,6 @@
 
 mod adapt;
 mod args;
-mod cache;
 mod compare;
 mod contact_mask;
 mod doctor;
@@ -100,8 +99,6 @@ enum Verb {
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
-    /// Predictions kept on the disk: how many, where, and a way to remove them.
-    Cache(cache::CacheArgs),
     /// Say which model runtime is used and why, and which GPUs it can use.
     Runtime(models::RuntimeArgs),
 }
@@ -254,7 +251,6 @@ fn run(cli: Option<Cli>) -> VerbResult {
         Some(Verb::Masks(verb)) => masks::run(&verb),
         Some(Verb::Doctor(args)) => doctor::run(&args),
         Some(Verb::Bundle(verb)) => models::bundle(&verb),
-        Some(Verb::Cache(args)) => cache::run(&args),
         Some(Verb::Runtime(args)) => models::runtime(&args),
     }
 }

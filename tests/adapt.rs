@@ -63,7 +63,7 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
     pictures(&set, 12);
     let [set, out, bundle] = [&set, &out, &bundle].map(|p| p.to_str().unwrap());
     let adapt = |more: &[&str]| {
-        let fixed = ["adapt", "--input", set, "--bundle", bundle, "--runtime", "rten", "--json"];
+        let fixed = ["adapt", set, "--bundle", bundle, "--runtime", "rten", "--json"];
         run(&[&fixed[..], more].concat(), dir.path())
     };
     let tried = json(&adapt(&[]));
@@ -86,16 +86,15 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
     // The new bundle predicts what was scored, and without its fit what the source does.
     let generate = |bundle: &str, more: &[&str]| {
         let to = dir.path().join("pictures");
-        let fixed =
-            ["generate", "--input", set, "--out", to.to_str().unwrap(), "--runtime", "rten", "--json", "--bundle"];
+        let fixed = ["generate", set, "--out", to.to_str().unwrap(), "--runtime", "rten", "--json", "--bundle"];
         json(&run(&[&fixed[..], &[bundle], more].concat(), dir.path()))["mean"].clone()
     };
     let (source, fitted) = (generate(bundle, &[]), generate(out, &[]));
     let raw = |mean: &Value| mean["psnr_raw_db"].as_f64().unwrap();
-    let unfitted = generate(out, &["--fit-parts", "none"]);
+    let unfitted = generate(out, &["--shift", "exact:none"]);
     assert_eq!(raw(&unfitted), raw(&source), "{source} {unfitted}");
     assert!(raw(&fitted) > raw(&source) + 1.0, "{source} {fitted}");
-    let part = generate(out, &["--fit-parts", "offset,field"]);
+    let part = generate(out, &["--shift", "exact:offset,field"]);
     assert!(raw(&part) > raw(&source) && raw(&part) < raw(&fitted), "{part}");
     // The source is not overwritten, nor is a folder with something else in it.
     for (folder, why) in [(bundle, "stays as it is"), (set, "holds other files")] {
@@ -103,11 +102,11 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
         assert!(!refused.status.success() && said(&refused).contains(why), "{}", said(&refused));
     }
     assert_eq!(json(&adapt(&["--out", out, "--force"]))["bundle"], out, "a fit may be made again");
-    let twice = run(&["adapt", "--input", set, "--bundle", out, "--runtime", "rten", "--json"], dir.path());
+    let twice = run(&["adapt", set, "--bundle", out, "--runtime", "rten", "--json"], dir.path());
     assert!(said(&twice).contains("was fitted already") && said(&twice).contains("made from"), "{}", said(&twice));
     // A damaged fit is a damaged bundle.
     std::fs::write(Path::new(out).join("fit.npz"), b"no archive").unwrap();
-    let broken = run(&["generate", "--input", set, "--out", set, "--bundle", out, "--runtime", "rten"], dir.path());
+    let broken = run(&["generate", set, "--out", set, "--bundle", out, "--runtime", "rten"], dir.path());
     assert!(said(&broken).contains("fit.npz") && said(&broken).contains("SHA-256"), "{}", said(&broken));
 }
 
@@ -119,7 +118,7 @@ fn poor_pairs_are_left_out_or_pointed_at_in_plain_words() {
     pictures(&set, 13);
     let [root, bundle] = [&set, &bundle].map(|p| p.to_str().unwrap());
     let adapt = |more: &[&str]| {
-        let fixed = ["adapt", "--input", root, "--bundle", bundle, "--runtime", "rten", "--json"];
+        let fixed = ["adapt", root, "--bundle", bundle, "--runtime", "rten", "--json"];
         run(&[&fixed[..], more].concat(), dir.path())
     };
     let few = adapt(&["--pairs", "01,02,03"]);
@@ -147,7 +146,6 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
     assert!(made.status.success(), "{}", said(&made));
     let fixed = [
         "adapt",
-        "--input",
         set,
         "--bundle",
         bundle,
@@ -166,16 +164,14 @@ fn measured_meters_are_fitted_too_and_other_data_are_warned_of() {
     let angle = |which: &str| found[which]["angle"]["count"].as_u64();
     assert_eq!((angle("before"), angle("closed_form")), (Some(6), Some(6)), "{found:#}");
     // By the registration that is asked for: one that may not look at all leaves no pose.
-    let tried = [&fixed[..10], &["--engine", "distance_field:gate=0.05"]].concat();
+    let tried = [&fixed[..9], &["--engine", "distance_field:gate=0.05"]].concat();
     let strict = json(&run(&tried, dir.path()));
     assert_ne!(strict["before"]["angle"], found["before"]["angle"], "{strict:#}");
     let gain = found["closed_form"]["psnr_db"].as_f64().unwrap() - found["before"]["psnr_db"].as_f64().unwrap();
     assert!(gain > 1.0, "{found:#}");
     let to = dir.path().join("pictures");
-    let other = run(
-        &["generate", "--input", pairs, "--out", to.to_str().unwrap(), "--bundle", out, "--runtime", "rten"],
-        dir.path(),
-    );
+    let other =
+        run(&["generate", pairs, "--out", to.to_str().unwrap(), "--bundle", out, "--runtime", "rten"], dir.path());
     assert!(said(&other).contains("was fitted to 6 pairs"), "{}", said(&other));
 }
 
@@ -237,7 +233,7 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
 fn real_pairs_are_fitted_in_closed_form_as_well_as_the_recipe_says() {
     let Some(real) = shared("real-pairs") else { return };
     let dir = tempfile::tempdir().unwrap();
-    let found = json(&run(&["adapt", "--input", real.to_str().unwrap(), "--json"], dir.path()));
+    let found = json(&run(&["adapt", real.to_str().unwrap(), "--json"], dir.path()));
     let closed = |key: &str| found["closed_form"][key].as_f64().unwrap();
     assert_eq!((&found["pairs"], found["pads"].as_array().unwrap().len()), (&36.into(), 2), "{found:#}");
     assert!(closed("psnr_db") > 24.1 && closed("psnr_line_db") > 25.7, "{found:#}");

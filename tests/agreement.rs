@@ -72,7 +72,7 @@ fn how(action: Action) -> How {
     use How::{Options, Shell, Verb, Window};
     match action {
         A::OpenFolder | A::OpenDemo | A::Reload => Verb(&["doctor", "demo"]),
-        A::AboutData => Verb(&["doctor", "demo", "--sample", "8"]),
+        A::AboutData => Verb(&["doctor", "demo"]),
         A::Follow => Verb(&["watch", "folder"]),
         // Labels are on the disk as soon as a verb ends.
         A::Save => Shell,
@@ -118,7 +118,7 @@ fn how(action: Action) -> How {
         A::TryTools => Verb(&["pose", "demo", "--tool", "any"]),
         A::IcpFromHere => Verb(&["pose", "demo", "--start", "10,0,-2"]),
         A::OwnStarts => Verb(&["pose", "demo", "--pair", "a"]),
-        A::NextPoseEngine => Options(&["pose", "demo", "--engine", "lab"]),
+        A::NextPoseEngine => Options(&["pose", "demo", "--engine", "lab_icp"]),
         // Steps, residuals and reasons are in the report of the registration.
         A::StepBack | A::StepForward | A::FirstStep | A::LastStep | A::PlaySteps | A::PinStep | A::Correspondences => {
             Options(&["pose", "demo", "--trace", "--json"])
@@ -560,7 +560,7 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
         assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact"), "{pane:?}");
         assert_eq!(said(&studio, pane, "--runtime").as_deref(), Some("rten"), "{pane:?}");
         studio.send(prefer(|s| s.shift = ShiftMode::Parts(CorrectionParts::NONE)).into());
-        assert_eq!(said(&studio, pane, "--fit-parts").as_deref(), Some("none"), "{pane:?}");
+        assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("exact:none"), "{pane:?}");
         studio.send(prefer(|s| s.shift = ShiftMode::PaperShift).into());
         assert_eq!(said(&studio, pane, "--shift").as_deref(), Some("paper"), "{pane:?}");
     }

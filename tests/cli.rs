@@ -84,17 +84,6 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(report["fits"].as_array().unwrap().len() > 100, "each point's residual");
     assert!(cases[0].get("report").is_none(), "nothing is recorded unless asked for");
 
-    // The paper's starts in the wrong frame: what was asked for stands beside the little that was applied.
-    let paper =
-        ["--engine", "lab", "--paper-starts", "3", "--paper-trap", "wrong-frame", "--paper-trap", "rmse-choice"];
-    let trapped = run(
-        &[&["pose", set_text, "--mask", "cad", "--limit", "1", "--trace", "--json"][..], &paper].concat(),
-        data_path,
-    );
-    let runs = json(&trapped)["cases"][0]["report"]["runs"].as_array().unwrap().clone();
-    assert_eq!(runs.len(), 10);
-    let largest = |key: &str| runs.iter().map(|r| r[key]["theta_rad"].as_f64().unwrap().abs()).fold(0.0, f64::max);
-    assert!(largest("requested") > 0.2 && largest("start") < 0.1, "{} {}", largest("requested"), largest("start"));
     let told = run(
         &["pose", set_text, "--mask", "cad", "--limit", "1", "--trace", "--start", "-10,1,-2", "--json"],
         data_path,
@@ -102,7 +91,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let start = &json(&told)["cases"][0]["report"]["start"];
     assert!((start["theta_rad"].as_f64().unwrap() + 10f64.to_radians()).abs() < 1e-12, "{start}");
     assert!((start["z_m"].as_f64().unwrap() + 0.002).abs() < 1e-12, "{start}");
-    for bad in [&["--start", "1,2"][..], &["--paper-trap", "none"], &["--engine", "best"]] {
+    for bad in [&["--start", "1,2"][..], &["--mask", "dept"], &["--engine", "best"]] {
         let refused = run(&[&["pose", set_text][..], bad].concat(), data_path);
         assert_eq!(refused.status.code(), Some(2), "{}", error_text(&refused));
     }
@@ -125,10 +114,10 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     assert!(found["error_deg"].is_number() && found["grasp_from_object"]["pitch_rad"] == 0.05, "{found}");
 
     let masks = dir.path().join("masks");
-    let nothing = run(&["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap()], data_path);
+    let nothing = run(&["masks", "export", set_text, "--out", masks.to_str().unwrap()], data_path);
     assert_eq!(nothing.status.code(), Some(2), "nothing was corrected by hand yet");
     assert!(error_text(&nothing).contains("--pairs all"));
-    let all = ["masks", "export", "--input", set_text, "--out", masks.to_str().unwrap(), "--pairs", "all", "--json"];
+    let all = ["masks", "export", set_text, "--out", masks.to_str().unwrap(), "--pairs", "all", "--json"];
     let exported = run(&all, data_path);
     assert!(exported.status.success(), "{}", error_text(&exported));
     let counts = json(&exported);
@@ -207,7 +196,7 @@ fn predictions_are_written_scored_and_equal_for_equal_seeds() {
     let dir = tempfile::tempdir().unwrap();
     let predict = |name: &str, seed: &str| {
         let out = dir.path().join(name);
-        let args = ["generate", "--input", "demo", "--limit", "1", "--steps", "2", "--seed", seed, "--runtime", "rten"];
+        let args = ["generate", "demo", "--limit", "1", "--steps", "2", "--seed", seed, "--runtime", "rten"];
         let done = run(&[&args[..], &["--out", out.to_str().unwrap(), "--json"]].concat(), dir.path());
         assert!(done.status.success(), "{}", error_text(&done));
         let report = json(&done);
@@ -287,7 +276,7 @@ fn the_results_table_is_printed_and_written() {
     let bundle = |name: &str| format!("{}/tests/data/bundles/{name}", env!("CARGO_MANIFEST_DIR"));
     let (generator, mask, classifier) = (bundle("generator"), bundle("mask"), bundle("classifier"));
     let (table, lines) = (dir.path().join("table.md"), dir.path().join("table.csv"));
-    let mut args = vec!["evaluate", "--input", set_text, "--bundle", &generator, "--bundle", &generator];
+    let mut args = vec!["evaluate", set_text, "--bundle", &generator, "--bundle", &generator];
     args.extend(["--mask-bundle", &mask, "--classifier", &classifier, "--resamples", "50", "--paper"]);
     args.extend(["--markdown", table.to_str().unwrap(), "--csv", lines.to_str().unwrap()]);
     let text = run(&args, &data);
@@ -343,7 +332,7 @@ fn the_results_table_is_printed_and_written() {
     assert_eq!(report["rows"][0]["groups"][1]["grasps"], 1);
     assert_eq!(report["skipped"].as_array().unwrap().len(), 1);
 
-    let wrong = run(&["evaluate", "--input", "test-set", "--bundle", &mask], &data);
+    let wrong = run(&["evaluate", "test-set", "--bundle", &mask], &data);
     assert!(error_text(&wrong).contains("not a generator"), "{}", error_text(&wrong));
 }
 
@@ -354,7 +343,7 @@ fn stored_predictions_get_a_row() {
     let Some(pairs) = support::shared("real-pairs") else { return };
     let dir = tempfile::tempdir().unwrap();
     let generator = format!("{}/tests/data/bundles/generator", env!("CARGO_MANIFEST_DIR"));
-    let args = ["evaluate", "--input", pairs.to_str().unwrap(), "--bundle", &generator, "--json"];
+    let args = ["evaluate", pairs.to_str().unwrap(), "--bundle", &generator, "--json"];
     let report = json(&run(&args, dir.path()));
     assert_eq!(report["groups"], serde_json::json!(["clean_pictures", "clipped_pictures"]));
     let lab = &report["rows"][1]["groups"];

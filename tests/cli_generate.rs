@@ -1,4 +1,4 @@
-//! `generate` and `cache` as a user runs them, with the tiny bundle of the tests.
+//! `generate` and what it keeps as a user runs it, with the tiny bundle of the tests.
 
 use std::path::{Path, PathBuf};
 use std::process::Output;
@@ -29,7 +29,7 @@ pub(crate) fn full_size_bundle(dir: &Path) -> PathBuf {
 }
 
 #[test]
-fn predictions_are_kept_found_again_and_cleared() {
+fn predictions_are_kept_and_found_again() {
     let dir = tempfile::tempdir().unwrap();
     let (home, set, out) = (dir.path().join("home"), dir.path().join("set"), dir.path().join("out"));
     let bundle = full_size_bundle(dir.path());
@@ -37,30 +37,23 @@ fn predictions_are_kept_found_again_and_cleared() {
     let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
     assert!(made.status.success());
     let generate = |more: &[&str]| {
-        let fixed = ["generate", "--input", set, "--out", out, "--finger", "both", "--bundle", bundle];
+        let fixed = ["generate", set, "--out", out, "--finger", "both", "--bundle", bundle];
         run(&[&fixed[..], &["--runtime", "rten", "--json"], more].concat(), &home)
     };
     let kept = |report: &Value| -> Vec<bool> {
         report["pairs"].as_array().unwrap().iter().map(|p| p["kept"].as_bool().unwrap()).collect()
     };
-    let cache = |args: &[&str]| json(&run(&[&["cache", "--json"][..], args].concat(), &home));
-    assert_eq!(cache(&[])["predictions"], 0);
     let first = json(&generate(&[]));
     assert_eq!(kept(&first), [false, false]);
-    let usage = cache(&[]);
-    assert_eq!(usage["predictions"], 2);
-    assert!(usage["bytes"].as_u64().unwrap() > 2000 && usage["folder"].as_str().unwrap().contains("home"));
     let again = json(&generate(&[]));
     assert_eq!(kept(&again), [true, true]);
     assert_eq!(again["pairs"][0]["psnr_db"], first["pairs"][0]["psnr_db"], "the same to the last bit");
     assert_eq!(kept(&json(&generate(&["--no-cache"]))), [false, false]);
     // Another recipe is another prediction.
-    let fast = json(&generate(&["--preset", "fast"]));
+    let fast = json(&generate(&["--steps", "1"]));
     assert_eq!((kept(&fast), &fast["steps"]), (vec![false, false], &Value::from(1)));
-    let steps = json(&generate(&["--preset", "fast", "--steps", "3", "--sampler", "ddpm"]));
+    let steps = json(&generate(&["--steps", "3", "--sampler", "ddpm"]));
     assert_eq!((&steps["steps"], &steps["sampler"]), (&Value::from(3), &Value::from("ddpm")));
-    assert_eq!(cache(&["--clear"])["removed"], 6);
-    assert_eq!(cache(&[])["predictions"], 0);
     // Guidance is refused once, before anything is made.
     let refused = generate(&["--guidance", "2"]);
     let text = String::from_utf8_lossy(&refused.stderr).into_owned();
@@ -81,7 +74,7 @@ fn lengths_of_pictures_are_in_the_assumed_meters() {
     images::write_rgb8(&set.join("a_gelslim.png"), &gelslim).unwrap();
     images::write_gray8(&set.join("a_bubble.png"), &Grid::from_fn(128, 128, |x, y| (x + y) as u8)).unwrap();
     let [set, out, bundle] = [&set, &dir.path().join("out"), &bundle].map(|p| p.to_str().unwrap().to_owned());
-    let args = ["generate", "--input", &set, "--out", &out, "--bundle", &bundle, "--runtime", "rten", "--json"];
+    let args = ["generate", &set, "--out", &out, "--bundle", &bundle, "--runtime", "rten", "--json"];
     let report = json(&run(&args, &home));
     // Nothing in 0..255 is meant: the tile stands for -6.3 to 18.0 mm.
     for part in ["seen", "invented"] {

@@ -54,7 +54,7 @@ fn the_programs_own_bundles_are_those_that_ship_and_predict_the_same() {
 #[test]
 fn a_copied_program_predicts_and_poses_the_demo() {
     let home = tempfile::tempdir().unwrap();
-    let generate = ["generate", "--input", "demo", "--limit", "1", "--runtime", "rten", "--out", "out", "--json"];
+    let generate = ["generate", "demo", "--limit", "1", "--runtime", "rten", "--out", "out", "--json"];
     let report = json(&alone(home.path(), &generate));
     assert!(report["mean"]["psnr_db"].as_f64().unwrap() > 15.0, "{report}");
     let pose =

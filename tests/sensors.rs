@@ -75,7 +75,7 @@ fn the_reverse_direction_goes_through_every_verb() {
     let made = run(&["simulate", "--out", set, "--tools", "pattern_36", "--grasps", "1", "--seed", "3"], &home);
     assert!(made.status.success(), "{}", text(&made));
 
-    let generate = ["generate", "--input", set, "--out", out, "--finger", "both", "--runtime", "rten", "--json"];
+    let generate = ["generate", set, "--out", out, "--finger", "both", "--runtime", "rten", "--json"];
     let found = report(&run(&[&generate[..], &["--bundle", reverse]].concat(), &home));
     let pairs = found["pairs"].as_array().unwrap();
     assert_eq!(pairs.len(), 2, "both fingers");
@@ -94,7 +94,7 @@ fn the_reverse_direction_goes_through_every_verb() {
     // What needs depth says so.
     let pose = run(&["pose", set, "--imprint", "predicted", "--bundle", reverse, "--runtime", "rten"], &home);
     assert!(!pose.status.success() && text(&pose).contains("predicts a color picture"), "{}", text(&pose));
-    let args = ["evaluate", "--input", set, "--bundle", reverse, "--resamples", "0", "--runtime", "rten", "--json"];
+    let args = ["evaluate", set, "--bundle", reverse, "--resamples", "0", "--runtime", "rten", "--json"];
     let table = report(&run(&[&args[..], &["--mask", "truth"]].concat(), &home));
     let row = &table["rows"][1]["groups"][0];
     assert!(row["psnr_db"]["value"].as_f64().unwrap() > 0.0 && row["ssim"]["value"].is_number(), "{row}");
@@ -167,7 +167,7 @@ fn a_gripper_of_one_digit_is_opened_and_predicted_for() {
     assert_eq!(tiny.ends(&rig).unwrap(), Ok(Ends { input: rig.sensor_of_key("digit").unwrap(), output: None }));
 
     let [set, out, tiny] = [&set, &out, &bundle("digit_to_bubble")].map(|p| p.to_str().unwrap().to_owned());
-    let generate = ["generate", "--input", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
+    let generate = ["generate", &set, "--out", &out, "--runtime", "rten", "--json", "--bundle"];
     let found = report(&run(&[&generate[..], &[&tiny]].concat(), &home));
     assert_eq!(found["pairs"][0]["finger"], "thumb");
     let depth: Grid<f32> = images::read_gray(&Path::new(&out).join("a_thumb.png")).unwrap();

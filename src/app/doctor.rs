@@ -16,7 +16,7 @@ use super::state::view::UiRequest;
 use super::train::{self, TrainCommand};
 use super::{recipe, tasks};
 use touch2touch_core::read_as::parse_list;
-use touch2touch_pipeline::doctor::{self, Cure, Examined, SAMPLE, Worth, WorthSetup};
+use touch2touch_pipeline::doctor::{self, Cure, Examined, Worth};
 use touch2touch_pipeline::doubts;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::doctor::MOST_PAIRS;
@@ -41,10 +41,10 @@ pub(super) fn step(state: &mut State, command: DoctorCommand, effects: &mut Vec<
     match command {
         DoctorCommand::Show(shown) => state.doctor.shown = shown && state.library.open.is_some(),
         DoctorCommand::Try => {
-            let (Some(setup), Some(open)) = (worth_setup(state), &state.library.open) else { return };
+            let (Some(recipe), Some(open)) = (worth_recipe(state), &state.library.open) else { return };
             let source = open.source.clone();
             let title = format!("Try the models on {}", source.title());
-            if tasks::start(state, title, TryModels { source, setup }, effects).is_some() {
+            if tasks::start(state, title, TryModels { source, recipe }, effects).is_some() {
                 state.doctor.tried = true;
             }
         }
@@ -125,17 +125,17 @@ fn tried_recipe(state: &State) -> Recipe {
     }
 }
 
-/// The setup of trying the models now; `None` where no data, or no model, is there.
-fn worth_setup(state: &State) -> Option<WorthSetup> {
+/// The recipe of trying the models now; `None` where no data, or no model, is there.
+fn worth_recipe(state: &State) -> Option<Recipe> {
     // The models come from what is built in.
     state.library.open.as_ref()?.source.root()?;
     let recipe = tried_recipe(state);
-    (recipe.generator.is_some() || recipe.mask_model.is_some()).then_some(WorthSetup { recipe, pairs: SAMPLE })
+    (recipe.generator.is_some() || recipe.mask_model.is_some()).then_some(recipe)
 }
 
 /// True where the models can be tried.
 pub(crate) fn can_try(state: &State) -> bool {
-    worth_setup(state).is_some()
+    worth_recipe(state).is_some()
 }
 
 /// True where the models are to be tried because the panel is looked at, and were not yet.
@@ -153,7 +153,7 @@ pub(crate) fn fitted_in_use(state: &State) -> Option<&str> {
 /// Tries the models on a sample.
 pub struct TryModels {
     source: Arc<dyn DataSource>,
-    setup: WorthSetup,
+    recipe: Recipe,
 }
 
 impl Errand for TryModels {
@@ -162,7 +162,7 @@ impl Errand for TryModels {
 
     fn run(self, access: &Access, cx: &JobCx) -> Result<Self::End, TaskError> {
         let dataset = self.source.on_disk(Self::KIND.name())?;
-        Ok(doctor::worth(dataset, &self.setup, access.services.models(), cx)?.map(Arc::new))
+        Ok(doctor::worth(dataset, &self.recipe, access.services.models(), cx)?.map(Arc::new))
     }
 
     fn ended(worth: &Self::End, state: &mut State, _: &mut Vec<Effect>) {
@@ -184,7 +184,7 @@ impl Errand for Examine {
         let dataset = self.source.on_disk(Self::KIND.name())?;
         let generating = self.recipe.generating().ok();
         let generator = generating.map(|generating: Generating<'_>| (access.services.models(), generating));
-        doctor::examined(dataset, MOST_PAIRS, doubts::PAIRS, generator, cx).map(Arc::new)
+        doctor::examined(dataset, MOST_PAIRS, generator, cx).map(Arc::new)
     }
 
     fn ended(examined: &Self::End, state: &mut State, _: &mut Vec<Effect>) {

@@ -2,6 +2,7 @@
 
 use std::convert::Infallible;
 use std::ffi::OsString;
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::time::Duration;
@@ -13,10 +14,9 @@ use strum::IntoEnumIterator;
 
 use super::Common;
 use touch2touch_core::pose::Registration;
-use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::io::atomic;
-use touch2touch_pipeline::io::dataset::{Dataset, OpenError, ToolScale};
+use touch2touch_pipeline::io::dataset::{Dataset, ToolScale};
 use touch2touch_pipeline::pairs;
 
 /// The data set that a verb reads.
@@ -24,47 +24,21 @@ use touch2touch_pipeline::pairs;
 pub struct DatasetArgs {
     /// The data set: a folder in the lab's layout or of image pairs, or a built-in one: `demo`, `test-set` (46 unseen
     /// grasps of each of 9 seen and 3 unseen tools, simulated), `test-set-ambiguous`, `-mixed`, `-misaligned`, `-noise`.
-    #[arg(value_name = "PATH", required_unless_present = "input")]
-    path: Option<PathBuf>,
-    /// PATH, as an option.
-    #[arg(long, value_name = "PATH", conflicts_with = "path")]
-    input: Option<PathBuf>,
-    /// Read the data otherwise than they are stored, for this run: what the doctor offers, such as swap-fingers, several with
-    /// commas. Without it, what read-as.txt in the data set says (`doctor --set`). An empty list reads them as they are stored.
-    #[arg(long, value_name = "LIST", value_parser = parse_readings)]
-    read_as: Option<Readings>,
-}
-
-/// Ways to read data otherwise than they are stored.
-#[derive(Debug, Clone)]
-pub(super) struct Readings(pub(super) Vec<ReadAs>);
-
-/// Reads a list of them.
-pub(super) fn parse_readings(text: &str) -> Result<Readings, String> {
-    parse_list(text).map(Readings)
+    #[arg(value_name = "PATH")]
+    path: PathBuf,
 }
 
 impl DatasetArgs {
     /// Path that was named.
     pub fn path(&self) -> &Path {
-        // The parser sees to it that one of them is there.
-        self.path.as_deref().or(self.input.as_deref()).unwrap_or(Path::new(""))
+        &self.path
     }
 
     /// The folder's data set, or the built-in one of that name; says first what is wrong with it.
     pub(super) fn open(&self) -> anyhow::Result<Dataset> {
-        let dataset = self.open_unsaid().map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+        let dataset = Dataset::open(&self.path).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
         super::notes::say_problems(&dataset);
         Ok(dataset)
-    }
-
-    /// [`Self::open`] for a verb that says itself what is wrong.
-    pub(super) fn open_unsaid(&self) -> Result<Dataset, OpenError> {
-        let dataset = Dataset::open(self.path())?;
-        Ok(match &self.read_as {
-            Some(Readings(read_as)) => dataset.reading(read_as.clone()),
-            None => dataset,
-        })
     }
 
     /// [`Self::open`] with the unit of the CAD models as the command line has it.
@@ -129,6 +103,42 @@ where
 {
     PossibleValuesParser::new(T::iter().map(Into::into))
         .try_map(|key| key.parse().map_err(|_| format!("{key} is none of them")))
+}
+
+/// Reads a value by its own words, and lists those that it begins with in the help.
+#[derive(Debug)]
+pub(super) struct Listed<T> {
+    words: fn() -> Vec<PossibleValue>,
+    of: PhantomData<fn() -> T>,
+}
+
+impl<T> Clone for Listed<T> {
+    fn clone(&self) -> Self {
+        Self { words: self.words, of: PhantomData }
+    }
+}
+
+/// A parser of such a value.
+pub(super) fn listed<T>(words: fn() -> Vec<PossibleValue>) -> Listed<T> {
+    Listed { words, of: PhantomData }
+}
+
+impl<T: FromStr<Err = String> + Clone + Send + Sync + 'static> TypedValueParser for Listed<T> {
+    type Value = T;
+
+    fn parse_ref(
+        &self,
+        cmd: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<T, clap::Error> {
+        let read: fn(&str) -> Result<T, String> = str::parse;
+        read.parse_ref(cmd, arg, value)
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
+        Some(Box::new((self.words)().into_iter()))
+    }
 }
 
 /// Reads a registration, and lists them in the help.

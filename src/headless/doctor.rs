@@ -10,11 +10,11 @@ use clap::Args;
 use serde::Serialize;
 
 use super::args::DatasetArgs;
+use super::recipe::kept;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::units::counted;
-use touch2touch_pipeline::doctor::{self, Cure, Examined, Fact, Worth, WorthSetup};
-use touch2touch_pipeline::doubts;
+use touch2touch_pipeline::doctor::{self, Cure, Examined, Fact, Worth};
 use touch2touch_pipeline::export::DrawnMasks;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::{Dataset, OpenError};
@@ -34,14 +34,6 @@ pub(super) struct DoctorArgs {
     /// Load every pair of a large data set, not 2000 that are spread evenly.
     #[arg(long)]
     all: bool,
-    /// Pairs on which other readings of the data are tried (fingers swapped, pictures mirrored, another tool's CAD model,
-    /// ...), spread over the tools. 0 tries nothing.
-    #[arg(long, value_name = "N", default_value_t = doubts::PAIRS)]
-    tried: usize,
-    /// Pairs on which the models are tried, spread over the data set: the generator's score, what a fit would make of it,
-    /// and the mask model's poses where the true ones are known. 0 tries nothing.
-    #[arg(long, value_name = "N", default_value_t = doctor::SAMPLE)]
-    sample: usize,
     /// Compare no predictions with what was measured and try no models: faster, but swapped GelSlims are not seen.
     #[arg(long)]
     no_predictions: bool,
@@ -70,7 +62,7 @@ struct Report<'a> {
     /// Pairs that were loaded: 2000 at most, spread evenly, without `--all`.
     examined: usize,
     problems: &'a [Finding],
-    /// The readings that would set it right, for `--read-as`; `null` where there is none.
+    /// The readings that would set it right, for `--set read-as=`; `null` where there is none.
     read_as: Option<String>,
 }
 
@@ -81,13 +73,14 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
     }
     let output = Output::new(args.common, "examining", 0);
     let (mut about, mut worth) = (Vec::new(), None);
+    let models = Models::new(kept());
     // Without knowing the sensors, none of its pairs can be examined.
-    let (title, report, read_as, opened) = match args.dataset.open_unsaid() {
+    let (title, report, read_as, opened) = match Dataset::open(args.dataset.path()) {
         Ok(dataset) => {
             about = doctor::facts(&dataset, &DrawnMasks { labels: &Labels::of(&dataset), changed: &BTreeMap::new() });
-            worth = tried_models(args, &dataset, &output)?;
+            worth = tried_models(args, &dataset, &models, &output)?;
             about.extend(worth.iter().flat_map(Worth::facts));
-            let Examined { report, read_as } = examined(args, &dataset, &output)?;
+            let Examined { report, read_as } = examined(args, &dataset, &models, &output)?;
             (dataset.title, report, read_as, true)
         }
         Err(err @ OpenError::Rig { .. }) => {
@@ -134,8 +127,13 @@ fn line(fact: &Fact) -> String {
 }
 
 /// The worth of the shipped models, or of the generator that is named; none where none is to be tried.
-fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Option<Worth>> {
-    if args.no_predictions || args.sample == 0 {
+fn tried_models(
+    args: &DoctorArgs,
+    dataset: &Dataset,
+    models: &Models,
+    output: &Output,
+) -> anyhow::Result<Option<Worth>> {
+    if args.no_predictions {
         return Ok(None);
     }
     let found = bundles::find(&[]);
@@ -149,23 +147,21 @@ fn tried_models(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow
         mask_model: take(BundleKind::Mask, None).map(Into::into),
         ..Recipe::default()
     };
-    let models = Models::new(super::cache::store());
-    Ok(doctor::worth(dataset, &WorthSetup { recipe, pairs: args.sample }, &models, &output.job())?)
+    Ok(doctor::worth(dataset, &recipe, models, &output.job())?)
 }
 
 /// The pairs examined; predictions are compared where a generator for these sensors is there.
-fn examined(args: &DoctorArgs, dataset: &Dataset, output: &Output) -> anyhow::Result<Examined> {
+fn examined(args: &DoctorArgs, dataset: &Dataset, models: &Models, output: &Output) -> anyhow::Result<Examined> {
     let cx = output.job();
     let most = if args.all { usize::MAX } else { MOST_PAIRS };
-    let bundle = (!args.no_predictions && args.tried > 0)
+    let bundle = (!args.no_predictions)
         .then(|| bundles::find(&[]).take(BundleKind::Generator, args.bundle.as_deref(), &dataset.rig).ok())
         .flatten();
     let Some((bundle, info)) = bundle.as_ref().and_then(|bundle| Some((bundle, bundle.generator.as_ref()?))) else {
-        return Ok(doctor::examined(dataset, most, args.tried, None, &cx)?);
+        return Ok(doctor::examined(dataset, most, None, &cx)?);
     };
-    let models = Models::new(super::cache::store());
     let generating = Generating { bundle, engine: EngineChoice::Auto, config: &info.defaults };
-    Ok(doctor::examined(dataset, most, args.tried, Some((&models, generating)), &cx)?)
+    Ok(doctor::examined(dataset, most, Some((models, generating)), &cx)?)
 }
 
 /// The other examples, by the names of their files.

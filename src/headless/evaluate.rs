@@ -108,7 +108,7 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let setup = setup(args, &dataset)?;
     let output = Output::new(args.common, "evaluating", 0);
-    let models = Models::new(if args.no_cache { None } else { super::cache::store() });
+    let models = Models::new(if args.no_cache { None } else { super::recipe::kept() });
     let mut evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
     for file in &args.against {
         evaluation.against(file)?;

@@ -33,9 +33,8 @@ pub(super) struct BundleArgs {
 /// Arguments of `bundle try`.
 #[derive(Debug, Args)]
 pub(super) struct TryArgs {
-    path: PathBuf,
-    #[arg(long)]
     engine: EngineChoice,
+    path: PathBuf,
 }
 
 #[derive(Serialize)]

@@ -27,8 +27,8 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::load_tool;
 
-use args::{Imprints, registration};
-pub(super) use args::{PoseArgs, Registrations, RegistrationsParser, parse_start};
+use args::Imprints;
+pub(super) use args::{PoseArgs, Registrations, parse_start, registrations};
 use report::{Accepted, First, PoseRow, RankedTool, Report, summary, text};
 
 /// Word of `--tool` for trying all tools.
@@ -162,14 +162,14 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
     let one = |&by: &Registration| {
         let ranked = match touch.tool {
             Ok(_) => None,
-            Err(_) => Some(estimate.which_tool(touch, tried.iter().copied(), &*registration(args, by))?),
+            Err(_) => Some(estimate.which_tool(touch, tried.iter().copied(), &*by.method())?),
         };
         let likeliest = ranked.iter().flatten().next().map(|first| first.tool.as_str());
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
         let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
-        let found = estimate.pose_by(touch, &*registration(args, by), ask);
+        let found = estimate.pose_by(touch, &*by.method(), ask);
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
         Ok(PoseRow {

@@ -5,8 +5,9 @@ mod args;
 use std::path::{Path, PathBuf};
 
 use super::contact_mask::MaskArgs;
+use crate::app::services::Services as _;
+use crate::app::services::live::LiveServices;
 use touch2touch_core::dataset::Problem;
-use touch2touch_core::diffusion::Spacing;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::Rig;
@@ -14,6 +15,7 @@ use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::infer::bundle::Bundle;
 use touch2touch_pipeline::infer::engine::{EngineChoice, resolve};
+use touch2touch_pipeline::infer::store::{Store, user_folder};
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::learn::tuning::unfinished_folder;
 use touch2touch_pipeline::steps::bundles::{self, BundleInfo, FoundBundles};
@@ -23,13 +25,12 @@ use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::recipe::{GeneratorChoice, Model, Recipe};
 
 pub(super) use args::MappingArgs;
-use args::SpacingArg;
 pub use args::{ModelArgs, RuntimeArg};
 
 impl ModelArgs {
     /// The models of one run of the program; none is loaded yet.
     pub fn models(&self) -> Models {
-        Models::new(if self.no_cache { None } else { super::cache::store() })
+        Models::new(if self.no_cache { None } else { kept() })
     }
 
     /// The engine that runs the models.
@@ -58,26 +59,23 @@ impl ModelArgs {
             // Without a generator nothing is read by it; what was asked for is still said.
             return Ok(Recipe { shift: self.mapping.mode(None).unwrap_or_default(), ..recipe });
         }
-        let (generator, shift) = self.generator_choice()?.of(self.found(), rig)?;
+        let (generator, shift) = self.generator_choice().of(self.found(), rig)?;
         Ok(Recipe { generator: Some(generator), shift, ..recipe })
     }
 
     /// The generator as the command line says it.
-    fn generator_choice(&self) -> anyhow::Result<GeneratorChoice> {
-        Ok(GeneratorChoice {
+    fn generator_choice(&self) -> GeneratorChoice {
+        GeneratorChoice {
             bundle: self.bundle.clone(),
-            preset: self.preset,
             steps: self.steps,
             seed: self.seed,
             eta: self.eta,
             sampler: self.sampler,
-            spacing: self.spacing.map(|spacing| match spacing {
-                SpacingArg::Trailing => Spacing::Trailing,
-                SpacingArg::Lab => Spacing::Lab,
-            }),
+            spacing: self.spacing,
             guidance: self.guidance,
-            shift: self.mapping.choice()?,
-        })
+            shift: self.mapping.shift.clone(),
+            ..GeneratorChoice::default()
+        }
     }
 
     /// Recipe with masks and a registration. A mask model is looked for where one is taken.
@@ -98,6 +96,12 @@ impl ModelArgs {
     pub fn mask_model(&self, of: MaskSource, rig: &Rig) -> Result<Option<Model>, TaskError> {
         Model::of_masks(of, self.found(), self.mask_bundle.as_deref(), rig)
     }
+}
+
+/// The user's kept predictions with the budget of the studio's preferences; `None` without a folder for them.
+pub(super) fn kept() -> Option<Store> {
+    let (settings, _) = LiveServices::new().load_settings();
+    Some(Store::new(user_folder()?, u64::from(settings.cache_mib) << 20))
 }
 
 /// The recipe that several generators have in common, which are no part of it.
@@ -126,7 +130,7 @@ pub(super) fn misgiving(recipe: &Recipe, sample: &Sample) -> Option<Problem> {
     Some(Problem {
         what: bundle.misgiving(sample)?,
         file: bundle.origin.path(),
-        hint: "name another bundle, or switch the fit off with --fit-parts none".into(),
+        hint: "name another bundle, or switch the fit off with --shift exact:none".into(),
     })
 }
 

@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
 use serde::Serialize;
 use serde_json::json;
 use strum::IntoEnumIterator;
 
-use super::args::at_least_one;
+use super::args::{at_least_one, keyed};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::sim::{self, Condition, Fault, Sensors};
@@ -21,7 +21,7 @@ pub(super) struct SimulateArgs {
     /// The folder to write; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// `all`, `seen`, `unseen`, or or tool names separated by commas.
+    /// `all`, `seen`, `unseen`, or tool names separated by commas.
     #[arg(long, default_value = "all")]
     tools: String,
     /// Grasps per tool.
@@ -48,28 +48,11 @@ pub(super) struct SimulateArgs {
     /// millimeters) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed", "sensors", "gelslims"])]
     faults: bool,
-    /// Layout, one of the lab's.
-    #[arg(long, value_enum, default_value_t = Part::Test)]
-    part: Part,
+    /// Part of the lab's layout that it is written as: `train/...`, `test/test_only/...` or `test/train_only/...`.
+    #[arg(long, value_parser = keyed::<Layout>(), default_value = "test")]
+    part: Layout,
     #[command(flatten)]
     common: Common,
-}
-
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Part {
-    /// `train/…/<tool folder>/data_N.pt`
-    Train,
-    /// `test/test_only/…/<tool>_data_N.pt`
-    Test,
-}
-
-impl Part {
-    fn layout(self) -> Layout {
-        match self {
-            Self::Train => Layout::Train,
-            Self::Test => Layout::Test,
-        }
-    }
 }
 
 /// Parser of the key of a condition.
@@ -98,7 +81,6 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     let start = std::time::Instant::now();
     let grasps = if args.test_set { sim::TEST_GRASPS } else { args.grasps.into() };
     let output = Output::new(args.common, "simulating", chosen.len() * grasps as usize);
-    let layout = args.part.layout();
     let sensors = Sensors::named(args.sensors, args.gelslims).map_err(anyhow::Error::msg)?;
     let config = sensors.config();
     // A condition gives at most two forms of a tool, one to even pairs and one to odd ones.
@@ -119,7 +101,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     if sensors != Sensors::Nominal {
         recipe["sensors"] = json!(sensors);
     }
-    let writing = Writing::begin(&args.out, layout, &tools, pairs, recipe)?;
+    let writing = Writing::begin(&args.out, args.part, &tools, pairs, recipe)?;
     for (t, tool) in chosen.iter().enumerate() {
         for g in 0..grasps {
             let touched = args.condition.tool(tool, g);
@@ -165,7 +147,7 @@ fn write_faults(args: &SimulateArgs) -> VerbResult {
     let output = Output::new(args.common, "simulating", names.len());
     let models: Vec<_> = names.iter().map(|(f, name)| (name.as_str(), false, f.mesh())).collect();
     let recipe = json!({"faults": true});
-    let writing = Writing::begin(&args.out, args.part.layout(), &models, names.len(), recipe)?;
+    let writing = Writing::begin(&args.out, args.part, &models, names.len(), recipe)?;
     for (fault, name) in &names {
         writing.pair(name, 0, &fault.sample())?;
         output.step(name);

@@ -1,42 +1,33 @@
 //! `touch2touch watch`: each GelSlim touch that appears in a folder is predicted, posed, and written beside it. This is
 //! how a robot uses the models online.
 
-mod done;
+mod files;
 mod one;
-mod recipe;
-mod summary;
-mod write;
 
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant, SystemTime};
+use std::path::PathBuf;
+use std::time::{Instant, SystemTime};
 
 use async_signal::{Signal, Signals};
 use clap::Args;
-use serde::Serialize;
 use serde_json::json;
 
 use super::args::DatasetArgs;
 use super::contact_mask::{MaskArgs, readable};
 use super::guard::{Bug, guarded};
 use super::output::says;
-use super::pose::{Registrations, RegistrationsParser};
+use super::pose::Registrations;
 use super::recipe::ModelArgs;
-use super::{Common, Output, ToolArgs, VerbResult, report};
-use done::Done;
-use one::{Arrived, Worker};
-use summary::Summary;
-use touch2touch_core::dataset::{PairId, Problem};
-use touch2touch_core::rig::PerPad;
-use touch2touch_core::sample::DepthCamera;
-use touch2touch_pipeline::follow::{FollowEvent, Following};
-use touch2touch_pipeline::io::dataset::{Dataset, cameras_of, rig_of};
-use touch2touch_pipeline::io::follow::{Arrival, FollowConfig, PERIOD, Ready, Stamp};
+use super::{Common, Output, VerbResult, report};
+use files::Source;
+use one::{Arrived, Done, Worker};
+use touch2touch_core::dataset::Problem;
+use touch2touch_pipeline::follow::{FollowEvent, Following, PERIOD, Ready};
+use touch2touch_pipeline::io::dataset::rig_of;
 use touch2touch_pipeline::io::names::Outputs;
 use touch2touch_pipeline::job::Cancel;
 use touch2touch_pipeline::labels::PairLabels;
 use touch2touch_pipeline::steps::estimate::Touch;
 use touch2touch_pipeline::steps::mask::MaskSource;
-use write::Save;
 
 /// Arguments of `watch`.
 #[derive(Debug, Args)]
@@ -51,48 +42,17 @@ pub(super) struct WatchArgs {
     #[arg(long, value_name = "NAME|FILE.stl")]
     tool: Option<String>,
     #[command(flatten)]
-    unit: ToolArgs,
-    /// The bubble cameras for touches without a bubble file: a bubble .pt file of the same rig, or `demo`. Without it,
-    /// rig.pt in the folder, else its first bubble file; if there is none, there is no pose.
-    #[arg(long, value_name = "FILE.pt|demo")]
-    camera: Option<PathBuf>,
-    #[command(flatten)]
     mask: MaskArgs,
     /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value = "default", value_parser = RegistrationsParser)]
+    #[arg(long = "engine", value_name = "ENGINE", default_value = "joint", value_parser = super::pose::registrations())]
     registration: Registrations,
-    /// Files that are written beside NAME.t2t.json: imprints in meters and masks as .npz or .pt, 16-bit pictures (0.001
-    /// mm steps from -20 mm) as .png.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = [Save::Npz, Save::Png])]
-    save: Vec<Save>,
-    /// Take up what lies there already as well, unless it was done with the same recipe.
-    #[arg(long)]
-    existing: bool,
-    /// Take up what lies there, and end.
+    /// Take up what lies there, unless it was done with the same recipe, and end.
     #[arg(long)]
     once: bool,
-    /// Time that a file that cannot be read may stay unchanged before it counts as broken, seconds.
-    #[arg(long, default_value_t = 2.0, value_name = "SECONDS")]
-    patience: f64,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
     common: Common,
-}
-
-/// File of a touch when it was done: with the same numbers and the same recipe it need not be done again.
-#[derive(Debug, Clone, Serialize)]
-struct Source {
-    file: String,
-    bytes: u64,
-    modified_ns: u64,
-}
-
-impl Source {
-    fn new(file: &Path, stamp: Stamp) -> Self {
-        let name = file.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned());
-        Self { file: name, bytes: stamp.bytes, modified_ns: stamp.modified_ns() }
-    }
 }
 
 pub(super) fn run(args: &WatchArgs) -> VerbResult {
@@ -103,34 +63,25 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
     if matches!(masks, MaskSource::Cad | MaskSource::Truth) {
         anyhow::bail!("--mask {} needs the true pose, which a new touch does not have", masks.key());
     }
-    let mut outputs = args.out.as_deref().map(report::outputs).transpose()?;
-    let patience = Duration::try_from_secs_f64(args.patience)
-        .map_err(|_| anyhow::anyhow!("--patience {} is no time in seconds", args.patience))?;
-    let config = FollowConfig {
-        existing: args.existing || args.once,
-        patience,
-        tool_scale: args.unit.tool_scale,
-        cameras: cameras(args.camera.as_deref())?,
-    };
-    let mut following = Following::new(args.dataset.path(), config)?;
+    let folder = args.dataset.path();
+    let outputs = args.out.as_deref().map(report::outputs).transpose()?;
+    let following = Following::new(folder, args.once)?;
     // The models are chosen for the sensors before the first touch is there.
-    let rig = rig_of(args.dataset.path()).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
-    let mut worker = Worker::new(args, &rig, stop.clone())?;
+    let rig = rig_of(folder).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
+    let worker = Worker::new(args, &rig, stop.clone())?;
     let ready = json!({
-        "event": "ready", "folder": args.dataset.path(), "recipe": worker.recipe(None, &PairLabels::default())?, "period_ms": PERIOD.as_secs_f64() * 1e3,
-        "load_and_warm_up_s": worker.warm_s,
+        "event": "ready", "folder": folder, "recipe": worker.recipe(None, &PairLabels::default())?,
+        "period_ms": PERIOD.as_secs_f64() * 1e3, "load_and_warm_up_s": worker.warm_s,
     });
     output.line(&ready, || {
-        format!("following {} (models warm after {:.1} s); Ctrl-C ends", args.dataset.path().display(), worker.warm_s)
+        format!("following {} (models warm after {:.1} s); Ctrl-C ends", folder.display(), worker.warm_s)
     })?;
-
     following.dataset().into_iter().for_each(|dataset| super::notes::say_problems(dataset));
-    let mut summary = Summary::default();
-    while let Some(event) = following.wait(&stop, args.once) {
+    let mut watch = Watch { output, outputs, following, worker, summary: Summary::default() };
+    while let Some(event) = watch.following.wait(&stop, args.once) {
+        let output = &watch.output;
         match event {
-            FollowEvent::Ready(ready) => {
-                touch(&mut outputs, &mut following, &mut worker, &ready, &output, &mut summary)?;
-            }
+            FollowEvent::Ready(ready) => watch.touch(&ready)?,
             FollowEvent::Trouble(Problem { file, what, hint }) => {
                 let event = json!({"event": "trouble", "file": file, "error": what, "hint": hint});
                 output.line(&event, || format!("{}: {what} ({hint})", file.display()))?;
@@ -140,14 +91,15 @@ pub(super) fn run(args: &WatchArgs) -> VerbResult {
             }
         }
     }
+    let Watch { output, following, summary, .. } = watch;
     if args.once && following.dataset().is_none() {
         anyhow::bail!(
             "no touch was found ({}); see `touch2touch watch --help` for what counts as one",
-            args.dataset.path().display()
+            folder.display()
         );
     }
     output.line(&summary.json(), || summary.text())?;
-    Ok(summary.failed() == 0 && following.is_in_order())
+    Ok(summary.failed == 0 && following.is_in_order())
 }
 
 /// From now on Ctrl-C sets `stop` instead of ending the program in the middle of a touch; a second one ends it.
@@ -166,101 +118,78 @@ fn take_signals(stop: Cancel) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// The cameras that `--camera` names.
-fn cameras(named: Option<&Path>) -> anyhow::Result<Option<PerPad<DepthCamera>>> {
-    let Some(file) = named else { return Ok(None) };
-    let cameras = if file == Path::new("demo") {
-        Dataset::demo().load(PairId(0))?.pads.map(|touch| touch?.depth()?.camera.clone())
-    } else {
-        cameras_of(file)?
-    };
-    if cameras.is_empty() {
-        anyhow::bail!(
-            "the file has no camera: K, bubbles_tr_quat, grasp_frame_quat and bubble_depth_ref are needed ({})",
-            file.display()
-        );
-    }
-    Ok(Some(cameras))
+/// A folder that is watched.
+struct Watch<'a> {
+    output: Output,
+    outputs: Option<Outputs>,
+    following: Following,
+    worker: Worker<'a>,
+    summary: Summary,
 }
 
-/// Takes one touch as far as it goes now.
-fn touch(
-    outputs: &mut Option<Outputs>,
-    following: &mut Following,
-    worker: &mut Worker<'_>,
-    ready: &Ready,
-    output: &Output,
-    summary: &mut Summary,
-) -> anyhow::Result<()> {
-    if ready.completed {
-        return Ok(());
-    }
-    let stem = match outputs.as_mut().map(|outputs| outputs.stem(&ready.name)) {
-        None => ready.file.with_extension(""),
-        Some(Ok(stem)) => stem,
-        Some(Err(clash)) => {
-            summary.fail();
-            let event = json!({"event": "error", "name": ready.name, "error": clash.to_string()});
-            return output.line(&event, || format!("{}: {clash}", ready.name));
+impl Watch<'_> {
+    /// Takes one touch as far as it goes now.
+    fn touch(&mut self, ready: &Ready) -> anyhow::Result<()> {
+        let Self { output, outputs, following, worker, summary } = self;
+        if ready.completed {
+            return Ok(());
         }
-    };
-    let source = Source::new(&ready.file, ready.stamp);
-    let tool = worker.tool_name(following.entry(ready).and_then(|entry| entry.tool.clone()));
-    let labels = readable(following.labels(ready), output);
-    let recipe = worker.recipe(tool.as_deref(), &labels)?;
-    if write::is_done(&stem, &source, &recipe) {
-        summary.skip();
-        return output.line(&json!({"event": "skipped", "name": ready.name}), || {
-            format!("{}: was done with the same recipe", ready.name)
-        });
-    }
-    let found = SystemTime::now();
-    let start = Instant::now();
-    let problem = match following.read(ready) {
-        Arrival::Unfinished => return Ok(()),
-        Arrival::Gone => {
-            return output.line(&json!({"event": "gone", "name": ready.name}), || format!("{}: is gone", ready.name));
+        let stem = match outputs.as_mut().map(|outputs| outputs.stem(&ready.name)) {
+            None => ready.file.with_extension(""),
+            Some(Ok(stem)) => stem,
+            Some(Err(clash)) => {
+                summary.failed += 1;
+                let event = json!({"event": "error", "name": ready.name, "error": clash.to_string()});
+                return output.line(&event, || format!("{}: {clash}", ready.name));
+            }
+        };
+        let source = Source::new(&ready.file, ready.stamp);
+        let tool = worker.tool_name(following.entry(ready).and_then(|entry| entry.tool.clone()));
+        let labels = readable(following.labels(ready), output);
+        let recipe = worker.recipe(tool.as_deref(), &labels)?;
+        if files::is_done(&stem, &source, &recipe) {
+            summary.skipped += 1;
+            return output.line(&json!({"event": "skipped", "name": ready.name}), || {
+                format!("{}: was done with the same recipe", ready.name)
+            });
         }
-        Arrival::Broken(problem) => problem,
-        Arrival::Whole(loaded) => {
-            let Some(dataset) = following.dataset().cloned() else { return Ok(()) };
-            let (sample, read) = (&loaded.sample, Instant::now());
+        let begun = (SystemTime::now(), Instant::now());
+        let (Some(read), Some(dataset)) = (following.read(ready), following.dataset()) else { return Ok(()) };
+        let done = read.and_then(|sample| {
             let work = || {
-                let tool = worker.tool_of(&dataset, sample, tool.as_deref());
-                let model = tool.as_ref().map(|tool| &*tool.model);
-                let touch = Touch { dataset: &dataset, pair: ready.id, sample, tool: model, labels: &labels };
-                let tool = tool.as_ref().map(|tool| &*tool.name).ok();
-                let arrived =
-                    Arrived { ready, tool, found, start, read, stem: &stem, source: &source, recipe: &recipe };
-                worker.work(touch, arrived)
+                let tool = worker.tool_of(dataset, &sample, tool.as_deref());
+                let model = tool.as_ref().map(|(_, model)| &**model);
+                let touch = Touch { dataset, pair: ready.id, sample: &sample, tool: model, labels: &labels };
+                let tool = tool.as_ref().ok().map(|(name, _)| name.as_str());
+                worker.work(touch, Arrived { ready, tool, begun, stem: &stem, source: &source, recipe: &recipe })
             };
-            match guarded(vec![ready.file.clone()], work) {
-                Ok(Some(done)) => return report(output, &done, summary),
-                // Ctrl-C.
-                Ok(None) => return Ok(()),
-                Err(err) => {
-                    if err.is::<Bug>() {
-                        worker.recover();
-                    }
-                    Problem {
-                        file: ready.file.clone(),
-                        what: says(&err),
-                        hint: "touch the file to have it tried again".into(),
-                    }
+            guarded(vec![ready.file.clone()], work).map_err(|err| {
+                if err.is::<Bug>() {
+                    worker.recover();
                 }
+                let hint = "touch the file to have it tried again".into();
+                Problem { file: ready.file.clone(), what: says(&err), hint }
+            })
+        });
+        match done {
+            Ok(Some(done)) => report(output, &done, summary),
+            // Ctrl-C.
+            Ok(None) => Ok(()),
+            Err(problem) => {
+                summary.failed += 1;
+                if let Err(err) = files::failure(&stem, &source, &recipe, &problem) {
+                    output.note(&format!("{}: {}", ready.name, says(&err)));
+                }
+                let Problem { what, hint, .. } = problem;
+                let event = json!({"event": "error", "name": ready.name, "error": what, "hint": hint});
+                output.line(&event, || format!("{}: {what} ({hint})", ready.name))
             }
         }
-    };
-    summary.fail();
-    if let Err(err) = write::failure(&stem, &source, &recipe, &problem) {
-        output.note(&format!("{}: {}", ready.name, says(&err)));
     }
-    let event = json!({"event": "error", "name": ready.name, "error": problem.what, "hint": problem.hint});
-    output.line(&event, || format!("{}: {} ({})", ready.name, problem.what, problem.hint))
 }
 
 fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result<()> {
-    summary.add(&done.latency, done.fresh);
+    if done.fresh { &mut summary.fresh } else { &mut summary.backlog }.push(done.latency);
     for note in &done.notes {
         output.note(&super::notes::line(note));
     }
@@ -272,4 +201,84 @@ fn report(output: &Output, done: &Done, summary: &mut Summary) -> anyhow::Result
         event.extend(rest);
     }
     output.line(&event, || done.text())
+}
+
+/// Counts and times of a run.
+#[derive(Debug, Default)]
+struct Summary {
+    fresh: Vec<Latency>,
+    backlog: Vec<Latency>,
+    skipped: usize,
+    failed: usize,
+}
+
+/// Times of one touch, milliseconds.
+#[derive(Debug, Clone, Copy, Default, serde::Serialize)]
+struct Latency {
+    /// From its being found whole to meters: reading and the generator, both fingers.
+    generate: f64,
+    /// From its being found whole to the result on the disk.
+    work: f64,
+    /// From the file's last change to the result on the disk.
+    total: f64,
+}
+
+/// Median, 95th percentile and largest of a time.
+fn spread(times: impl Iterator<Item = f64>) -> Option<[f64; 3]> {
+    let mut times: Vec<f64> = times.collect();
+    times.sort_by(f64::total_cmp);
+    let last = times.len().checked_sub(1)?;
+    // Nearest rank: a time that was measured, not one in between.
+    let rank = |share: f64| times[((share * times.len() as f64).ceil() as usize).clamp(1, times.len()) - 1];
+    Some([rank(0.5), rank(0.95), times[last]])
+}
+
+impl Summary {
+    fn json(&self) -> serde_json::Value {
+        let times = |list: &[Latency]| {
+            let of = |get: fn(&Latency) -> f64| {
+                spread(list.iter().map(get)).map(|[median, p95, max]| json!({"median": median, "p95": p95, "max": max}))
+            };
+            json!({
+                "touches": list.len(), "generate": of(|l| l.generate), "work": of(|l| l.work), "total": of(|l| l.total),
+            })
+        };
+        json!({
+            "event": "summary", "done": self.fresh.len() + self.backlog.len(), "skipped": self.skipped,
+            "failed": self.failed, "latency_ms": times(&self.fresh), "existing_ms": times(&self.backlog),
+        })
+    }
+
+    fn text(&self) -> String {
+        let (fresh, backlog) = (&self.fresh, &self.backlog);
+        let mut text =
+            format!("{} done, {} skipped, {} failed", fresh.len() + backlog.len(), self.skipped, self.failed);
+        if let Some([median, p95, max]) = spread(fresh.iter().map(|l| l.total)) {
+            text += &format!(
+                "\nlatency, file closed to result written, {} touches: median {median:.0} ms, p95 {p95:.0} ms, worst {max:.0} ms",
+                fresh.len()
+            );
+        }
+        // Touches that lay there before have no latency that means something.
+        if let Some([median, p95, _]) = spread(backlog.iter().map(|l| l.work)) {
+            text += &format!(
+                "\nwork on {} touches that lay there: median {median:.0} ms, p95 {p95:.0} ms each",
+                backlog.len()
+            );
+        }
+        text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spread;
+
+    #[test]
+    fn percentiles_are_times_that_were_measured() {
+        assert_eq!(spread(std::iter::empty()), None);
+        assert_eq!(spread([7.0].into_iter()), Some([7.0; 3]));
+        assert_eq!(spread((1..=100).rev().map(f64::from)), Some([50.0, 95.0, 100.0]));
+        assert_eq!(spread((1..=20).map(f64::from)), Some([10.0, 19.0, 20.0]));
+    }
 }

@@ -125,7 +125,7 @@ impl Both {
         let mut out = false;
         let placed = words.into_iter().skip(1).map(|word| {
             let placed = if std::mem::replace(&mut out, word == "--out") { self.at(&word) } else { word };
-            if placed == "statistics.json" { self.at(&placed) } else { placed }
+            if placed == "refit:statistics.json" { format!("refit:{}", self.at("statistics.json")) } else { placed }
         });
         placed.collect()
     }

@@ -72,7 +72,6 @@ fn held(verb: &str) -> Option<Held> {
             files::the_unit_of_a_cad_model_is_written_the_same_by_button_and_verb,
         ]),
         "bundle check" => Not("it looks at one model's files and computes nothing of a touch"),
-        "cache" => Not("it counts and removes what can be made again"),
         "runtime" => Not("it says which engine is there"),
         _ => return None,
     })

@@ -153,7 +153,7 @@ fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
     for (words, nearest) in [
         (&["generat"][..], "`touch2touch generate`"),
         (&["Pose"], "`touch2touch pose`"),
-        (&["evalute", "--input", "demo"], "`touch2touch evaluate`"),
+        (&["evalute", "demo"], "`touch2touch evaluate`"),
         (&["/no/such/folder"], "--help"),
         (&["--reset-ui", "docter"], "`touch2touch doctor`"),
     ] {
@@ -167,7 +167,7 @@ fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
 }
 
 #[test]
-fn every_verb_takes_the_dataset_as_a_path_or_as_input_and_no_number_of_nothing() {
+fn every_verb_takes_the_dataset_as_a_path_and_no_number_of_nothing() {
     let verbs = ["generate", "stats", "evaluate", "pose", "masks export", "doctor", "watch"];
     for verb in verbs {
         let needed: &[&str] = match verb {
@@ -179,8 +179,8 @@ fn every_verb_takes_the_dataset_as_a_path_or_as_input_and_no_number_of_nothing()
             touch2touch::headless::check_command(words.chain(needed.iter().copied()))
         };
         check(&["demo"]).unwrap_or_else(|err| panic!("{verb}: {err}"));
-        check(&["--input", "demo"]).unwrap_or_else(|err| panic!("{verb}: {err}"));
-        assert!(check(&["demo", "--input", "demo"]).is_err() && check(&[]).is_err(), "{verb}");
+        check(&["demo"]).unwrap_or_else(|err| panic!("{verb}: {err}"));
+        assert!(check(&["demo", "demo"]).is_err() && check(&[]).is_err(), "{verb}");
     }
     for words in [
         "generate demo --out x --limit 0",
@@ -202,7 +202,7 @@ fn what_the_system_says_is_said_once() {
     let said = error_text(&refused);
     assert_eq!(said.matches("os error 2").count(), 1, "{said}");
     let file = dir.path().join("none.json");
-    let args = ["stats", "demo", "--out", file.to_str().unwrap(), "--shift", "refit", "--stats", "/no/such/file"];
+    let args = ["stats", "demo", "--out", file.to_str().unwrap(), "--shift", "refit:/no/such/file"];
     let said = error_text(&run(&args, dir.path()));
     assert!(said.matches("os error 2").count() <= 1, "{said}");
 }

@@ -12,7 +12,7 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     let dir = tempfile::tempdir().unwrap();
     let file = dir.path().join("stats.json");
     let path = file.to_str().unwrap();
-    let stats = ["stats", "--input", "demo", "--limit", "3", "--out", path, "--json"];
+    let stats = ["stats", "demo", "--limit", "3", "--out", path, "--json"];
     let done = run(&[&stats[..], &QUICK].concat(), dir.path());
     assert!(done.status.success(), "{}", error_text(&done));
     let report = json(&done);
@@ -24,8 +24,8 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     assert_eq!(stored["stats"], report["stats"]);
 
     let out = dir.path().join("out");
-    let generate = ["generate", "--input", "demo", "--limit", "1", "--out", out.to_str().unwrap(), "--json"];
-    let refit = ["--shift", "refit", "--stats", path];
+    let generate = ["generate", "demo", "--limit", "1", "--out", out.to_str().unwrap(), "--json"];
+    let refit = ["--shift", &format!("refit:{path}")];
     let done = run(&[&generate[..], &QUICK, &refit].concat(), dir.path());
     assert!(done.status.success(), "{}", error_text(&done));
     let pair = &json(&done)["pairs"][0];

@@ -56,7 +56,7 @@ struct Watch {
 impl Watch {
     fn start(folder: &Path, data: &Path, more: &[&str]) -> Self {
         let mut child = Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-            .args(["watch", folder.to_str().unwrap(), "--steps", "2", "--patience", "2", "--json"])
+            .args(["watch", folder.to_str().unwrap(), "--steps", "2", "--json"])
             .args(more)
             .env("TOUCH2TOUCH_DATA", data)
             .env("XDG_DATA_HOME", data)
@@ -116,10 +116,9 @@ fn touches_are_posed_as_they_arrive_and_damaged_ones_do_not_stop_it() {
     let (set, files) = set(dir.path());
     let folder = dir.path().join("robot");
     std::fs::create_dir(&folder).unwrap();
-    let camera = bubble(&files[0]);
+    std::fs::copy(bubble(&files[0]), folder.join("rig.pt")).unwrap();
     let stl = set.join("tools_stls/pattern_36.stl");
-    let watch =
-        Watch::start(&folder, dir.path(), &["--tool", stl.to_str().unwrap(), "--camera", camera.to_str().unwrap()]);
+    let watch = Watch::start(&folder, dir.path(), &["--tool", stl.to_str().unwrap()]);
 
     // Written slowly: nothing happens before the last byte.
     let slow = folder.join("grasp_1.pt");
@@ -175,11 +174,7 @@ fn touches_are_posed_as_they_arrive_and_damaged_ones_do_not_stop_it() {
     assert!(left.is_empty(), "{left:?}");
 
     // Started again, it takes up nothing: what lies there was done, and its own files are no touches.
-    let mut again = Watch::start(
-        &folder,
-        dir.path(),
-        &["--tool", stl.to_str().unwrap(), "--camera", camera.to_str().unwrap(), "--once"],
-    );
+    let mut again = Watch::start(&folder, dir.path(), &["--tool", stl.to_str().unwrap(), "--once"]);
     let events: Vec<Value> = std::iter::from_fn(|| again.lines.recv_timeout(Duration::from_secs(60)).ok()).collect();
     assert!(again.child.wait().unwrap().success());
     assert_eq!(events.len(), 4, "{events:#?}");
@@ -199,15 +194,14 @@ fn without_tool_or_camera_it_says_so_and_existing_files_are_taken_once() {
     let out = dir.path().join("out");
     let args = ["watch", folder.to_str().unwrap(), "--once", "--steps", "1", "--out", out.to_str().unwrap()];
     let start = Instant::now();
-    let done = run(&[&args[..], &["--save", "pt,npz"]].concat(), dir.path());
+    let done = run(&args, dir.path());
     assert!(done.status.success(), "{}", error_text(&done));
     let text = String::from_utf8_lossy(&done.stdout).into_owned();
     assert!(text.contains("2 done, 0 skipped, 0 failed"), "{text}");
     let read = |name: &str| -> Value { serde_json::from_slice(&std::fs::read(out.join(name)).unwrap()).unwrap() };
     assert!(read("a_1.t2t.json")["no_pose"].as_str().unwrap().contains("--tool"));
-    assert!(read("pattern_36_data_2.t2t.json")["no_pose"].as_str().unwrap().contains("--camera"));
-    let dict = touch2touch_pipeline::io::pt::read_dict(&out.join("a_1.t2t.pt")).unwrap();
-    assert_eq!(dict.shape("prediction").unwrap(), [2, 1, 140, 175]);
+    assert!(read("pattern_36_data_2.t2t.json")["no_pose"].as_str().unwrap().contains("rig.pt"));
+    assert_eq!(npz::read(&out.join("a_1.t2t.npz")).unwrap()["imprint_right"].shape, [140, 175]);
     eprintln!("two touches once: {:.1} s with loading", start.elapsed().as_secs_f64());
     // Another recipe is another result.
     let other = run(&[&args[..4], &["2"], &args[5..]].concat(), dir.path());
@@ -227,7 +221,7 @@ fn a_foreign_file_neither_hides_touches_nor_goes_unsaid() {
     let (_, files) = set(dir.path());
     let folder = dir.path().join("robot");
     std::fs::create_dir(&folder).unwrap();
-    let watch = Watch::start(&folder, dir.path(), &["--save", "npz"]);
+    let watch = Watch::start(&folder, dir.path(), &[]);
     std::fs::copy(&files[0], folder.join("grasp_1.pt")).unwrap();
     assert_eq!(watch.next()["name"], "grasp_1");
     std::fs::copy(bubble(&files[0]), folder.join("calibration.pt")).unwrap();
@@ -277,7 +271,7 @@ fn a_foreign_file_that_was_there_first_hides_nothing() {
     std::fs::create_dir(&folder).unwrap();
     std::fs::copy(bubble(&files[0]), folder.join("calibration.pt")).unwrap();
     std::fs::copy(&files[0], folder.join("grasp_1.pt")).unwrap();
-    let done = run(&["watch", folder.to_str().unwrap(), "--once", "--steps", "1", "--save", "npz"], dir.path());
+    let done = run(&["watch", folder.to_str().unwrap(), "--once", "--steps", "1"], dir.path());
     let text = String::from_utf8_lossy(&done.stdout).into_owned();
     assert_eq!(done.status.code(), Some(1), "{text}");
     assert!(text.contains("1 done, 0 skipped, 1 failed") && text.contains("calibration"), "{text}");

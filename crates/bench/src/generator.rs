@@ -59,7 +59,7 @@ pub(super) struct GeneratorArgs {
     #[arg(long, value_delimiter = ',')]
     samplers: Vec<Sampler>,
     /// Spacings to try, separated by commas: trailing, lab.
-    #[arg(long, value_delimiter = ',', value_parser = spacing, default_value = "trailing")]
+    #[arg(long, value_delimiter = ',', default_value = "trailing")]
     spacings: Vec<Spacing>,
     /// Only this engine, by its name for `--runtime`. Without it, all that are found; all but the first on a quarter of the
     /// grasps.
@@ -78,14 +78,6 @@ enum Tools {
     All,
     Seen,
     Unseen,
-}
-
-fn spacing(text: &str) -> Result<Spacing, String> {
-    match text {
-        "trailing" => Ok(Spacing::Trailing),
-        "lab" => Ok(Spacing::Lab),
-        _ => Err("the spacings are trailing and lab".into()),
-    }
 }
 
 /// One way to generate.

@@ -142,7 +142,7 @@ impl Doubt {
     }
 
     fn stored(read_as: ReadAs, figures: &str) -> Self {
-        let hint = format!("correct what writes the files, or read them so with --read-as {read_as}");
+        let hint = format!("correct what writes the files, or have them read so with `doctor --set read-as={read_as}`");
         Self::new(Cause::Stored(read_as), format!("{}: {figures}", read_as.mistake()), &hint)
     }
 }

@@ -13,7 +13,7 @@ use strum::IntoStaticStr;
 pub use cure::Cure;
 pub use examined::{Examined, examined};
 pub use facts::facts;
-pub use worth::{SAMPLE, Worth, WorthSetup, worth};
+pub use worth::{SAMPLE, Worth, worth};
 
 /// Subject of a fact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, IntoStaticStr)]

@@ -68,7 +68,7 @@ pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Genera
     doubts
 }
 
-/// Reading of the data set that removes the doubts if they are true, as `--read-as` takes it; `None` where no reading
+/// Reading of the data set that removes the doubts if they are true, as `doctor --set read-as=` takes it; `None` where no reading
 /// helps.
 pub fn remedy(dataset: &Dataset, doubts: &[Doubt]) -> Option<String> {
     let mut readings = doubts.iter().filter_map(Doubt::read_as).peekable();
@@ -102,8 +102,7 @@ pub fn problems(dataset: &Dataset, doubts: &[Doubt]) -> Vec<Problem> {
                 format!("read them as they are stored: `touch2touch doctor {} --set read-as=`", file.display())
             }
             Some(_) => format!(
-                "correct what writes the files, or have them read so: `touch2touch doctor {} --set read-as={remedy}`; --read-as {remedy} \
-                 tries it for one run",
+                "correct what writes the files, or have them read so: `touch2touch doctor {} --set read-as={remedy}`",
                 file.display(),
             ),
             None => doubt.hint.clone(),

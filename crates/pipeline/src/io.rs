@@ -11,7 +11,6 @@ pub mod doctor;
 pub mod exchange;
 pub mod files;
 pub mod folders;
-pub mod follow;
 pub mod fonts;
 pub mod home;
 pub mod images;

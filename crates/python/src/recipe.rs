@@ -148,7 +148,6 @@ impl Recipe {
         let mut left = Left(named.copy()?);
         let imprint = [ImprintSource::Measured, ImprintSource::Predicted].map(|source| (source.key(), source));
         let imprint = left.one_of("imprint", imprint)?.unwrap_or_default();
-        let spacings = [("trailing", Spacing::Trailing), ("lab", Spacing::Lab)];
         let generator = GeneratorChoice {
             bundle: left.take("bundle")?,
             preset: left.one_of("preset", Preset::iter().map(|preset| (preset.key(), preset)))?.unwrap_or_default(),
@@ -156,7 +155,7 @@ impl Recipe {
             seed: left.take("seed")?,
             eta: left.take("eta")?,
             sampler: left.one_of("sampler", Sampler::iter().map(|sampler| (sampler.into(), sampler)))?,
-            spacing: left.one_of("spacing", spacings)?,
+            spacing: left.one_of("spacing", Spacing::iter().map(|spacing| (spacing.into(), spacing)))?,
             guidance: left.take("guidance")?,
             shift: left.shift()?,
         };

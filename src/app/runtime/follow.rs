@@ -12,7 +12,6 @@ use super::{JobId, Runtime, Wake};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::follow::{FollowEvent, Following};
 use touch2touch_pipeline::io::caught::caught;
-use touch2touch_pipeline::io::follow::Arrival;
 use touch2touch_pipeline::job::Cancel;
 
 /// A followed folder.
@@ -85,12 +84,9 @@ fn followed(source: &dyn DataSource, following: &mut Following, event: FollowEve
         }
         FollowEvent::Recovered => return None,
     };
-    let sample = match following.read(&ready) {
-        Arrival::Unfinished | Arrival::Gone => return None,
-        Arrival::Broken(problem) => {
-            Err(TaskError::new(format!("Load {}", ready.name), problem.what).with_hint(problem.hint))
-        }
-        Arrival::Whole(loaded) => Ok(Arc::new(loaded.sample)),
-    };
+    let sample = following
+        .read(&ready)?
+        .map(Arc::new)
+        .map_err(|problem| TaskError::new(format!("Load {}", ready.name), problem.what).with_hint(problem.hint));
     Some(Followed { source: source.grown(following.dataset()?)?, pair: ready.id, completed: ready.completed, sample })
 }

@@ -5,8 +5,9 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-use super::super::args::{DatasetArgs, Readings, parse_readings};
+use super::super::args::DatasetArgs;
 use super::super::{Common, Output, VerbResult};
+use touch2touch_core::read_as::{ReadAs, parse_list};
 use touch2touch_pipeline::doubts::read_otherwise;
 use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
 use touch2touch_pipeline::steps::tool::{set_unit, units_of};
@@ -15,7 +16,7 @@ use touch2touch_pipeline::steps::tool::{set_unit, units_of};
 #[derive(Debug, Clone)]
 pub(super) enum Setting {
     /// Readings other than as it is stored; none: as it is stored.
-    ReadAs(Readings),
+    ReadAs(Vec<ReadAs>),
     /// The unit of a tool's CAD model.
     Unit { tool: String, unit: ToolUnit },
 }
@@ -26,7 +27,7 @@ impl FromStr for Setting {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let named = text.split_once('=').map(|(name, value)| (name, name.strip_prefix("unit:"), value));
         match named {
-            Some(("read-as", _, list)) => parse_readings(list).map(Self::ReadAs),
+            Some(("read-as", _, list)) => parse_list(list).map(Self::ReadAs),
             Some((_, Some(tool), unit)) => Ok(Self::Unit { tool: tool.to_owned(), unit: unit.parse()? }),
             _ => Err("say read-as=LIST, such as read-as=swap-fingers, or unit:TOOL=UNIT, such as unit:cup=mm".into()),
         }
@@ -47,7 +48,7 @@ struct Said {
 impl Setting {
     fn say(&self, dataset: &Dataset) -> anyhow::Result<Said> {
         match self {
-            Self::ReadAs(Readings(read_as)) => {
+            Self::ReadAs(read_as) => {
                 let file = Some(read_otherwise(dataset, read_as)?).filter(|_| !read_as.is_empty());
                 let keys: Vec<String> = read_as.iter().map(ToString::to_string).collect();
                 let because = read_as.iter().map(|reading| reading.mistake()).collect();

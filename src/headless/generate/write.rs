@@ -10,9 +10,7 @@ use touch2touch_pipeline::io::names::with_ending;
 /// -20 mm) for people.
 pub(super) fn write(stem: &Path, imprint: &DepthMap) -> anyhow::Result<()> {
     touch2touch_pipeline::io::npz::write_npy(&with_ending(stem, ".npy"), imprint)?;
-    let picture = imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16);
-    images::write_gray16(&with_ending(stem, ".png"), &picture)?;
-    Ok(())
+    Ok(images::write_depth16(&with_ending(stem, ".png"), imprint)?)
 }
 
 /// Writes `STEM.png`: the difference of a color sensor's images around the middle gray, in its raw orientation;

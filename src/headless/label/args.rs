@@ -45,8 +45,8 @@ pub(in super::super) struct LabelArgs {
     /// Take the mask of this imprint over to that of `--imprint`.
     #[arg(long, value_name = "IMPRINT", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ImprintSource>())]
     pub(super) from: Option<ImprintSource>,
-    /// Propose a mask and accept it: what was painted by hand stays, unless `--over-drawn`. Distances to the CAD model
-    /// are those of `--cad-mm`.
+    /// Propose a mask and accept it: what was painted by hand stays, unless `--over-drawn`. Numbers of it
+    /// are those of `--mask`, such as `--mask cad:mm=1`.
     #[arg(long, value_name = "SOURCE", requires = "pair", conflicts_with_all = ["adopt", "from", "remove_mask"], value_parser = keyed::<ProposalSource>())]
     pub(super) propose: Option<ProposalSource>,
     /// Let the proposal replace what was painted by hand as well.

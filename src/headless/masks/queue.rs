@@ -7,8 +7,8 @@ use serde::Serialize;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
-use super::super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
-use super::super::{Common, Output, ToolArgs, VerbResult, cache};
+use super::super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model, kept};
+use super::super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::infer::bundle::{Bundle, find_all};
@@ -81,7 +81,7 @@ fn setup(args: &QueueArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
 pub(super) fn run(args: &QueueArgs) -> VerbResult {
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;
     let output = Output::new(args.common, "ranking", 0);
-    let models = Models::new(if args.no_cache { None } else { cache::store() });
+    let models = Models::new(if args.no_cache { None } else { kept() });
     let (found, evaluation) = queue(&dataset, &setup(args, &dataset)?, &models, &output.job())?;
     for skipped in &evaluation.skipped {
         output.note(&format!("{}: {}", skipped.what, skipped.why));

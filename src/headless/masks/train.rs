@@ -7,8 +7,8 @@ use std::time::Duration;
 use clap::Args;
 
 use super::super::args::{DatasetArgs, RegistrationParser, keyed, parse_minutes};
-use super::super::recipe::RuntimeArg;
-use super::super::{Common, Output, VerbResult, cache};
+use super::super::recipe::{RuntimeArg, kept};
+use super::super::{Common, Output, VerbResult};
 use touch2touch_core::pose::Registration;
 use touch2touch_core::units::counted;
 use touch2touch_pipeline::export::DrawnMasks;
@@ -123,7 +123,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
         unfinished: if args.no_cache { None } else { unfinished_folder() },
         out,
     };
-    let models = Models::new(if args.no_cache { None } else { cache::store() });
+    let models = Models::new(if args.no_cache { None } else { kept() });
     let trained = train(&dataset, &masks, &setup, &models, &output.job())?;
     for remark in &trained.unusable {
         output.note(&format!("left out: {}: {}", remark.name, remark.why));

@@ -1,37 +1,40 @@
-//! One touch: prediction, masks, pose, files.
+//! One touch: prediction, masks, pose, files, and the result as it is written and said.
 
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::Path;
 use std::sync::Arc;
 use std::time::{Instant, SystemTime};
 
-use serde_json::Value;
+use serde::Serialize;
+use serde_json::{Value, json};
 
 use super::super::output::says;
 use super::super::recipe::{misgiving, warm_up};
-use super::done::{Done, PoseMetrics, figures};
-use super::summary::Latency;
-use super::{Source, WatchArgs, recipe, write};
+use super::{Latency, Source, WatchArgs, files};
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::dataset::Problem;
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::pose::ToolModel;
-use touch2touch_core::rig::{PadId, Rig};
+use touch2touch_core::postprocess::{ShiftMode, Stats};
+use touch2touch_core::rig::{PadId, Rig, Text};
 use touch2touch_core::sample::Sample;
+use touch2touch_core::verdict::Verdict;
 use touch2touch_pipeline::compare;
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::follow::Ready;
+use touch2touch_pipeline::infer::engine::resolve;
 use touch2touch_pipeline::io::dataset::{Dataset, read_in_meters};
-use touch2touch_pipeline::io::follow::Ready;
 use touch2touch_pipeline::job::{Cancel, JobCx};
 use touch2touch_pipeline::labels::{ImprintSource, PairLabels};
 use touch2touch_pipeline::steps::estimate::{Touch, estimate};
+use touch2touch_pipeline::steps::mask::Contact;
 use touch2touch_pipeline::steps::models::Models;
 use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::prediction::Prediction;
 use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::{load_tool, named_tool};
-
-/// The tool of a touch.
-pub(super) struct HeldTool {
-    pub(super) name: String,
-    pub(super) model: Arc<ToolModel>,
-}
 
 /// A touch that arrived, with what its result is called and depends on.
 #[derive(Clone, Copy)]
@@ -39,11 +42,8 @@ pub(super) struct Arrived<'a> {
     pub(super) ready: &'a Ready,
     /// The name of its tool, where it has a CAD model.
     pub(super) tool: Option<&'a str>,
-    /// When it was found whole.
-    pub(super) found: SystemTime,
-    /// When its reading began, and ended.
-    pub(super) start: Instant,
-    pub(super) read: Instant,
+    /// When it was found whole: the time of day, and the clock's.
+    pub(super) begun: (SystemTime, Instant),
     /// Path of its results, without an ending.
     pub(super) stem: &'a Path,
     pub(super) source: &'a Source,
@@ -64,11 +64,7 @@ pub(super) struct Worker<'a> {
 impl<'a> Worker<'a> {
     /// Loads the models and runs them once, so that the first touch does not wait for memory and kernels.
     pub(super) fn new(args: &'a WatchArgs, rig: &Rig, stop: Cancel) -> anyhow::Result<Self> {
-        let registration = match args.registration.0.as_slice() {
-            [registration] => *registration,
-            _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
-        };
-        let recipe = args.model.posed(ImprintSource::Predicted, rig, &args.mask, registration)?;
+        let recipe = args.model.posed(ImprintSource::Predicted, rig, &args.mask, args.registration.one()?)?;
         let (models, start) = (args.model.models(), Instant::now());
         warm_up(&recipe, &models)?;
         let warm_s = start.elapsed().as_secs_f64();
@@ -87,20 +83,15 @@ impl<'a> Worker<'a> {
 
     /// Everything the result depends on besides the touch.
     pub(super) fn recipe(&self, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
-        recipe::told(self.args, &self.recipe, tool, labels)
+        told(&self.recipe, tool, labels)
     }
 
     /// Predicts, poses and writes. `None` if the run was told to stop meanwhile.
     pub(super) fn work(&self, touch: Touch<'_>, arrived: Arrived<'_>) -> anyhow::Result<Option<Done>> {
-        let Arrived { ready, tool, found, start, read, stem, source, recipe } = arrived;
+        let Arrived { ready, tool, begun: (found, start), stem, source, recipe } = arrived;
         let sample = touch.sample;
-        let since = |earlier: SystemTime, later: SystemTime| {
-            later.duration_since(earlier).map_or(0.0, |d| d.as_secs_f64() * 1e3)
-        };
-        let ms = |from: Instant| from.elapsed().as_secs_f64() * 1e3;
-        let load = (read - start).as_secs_f64() * 1e3;
-        let mut latency = Latency { found: since(ready.stamp.closed, found), load, ..Latency::default() };
-
+        let ms = || start.elapsed().as_secs_f64() * 1e3;
+        let waited = found.duration_since(ready.stamp.closed).map_or(0.0, |waited| waited.as_secs_f64() * 1e3);
         let cx = JobCx::new(self.stop.clone(), Arc::new(|_| {}));
         let estimate = match estimate(touch, &self.recipe, Stage::Imprint, &self.models, &cx) {
             Err(_) if self.stop.is_cancelled() => return Ok(None),
@@ -109,11 +100,7 @@ impl<'a> Worker<'a> {
             }
             estimate => estimate?,
         };
-        latency.generate = ms(read);
-        let step = Instant::now();
-        let estimate = estimate.reach(touch, Stage::Mask, &self.models, &cx)?;
-        latency.mask = ms(step);
-        let step = Instant::now();
+        let generate = ms();
         let estimate = estimate.reach(touch, Stage::Pose, &self.models, &cx)?;
         // Without a tool, that is the reason, whatever else is missing.
         let (pose, no_pose) = match (tool, touch.tool.and(estimate.pose())) {
@@ -122,14 +109,10 @@ impl<'a> Worker<'a> {
             (None, Ok(_)) => (None, None),
         };
         let (contact, shift) = (estimate.contact(), self.recipe.shift);
-        latency.pose = ms(step);
-
-        let step = Instant::now();
-        let files = write::predictions(stem, &sample.rig, contact, &self.args.save)?;
-        latency.write = ms(step);
-        latency.total = since(ready.stamp.closed, SystemTime::now());
+        let files = files::predictions(stem, &sample.rig, contact)?;
         let tile = compare::tile_of(touch.dataset, touch.pair, sample)?;
         let drawn = |pad: PadId| Some((estimate.predictions[pad].as_ref()?, shift));
+        let latency = || Latency { generate, work: ms(), total: waited + ms() };
         let mut done = Done {
             name: ready.name.clone(),
             source: source.clone(),
@@ -145,13 +128,12 @@ impl<'a> Worker<'a> {
                 .collect(),
             pose,
             no_pose,
-            latency,
+            latency: latency(),
             error: None,
             fresh: ready.fresh,
         };
-        write::result(stem, &done)?;
-        done.latency.write = ms(step);
-        done.latency.total = since(ready.stamp.closed, SystemTime::now());
+        files::result(stem, &done)?;
+        done.latency = latency();
         Ok(Some(done))
     }
 
@@ -161,19 +143,153 @@ impl<'a> Worker<'a> {
         dataset: &Dataset,
         sample: &Sample,
         name: Option<&str>,
-    ) -> Result<HeldTool, TaskError> {
+    ) -> Result<(String, Arc<ToolModel>), TaskError> {
         let fail = |why: String| TaskError::new("Pose", why);
         let name = name.ok_or_else(|| fail("the file's name says no tool; name it with --tool".into()))?;
         if sample.pads.iter().flatten().all(|touch| touch.camera().is_none()) {
-            return Err(fail("no bubble camera is known; name a bubble file of the rig with --camera".into()));
+            return Err(fail(
+                "no bubble camera is known; put a bubble file of the rig into the folder as rig.pt".into(),
+            ));
         }
-        if !self.tools.contains_key(name) {
-            let model = tool_model(dataset, name, self.args).map_err(|err| fail(says(&err)))?;
-            self.tools.insert(name.to_owned(), Arc::new(model));
-        }
-        let model = self.tools.get(name).ok_or_else(|| fail(format!("no CAD model of {name}")))?;
-        Ok(HeldTool { name: name.to_owned(), model: model.clone() })
+        let model = match self.tools.get(name) {
+            Some(model) => model.clone(),
+            None => {
+                let model = Arc::new(tool_model(dataset, name).map_err(|err| fail(says(&err)))?);
+                self.tools.insert(name.to_owned(), model.clone());
+                model
+            }
+        };
+        Ok((name.to_owned(), model))
     }
+}
+
+/// Everything the result depends on besides the touch.
+fn told(recipe: &Recipe, tool: Option<&str>, labels: &PairLabels) -> anyhow::Result<Value> {
+    let generating = recipe.generating()?;
+    let (bundle, config) = (generating.bundle, generating.config);
+    let model = recipe.mask_model.as_ref().map(|model| &model.id);
+    let drawn: Vec<(String, String)> = labels
+        .masks
+        .iter()
+        .filter(|_| recipe.hand)
+        .map(|(place, hand)| (format!("{place:?}"), digest(&hand.mask)))
+        .collect();
+    let mask = json!({"choice": recipe.mask, "model": model.map(|id| &**id), "drawn": drawn});
+    Ok(json!({
+        "id": recipe.id(Stage::Pose),
+        "bundle": bundle.name, "bundle_hash": *bundle.id, "runtime": resolve(recipe.engine)?,
+        "sampler": config.sampler, "steps": config.steps, "seed": config.seed, "eta": config.eta,
+        "spacing": config.spacing, "guidance": config.guidance, "shift": recipe.shift, "mask": mask,
+        "registration": recipe.registration, "tool": tool, "version": env!("CARGO_PKG_VERSION"),
+    }))
+}
+
+/// Tells one drawn mask from another.
+fn digest(mask: &Mask) -> String {
+    let mut hasher = DefaultHasher::new();
+    (mask.size(), mask.as_slice()).hash(&mut hasher);
+    format!("{:016x}", hasher.finish())
+}
+
+/// Metrics of one finger.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct FingerFigures {
+    pub(super) finger: Text,
+    pub(super) min_m: f64,
+    pub(super) max_m: f64,
+    pub(super) mean_m: f64,
+    pub(super) contact_px: Option<usize>,
+    /// Basis of the mask: the source's key, `depth` where the mask model found nothing, `flat` where there is no
+    /// contact.
+    pub(super) mask: &'static str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) psnr_db: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) ssim: Option<f64>,
+}
+
+/// A pose, in the lab's sense of the angle.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct PoseMetrics {
+    pub(super) tool: String,
+    pub(super) angle_deg: f64,
+    pub(super) y_m: f64,
+    pub(super) z_m: f64,
+    pub(super) grasp_from_object: PlanarPose,
+    /// Standard deviation of the angle, and the covariance of `grasp_from_object` (angle in radians, y and z in meters).
+    pub(super) angle_sd_deg: Option<f64>,
+    pub(super) covariance: Option<[[f64; 3]; 3]>,
+    /// Reliance that the pose deserves, without the truth.
+    pub(super) verdict: Option<Verdict>,
+    pub(super) rms_m: f64,
+    pub(super) points: usize,
+    pub(super) stop: String,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) truth_deg: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) error_deg: Option<f64>,
+}
+
+/// A result, as it is written and said.
+#[derive(Debug, Clone, Serialize)]
+pub(super) struct Done {
+    pub(super) name: String,
+    pub(super) source: Source,
+    pub(super) recipe: Value,
+    pub(super) files: Vec<String>,
+    /// Oddities of the touch's files.
+    pub(super) notes: Vec<Problem>,
+    pub(super) scale: &'static str,
+    pub(super) fingers: Vec<FingerFigures>,
+    /// Why masks are not made of the source that was asked.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) mask_notes: Vec<String>,
+    pub(super) pose: Option<PoseMetrics>,
+    /// Why there is no pose.
+    pub(super) no_pose: Option<String>,
+    /// Up to the writing of this very file; the event and the summary include it.
+    pub(super) latency: Latency,
+    pub(super) error: Option<String>,
+    #[serde(skip)]
+    pub(super) fresh: bool,
+}
+
+impl Done {
+    pub(super) fn text(&self) -> String {
+        let pose = match (&self.pose, &self.no_pose) {
+            (Some(p), _) => format!("{:.1} deg, y {:.2} mm, z {:.2} mm", p.angle_deg, p.y_m * 1e3, p.z_m * 1e3),
+            (None, Some(why)) => format!("no pose: {why}"),
+            (None, None) => "no pose".to_owned(),
+        };
+        let Latency { generate, total, .. } = self.latency;
+        let when = if self.fresh { format!("{total:.0} ms after it was closed") } else { "lay there".to_owned() };
+        format!("{}: {pose} ({when}; generator {generate:.0} ms)", self.name)
+    }
+}
+
+/// Numbers of one prediction, against the measurement where there is one.
+pub(super) fn figures(
+    sample: &Sample,
+    pad: PadId,
+    contact: &Contact,
+    drawn: Option<(&Prediction, ShiftMode)>,
+    tile: Option<&DepthMap>,
+) -> Option<FingerFigures> {
+    let imprint = contact.imprints[pad].as_ref()?;
+    let stats = Stats::of(imprint);
+    let compared = compare::of_pad(imprint, drawn, sample, pad, tile).ok().flatten();
+    let mask = contact.masks[pad].as_ref();
+    let count = |found: &ContactMask| found.mask.as_slice().iter().filter(|&&m| m).count();
+    Some(FingerFigures {
+        finger: sample.rig.pad_key(pad),
+        min_m: stats.min,
+        max_m: stats.max,
+        mean_m: stats.mean,
+        contact_px: mask.map(count),
+        mask: mask.map_or(contact.source().key(), |found| found.basis.key(contact.source().key())),
+        psnr_db: compared.as_ref().and_then(|c| c.psnr_db),
+        ssim: compared.as_ref().and_then(|c| c.ssim),
+    })
 }
 
 impl PoseMetrics {
@@ -198,9 +314,9 @@ impl PoseMetrics {
 }
 
 /// The CAD model of a tool: a file, one of the data set's, or one of the demo's.
-fn tool_model(dataset: &Dataset, name: &str, args: &WatchArgs) -> anyhow::Result<ToolModel> {
+fn tool_model(dataset: &Dataset, name: &str) -> anyhow::Result<ToolModel> {
     if Path::new(name).extension().is_some_and(|e| e.eq_ignore_ascii_case("stl")) {
-        let mesh = read_in_meters(Path::new(name), args.unit.tool_scale);
+        let mesh = read_in_meters(Path::new(name), None);
         let mesh = mesh.map_err(|err| anyhow::anyhow!("{err}: {}", err.hint()))?;
         return Ok(named_tool(name, mesh)?.model);
     }

@@ -11,8 +11,24 @@ pub struct Schedule {
 }
 
 /// Spacing of the training steps that a sampler visits.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Serialize,
+    Deserialize,
+    strum::EnumIter,
+    strum::EnumString,
+    strum::IntoStaticStr,
+)]
 #[serde(rename_all = "snake_case")]
+#[strum(serialize_all = "snake_case")]
 pub enum Spacing {
     /// The public latent-diffusion release's: `1, 1 + c, 1 + 2c, …` with `c = T / steps` rounded down. The last, noisiest
     /// steps of the training are left out, and the number of steps is `ceil(T / c)`, not always the one asked for.

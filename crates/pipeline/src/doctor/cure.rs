@@ -26,7 +26,7 @@ pub enum Cure {
         /// The unit that the file beside it says now.
         replacing: Option<String>,
     },
-    /// The data read otherwise than they are stored, as `--read-as` takes it; empty: as they are stored.
+    /// The data read otherwise than they are stored, as `doctor --set read-as=` takes it; empty: as they are stored.
     ReadAs {
         /// The readings, with commas.
         list: String,

@@ -2,7 +2,7 @@
 
 use std::ops::ControlFlow;
 
-use crate::doubts::{self, Generator, examine_reading};
+use crate::doubts::{self, Generator, PAIRS, examine_reading};
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
 use crate::io::doctor::{self, DoctorReport};
@@ -14,11 +14,11 @@ use touch2touch_core::findings::Findings;
 pub struct Examined {
     /// The faults.
     pub report: DoctorReport,
-    /// The readings that would set it right, as `--read-as` takes them; `None` where there is none.
+    /// The readings that would set it right, as `doctor --set read-as=` takes them; `None` where there is none.
     pub read_as: Option<String>,
 }
 
-/// Reads the pairs, at most `most` of them, and lists what is wrong, then tries on about `tried` pairs which other reading would explain them
+/// Reads the pairs, at most `most` of them, and lists what is wrong, then tries on a handful which other reading would explain them
 /// better; with a generator, also by its predictions.
 ///
 /// # Errors
@@ -26,7 +26,6 @@ pub struct Examined {
 pub fn examined(
     dataset: &Dataset,
     most: usize,
-    tried: usize,
     generator: Option<Generator<'_>>,
     cx: &JobCx,
 ) -> Result<Examined, TaskError> {
@@ -36,7 +35,7 @@ pub fn examined(
         if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     cx.check(WHAT)?;
-    let doubts = examine_reading(dataset, tried, generator, &cx.quiet());
+    let doubts = examine_reading(dataset, PAIRS, generator, &cx.quiet());
     cx.check(WHAT)?;
     let mut found = Findings::default();
     found.extend(doubts::problems(dataset, &doubts));

@@ -16,7 +16,7 @@ use crate::steps::recipe::Recipe;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::units::counted;
 
-/// Pairs that the models are tried on where nobody says how many.
+/// Pairs that the models are tried on.
 pub const SAMPLE: usize = 24;
 /// Most grasps that are posed: the mask model is asked for each finger.
 const POSED: usize = 12;
@@ -28,15 +28,6 @@ const TOLERABLE_DEG: f64 = 2.0;
 const TOLERABLE_IOU: f64 = 0.8;
 /// A gain of a fit that is worth its while, dB.
 const GAIN_DB: f64 = 0.5;
-
-/// The models that are tried, and on how many pairs.
-#[derive(Clone, Debug)]
-pub struct WorthSetup {
-    /// The generator as it ships with its choices, the mask model, and the registration.
-    pub recipe: Recipe,
-    /// Pairs, spread over the data set.
-    pub pairs: usize,
-}
 
 /// Worth of the models on a sample.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -56,22 +47,22 @@ pub struct Worth {
     pub mask_model: Option<String>,
 }
 
-/// Tries the models on a sample: predicts it and fits the generator to two thirds of it in turn, and registers poses from
+/// Tries the generator, the mask model and the registration of a recipe on a sample: predicts it and fits the generator to two thirds of it in turn, and registers poses from
 /// the mask model's masks. Nothing is written. `None` for a simulated set that is built in: the models come from there.
 ///
 /// # Errors
 /// If the job was told to stop. That a model cannot be tried is part of the answer.
-pub fn worth(dataset: &Dataset, setup: &WorthSetup, models: &Models, cx: &JobCx) -> Result<Option<Worth>, TaskError> {
+pub fn worth(dataset: &Dataset, recipe: &Recipe, models: &Models, cx: &JobCx) -> Result<Option<Worth>, TaskError> {
     if dataset.kind == SourceKind::Demo && dataset.read_as().is_empty() {
         return Ok(None);
     }
     let all = dataset.index.pairs.len();
-    let pairs: Vec<PairId> = spread(all, Some(setup.pairs)).map(|at| PairId(at as u32)).collect();
+    let pairs: Vec<PairId> = spread(all, Some(SAMPLE)).map(|at| PairId(at as u32)).collect();
     let mut worth = Worth { all, ..Worth::default() };
-    if let Some((generator, _)) = &setup.recipe.generator {
+    if let Some((generator, _)) = &recipe.generator {
         worth.generator = Some(generator.name.clone());
         let fit = AdaptSetup {
-            recipe: setup.recipe.clone(),
+            recipe: recipe.clone(),
             pairs: pairs.clone(),
             folds: PARTS,
             tuning: None,
@@ -86,10 +77,10 @@ pub fn worth(dataset: &Dataset, setup: &WorthSetup, models: &Models, cx: &JobCx)
             Err(err) => worth.no_fit = Some(err.why),
         }
     }
-    if let Some(model) = &setup.recipe.mask_model {
+    if let Some(model) = &recipe.mask_model {
         worth.mask_model = Some(model.name.clone());
         let posed: BTreeSet<PairId> = spread(pairs.len(), Some(POSED)).map(|at| pairs[at]).collect();
-        let by = (&**model, setup.recipe.engine, setup.recipe.registration);
+        let by = (&**model, recipe.engine, recipe.registration);
         worth.masks = match mask_worth(dataset, &posed, by, models, cx) {
             Err(err) if err.is_cancelled() => return Err(err),
             found => found.ok().flatten(),

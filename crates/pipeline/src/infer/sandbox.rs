@@ -188,7 +188,7 @@ fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result
         built_in => built_in.path(),
     };
     let [group, verb] = VERB.map(AsRef::as_ref);
-    let args = [group, verb, "--engine".as_ref(), name.as_ref(), "--".as_ref(), place.as_os_str()];
+    let args = [group, verb, name.as_ref(), "--".as_ref(), place.as_os_str()];
     // Drivers reserve address space by the terabyte.
     let bounded = !matches!(engine, EngineKind::On(provider) if provider.has_own_memory());
     watch::watch(program, &args, Limits { memory: bounded.then(|| memory_limit(bundle)), time: TIME })

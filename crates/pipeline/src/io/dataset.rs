@@ -34,7 +34,6 @@ use super::stl::MeshError;
 
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
-pub use grow::cameras_of;
 pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters, imprint_from_tile};
 pub use pictures::{RIG_JSON, rig_of};
 pub use read_as::{READ_AS_FILE, write_read_as};

@@ -7,7 +7,7 @@ use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder as _, ImageFormat, ImageReader};
 
 use super::files;
-use touch2touch_core::grid::{Grid, RgbGrid};
+use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 
 /// Why a picture cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -226,11 +226,16 @@ pub fn write_gray8(path: &Path, picture: &Grid<u8>) -> Result<(), PictureError> 
     encode(path, picture.as_slice(), picture.size(), ExtendedColorType::L8)
 }
 
-/// Writes 16-bit gray.
+/// Writes an imprint (meters) as 16-bit gray for people: steps of 0.001 mm from -20 mm.
 ///
 /// # Errors
 /// [`PictureError`].
-pub fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
+pub fn write_depth16(path: &Path, imprint: &DepthMap) -> Result<(), PictureError> {
+    write_gray16(path, &imprint.map(|&d| ((d + 0.02) * 1e6).clamp(0.0, 65535.0) as u16))
+}
+
+/// Writes 16-bit gray.
+fn write_gray16(path: &Path, picture: &Grid<u16>) -> Result<(), PictureError> {
     // The encoder takes native-endian bytes and writes big-endian ones.
     let bytes: Vec<u8> = picture.as_slice().iter().flat_map(|v| v.to_ne_bytes()).collect();
     encode(path, &bytes, picture.size(), ExtendedColorType::L16)

@@ -20,7 +20,8 @@ use touch2touch_core::sample::Sample;
 pub use manifest::{MANIFEST, Writing, unfinished};
 
 /// Layout of the lab's that a simulated data set is written in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
+#[strum(serialize_all = "snake_case")]
 pub enum Layout {
     /// `train/{bubbles,gelslims}/data/<tool folder>/data_N.pt`.
     Train,

@@ -155,11 +155,6 @@ impl Dataset {
         }
     }
 
-    /// Lets touches that come without a depth picture use these cameras.
-    pub(crate) fn set_rig_cameras(&mut self, cameras: PerPad<DepthCamera>) {
-        self.cameras = OnceLock::from(cameras.map(|camera| camera.map(Arc::new)));
-    }
-
     /// The cameras for touches without a bubble: of [`RIG_FILE`] in the root, else of the first bubble file.
     fn cameras(&self) -> &PerPad<Arc<DepthCamera>> {
         self.cameras.get_or_init(|| {
@@ -191,11 +186,8 @@ impl Dataset {
     }
 }
 
-/// The cameras in a bubble file of the lab's.
-///
-/// # Errors
-/// [`LoadError`] if the file cannot be read; one without camera data has none.
-pub fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
+/// The cameras in a bubble file of the lab's; one without camera data has none.
+fn cameras_of(file: &Path) -> Result<PerPad<DepthCamera>, LoadError> {
     caught(|| Lab::cameras(file))
         .unwrap_or_else(|message| Err(LoadError::Bug { files: vec![file.to_owned()], message }))
 }

@@ -1,11 +1,14 @@
 //! [`Recipe::words`]: a recipe as options of a command line.
 
-use touch2touch_core::diffusion::Spacing;
-use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
+use std::fmt::{self, Display};
+use std::str::FromStr;
 
-use super::{Recipe, Stage};
+use strum::IntoEnumIterator as _;
+
+use super::{Recipe, ShiftChoice, Stage};
 use crate::infer::engine::EngineChoice;
-use crate::steps::mask::MaskSource;
+use crate::steps::mask::{MaskChoice, MaskSource};
+use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts, ShiftMode};
 
 /// The words of a command line.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -77,10 +80,7 @@ impl Recipe {
         let mut words = Words::default();
         if let Some((model, config)) = &self.generator {
             let sampler: &'static str = config.sampler.into();
-            let spacing = match config.spacing {
-                Spacing::Trailing => "trailing",
-                Spacing::Lab => "lab",
-            };
+            let spacing: &'static str = config.spacing.into();
             words = words
                 .option("--bundle", model.origin.path().display())
                 .option("--steps", config.steps)
@@ -103,33 +103,102 @@ impl Recipe {
     }
 
     fn mask_words(&self) -> Words {
-        let choice = self.mask;
-        let words = Words::default().option("--mask", choice.source.key());
-        let threshold = |words: Words| words.option("--threshold-mm", millimeters(choice.threshold_m));
-        let words = match choice.source {
-            MaskSource::Threshold => threshold(words),
-            MaskSource::TopPercent => words.option("--top-percent", choice.top_percent),
-            MaskSource::Cad => words.option("--cad-mm", millimeters(choice.cad_distance_m)),
-            MaskSource::Unet => words.option_if("--probability", choice.probability),
-            // Without a mask model it is the threshold.
-            MaskSource::Auto => threshold(words).option_if("--probability", choice.probability),
-            MaskSource::Truth => words,
-        };
         let model = self.mask_model.as_ref().map(|model| model.origin.path().display().to_string());
-        words.option_if("--mask-bundle", model).word_if(!self.hand, "--no-hand")
+        Words::default().option("--mask", self.mask).option_if("--mask-bundle", model).word_if(!self.hand, "--no-hand")
     }
 }
 
 /// The options of a way to meters.
 pub(crate) fn shift_words(shift: ShiftMode) -> Words {
-    let words = Words::default();
-    match shift {
-        ShiftMode::Raw => words.option("--shift", "raw"),
-        ShiftMode::PaperShift => words.option("--shift", "paper"),
-        ShiftMode::ExactInverse => words.option("--shift", "exact"),
-        ShiftMode::Parts(parts) => words.option("--shift", "exact").option("--fit-parts", parts_text(parts)),
+    let text = match shift {
+        ShiftMode::Raw => "raw".to_owned(),
+        ShiftMode::PaperShift => "paper".to_owned(),
+        ShiftMode::ExactInverse => "exact".to_owned(),
+        ShiftMode::Parts(parts) => format!("exact:{}", parts_text(parts)),
         // `stats --out statistics.json` writes it.
-        ShiftMode::Refit(_) => words.option("--shift", "refit").option("--stats", "statistics.json"),
+        ShiftMode::Refit(_) => "refit:statistics.json".to_owned(),
+    };
+    Words::default().option("--shift", text)
+}
+
+impl FromStr for ShiftChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(match text.split_once(':') {
+            None if text == "raw" => Self::Raw,
+            None if text == "paper" => Self::Paper,
+            None if text == "exact" => Self::default(),
+            Some(("exact", "none")) => Self::Exact(CorrectionParts::NONE),
+            Some(("exact", parts)) => {
+                let part = |name: &str| {
+                    name.trim().parse::<CorrectionPart>().map_err(|_| {
+                        let names: Vec<&str> = CorrectionPart::iter().map(Into::into).collect();
+                        format!("\"{name}\" is no part of a fit; there are {}", names.join(", "))
+                    })
+                };
+                Self::Exact(parts.split(',').map(part).collect::<Result<Vec<_>, _>>()?.into())
+            }
+            Some(("refit", file)) => Self::Refit(file.into()),
+            _ if text == "refit" => {
+                return Err("its statistics are needed: refit:FILE; make the file with `touch2touch stats`".into());
+            }
+            _ => return Err("it is none of exact, exact:none, exact:PART,PART, paper, raw and refit:FILE".into()),
+        })
+    }
+}
+
+/// The source, and those of its numbers that are not as they go without saying, such as `threshold:mm=4`.
+impl Display for MaskChoice {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let usual = Self::default();
+        let mm = |length_m: f32, usual_m: f32| (length_m != usual_m).then(|| format!("mm={}", millimeters(length_m)));
+        let [depth, distance] =
+            [mm(self.threshold_m, usual.threshold_m), mm(self.cad_distance_m, usual.cad_distance_m)];
+        let percent = (self.top_percent != usual.top_percent).then(|| format!("percent={}", self.top_percent));
+        let probability = self.probability.map(|least| format!("probability={least}"));
+        let numbers = match self.source {
+            // Without a mask model it is the threshold.
+            MaskSource::Auto => [depth, probability],
+            MaskSource::Unet => [None, probability],
+            MaskSource::Threshold => [depth, None],
+            MaskSource::TopPercent => [percent, None],
+            MaskSource::Cad => [distance, None],
+            MaskSource::Truth => [None, None],
+        };
+        let numbers: Vec<String> = numbers.into_iter().flatten().collect();
+        write!(f, "{}{}{}", self.source.key(), if numbers.is_empty() { "" } else { ":" }, numbers.join(","))
+    }
+}
+
+impl FromStr for MaskChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (key, numbers) = text.split_once(':').unwrap_or((text, ""));
+        let source = key.parse().map_err(|_| {
+            let keys: Vec<&str> = MaskSource::iter().map(MaskSource::key).collect();
+            format!("{key:?} is no source of masks; there are {}", keys.join(", "))
+        })?;
+        let mut choice = Self { source, ..Self::default() };
+        for part in numbers.split(',').filter(|part| !part.is_empty()) {
+            let (name, value) = part.split_once('=').unwrap_or((part, ""));
+            let number: Option<f64> = value.parse().ok().filter(|number: &f64| number.is_finite());
+            let number = number.ok_or_else(|| format!("{part:?}: a number is needed, as in threshold:mm=4"))?;
+            match (source, name) {
+                (MaskSource::Auto | MaskSource::Threshold, "mm") => choice.threshold_m = meters(number),
+                (MaskSource::Cad, "mm") => choice.cad_distance_m = meters(number),
+                (MaskSource::TopPercent, "percent") => choice.top_percent = number as f32,
+                (MaskSource::Auto | MaskSource::Unet, "probability") if (0.0..=1.0).contains(&number) => {
+                    choice.probability = Some(number as f32);
+                }
+                (MaskSource::Auto | MaskSource::Unet, "probability") => {
+                    return Err(format!("{part}: a probability of 0 to 1 is needed"));
+                }
+                _ => return Err(format!("{key} has no number {name:?}")),
+            }
+        }
+        Ok(choice)
     }
 }
 
@@ -150,11 +219,7 @@ pub fn meters(length_mm: f64) -> f32 {
 
 fn parts_text(parts: CorrectionParts) -> String {
     let names: Vec<&'static str> = Vec::<CorrectionPart>::from(parts).into_iter().map(Into::into).collect();
-    match parts {
-        CorrectionParts::ALL => "all".into(),
-        CorrectionParts::NONE => "none".into(),
-        _ => names.join(","),
-    }
+    if names.is_empty() { "none".into() } else { names.join(",") }
 }
 
 #[cfg(test)]
@@ -172,5 +237,18 @@ mod tests {
         assert_eq!(words.list(), ["v", "--a=-3", "--b", "2"]);
         assert_eq!(parts_text(vec![CorrectionPart::Offset, CorrectionPart::Gain].into()), "offset,gain");
         assert_eq!(millimeters(0.005), "5");
+    }
+
+    #[test]
+    fn what_is_no_choice_is_refused_and_says_what_there_is() {
+        assert_eq!("threshold".parse(), Ok(MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }));
+        for bad in ["unet:mm=3", "auto:probability=1.5", "threshold:mm=inf", "threshold:4", "dept", ""] {
+            assert!(bad.parse::<MaskChoice>().is_err(), "{bad}");
+        }
+        assert_eq!("exact:none".parse(), Ok(ShiftChoice::Exact(CorrectionParts::NONE)));
+        assert_eq!("refit:C:/a,b".parse(), Ok(ShiftChoice::Refit("C:/a,b".into())));
+        assert!("refit".parse::<ShiftChoice>().unwrap_err().contains("touch2touch stats"));
+        assert!("exact:size".parse::<ShiftChoice>().unwrap_err().contains("offset, field"));
+        assert!("doubled".parse::<ShiftChoice>().unwrap_err().contains("exact:none"));
     }
 }
