@@ -182,7 +182,7 @@ fn error_by_depth(dataset: &Dataset, id: PairId, share: Option<f32>) -> (f64, us
         }
         let found = settled_model(imprint, Mask::filled(imprint.width(), imprint.height(), false));
         assert!(matches!(found.basis, MaskBasis::Depth(_)), "{name}: {:?}", found.basis);
-        Some(found.mask)
+        Some(std::sync::Arc::unwrap_or_clone(found.mask))
     };
     let masks: PerPad<Mask> = sample.rig.pads().map(mask).collect();
     let points = contact_points(&sample, &measured(&sample).as_ref(), &masks.as_ref()).unwrap();

@@ -26,7 +26,7 @@ pub use dataset::{
 };
 pub use imprint::{AmbiguityKey, ColorKey, FlagsKey, ImprintKey, MeanKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};
-pub use mask::{AutomaticMask, MaskKey, MaskVersion};
+pub use mask::{MaskKey, MaskVersion};
 pub use pose::{CloudKey, DeviationKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey};
 pub(crate) use prediction::Keyed;
 pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, StoredKey};

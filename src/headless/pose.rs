@@ -162,14 +162,14 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
     let one = |&by: &Registration| {
         let ranked = match touch.tool {
             Ok(_) => None,
-            Err(_) => Some(estimate.which_tool(touch, tried.iter().copied(), &*by.method())?),
+            Err(_) => Some(estimate.which_tool(sample, tried.iter().copied(), &*by.method())?),
         };
         let likeliest = ranked.iter().flatten().next().map(|first| first.tool.as_str());
         let model = likeliest.and_then(|name| tried.iter().find(|(tool, _)| *tool == name)).map(|(_, model)| *model);
-        let touch = Touch { tool: model.map_or(touch.tool, Ok), ..touch };
+        let tool = model.map_or(touch.tool, Ok).map_err(Clone::clone);
         let starts = (!args.starts.is_empty()).then_some(args.starts.as_slice());
         let ask = Ask { starts, record: args.trace, evidence: true, ..Ask::default() };
-        let found = estimate.pose_by(touch, &*by.method(), ask);
+        let found = tool.and_then(|tool| estimate.pose_by(sample, tool, &*by.method(), ask));
         let answer = found.as_ref().ok();
         let place = answer.map(PoseResult::object_from_grasp);
         Ok(PoseRow {

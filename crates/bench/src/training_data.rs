@@ -1,6 +1,7 @@
 //! Training data for the networks: a data set or the simulator as shards that the trainer reads.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use rayon::prelude::*;
 use serde::Serialize;
@@ -388,7 +389,7 @@ fn contact(sample: &Sample, pad: PadId, tool: Option<&ToolModel>, labels: &PairL
         MaskBasis::Source => Known::Cad,
         MaskBasis::Depth(_) | MaskBasis::Flat => return None,
     };
-    Some((found.mask, known))
+    Some((Arc::unwrap_or_clone(found.mask), known))
 }
 
 /// Holes are filled from their borders inward with the mean of what is beside them.

@@ -3,6 +3,8 @@
 
 mod rise;
 
+use std::sync::Arc;
+
 use glam::DAffine3;
 use rayon::prelude::*;
 
@@ -130,7 +132,7 @@ pub enum MaskBasis {
 #[derive(Clone, Debug, PartialEq)]
 pub struct ContactMask {
     /// The pixels in contact.
-    pub mask: Mask,
+    pub mask: Arc<Mask>,
     /// Basis that it is made from.
     pub basis: MaskBasis,
     /// Share of the picture's pixels that the mask model says neither yes nor no of, 0..1; `None` for any other source.
@@ -174,9 +176,10 @@ impl MaskBasis {
 /// A mask with the last word on it: a flat imprint has no contact, whatever the mask's source.
 pub fn settled(imprint: &DepthMap, mask: Mask) -> ContactMask {
     if rise(imprint) >= FLAT_M {
-        return ContactMask { mask, basis: MaskBasis::Source, unsure: None };
+        return ContactMask { mask: Arc::new(mask), basis: MaskBasis::Source, unsure: None };
     }
-    ContactMask { mask: Mask::filled(imprint.width(), imprint.height(), false), basis: MaskBasis::Flat, unsure: None }
+    let mask = Arc::new(Mask::filled(imprint.width(), imprint.height(), false));
+    ContactMask { mask, basis: MaskBasis::Flat, unsure: None }
 }
 
 /// The mask of a model with the last word on it: as [`settled`], and where the model found nothing in an imprint that
@@ -185,7 +188,8 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
     match rest_and_top(imprint) {
         Some([rest, top]) if rise(imprint) >= CLEAR_M && !mask.as_slice().contains(&true) => {
             let min_m = rest + CONTACT_SHARE * (top - rest);
-            ContactMask { mask: threshold(imprint, min_m), basis: MaskBasis::Depth(min_m), unsure: None }
+            let mask = Arc::new(threshold(imprint, min_m));
+            ContactMask { mask, basis: MaskBasis::Depth(min_m), unsure: None }
         }
         _ => settled(imprint, mask),
     }
@@ -296,7 +300,7 @@ mod tests {
             assert_eq!(settled(&none, Mask::filled(none.width(), none.height(), true)).basis, MaskBasis::Flat);
         }
         let deep = settled(&bump(0.0, 0.008), all.clone());
-        assert_eq!((deep.mask, deep.basis), (all, MaskBasis::Source));
+        assert_eq!((&*deep.mask, deep.basis), (&all, MaskBasis::Source));
     }
 
     #[test]
@@ -321,7 +325,7 @@ mod tests {
             let imprint = bump(rest, height);
             let contact = settled_model(&imprint, none.clone());
             let MaskBasis::Depth(min_m) = contact.basis else { panic!("{:?}", contact.basis) };
-            assert_eq!(contact.mask, threshold(&imprint, min_m));
+            assert_eq!(*contact.mask, threshold(&imprint, min_m));
             assert!(contact.mask[(80, 60)] && !contact.mask[(5, 130)], "{min_m}");
             assert!((100..3000).contains(&count(&contact.mask)), "{}", count(&contact.mask));
             assert!(
@@ -331,7 +335,7 @@ mod tests {
         // What the model found stays; what is neither flat nor clearly deep stays without contact.
         let mut one = none.clone();
         one[(80, 60)] = true;
-        assert_eq!(settled_model(&bump(0.0, 0.006), one.clone()).mask, one);
+        assert_eq!(*settled_model(&bump(0.0, 0.006), one.clone()).mask, one);
         let faint = settled_model(&bump(0.0, 0.001_5), none);
         assert_eq!((count(&faint.mask), faint.basis), (0, MaskBasis::Source));
     }

@@ -163,7 +163,7 @@ impl Estimate {
             return Ok(None);
         }
         let masks = &self.results.contact().masks;
-        stack(py, self.pads().map(|pad| masks.get(pad).map(|found| &found.mask)), false)
+        stack(py, self.pads().map(|pad| masks.get(pad).map(|found| &*found.mask)), false)
     }
 
     /// The contact points of both fingers: (N, 3) float64, meters, grasp frame; `None` where there are none.

@@ -16,7 +16,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::pair_files::{PairFile, PairParts, write};
-use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::mask::made_of;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::prediction::predicted_by;
@@ -30,7 +30,7 @@ pub struct PairExport {
     source: ImprintSource,
     prediction: Option<String>,
     rig: Arc<Rig>,
-    clouds: Arc<Clouds>,
+    estimate: Arc<Estimate>,
     mask: String,
     registration: Registration,
     pose: Option<Arc<PoseResult>>,
@@ -51,7 +51,7 @@ impl PairExport {
             source: self.source,
             prediction: self.prediction.as_deref(),
             rig: &self.rig,
-            clouds: &self.clouds,
+            clouds: self.estimate.surface(),
             mask: &self.mask,
             registration: self.registration,
             pose: self.pose.as_deref(),
@@ -104,7 +104,7 @@ pub fn pair_export(state: &State, source: ImprintSource) -> Option<PairExport> {
         source,
         prediction,
         rig: state.rig(),
-        clouds: state.results.clouds.get(&cloud)?.clone(),
+        estimate: state.results.clouds.get(&cloud)?.clone(),
         mask: masks_made_of(state, &cloud),
         registration: state.settings.registration,
         pose,

@@ -1,10 +1,7 @@
 //! Keys of contact masks.
 
-use std::sync::Arc;
-
 use super::super::keys::{ImprintKey, Key, MaskRecipe, Revision};
-use touch2touch_core::contact::{ContactMask, MaskBasis};
-use touch2touch_core::grid::Mask;
+use touch2touch_core::contact::ContactMask;
 
 /// An automatic mask of one imprint.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -16,9 +13,9 @@ pub struct MaskKey {
 }
 
 impl Key for MaskKey {
-    type Value = AutomaticMask;
+    type Value = ContactMask;
 
-    fn bytes(found: &AutomaticMask) -> usize {
+    fn bytes(found: &ContactMask) -> usize {
         found.mask.len()
     }
 }
@@ -30,21 +27,4 @@ pub enum MaskVersion {
     Auto(MaskRecipe),
     /// Corrected by hand.
     Hand(Revision),
-}
-
-/// An automatic mask.
-#[derive(Clone, Debug)]
-pub struct AutomaticMask {
-    /// The pixels in contact.
-    pub mask: Arc<Mask>,
-    /// The basis that it is made of in the end.
-    pub basis: MaskBasis,
-    /// As [`ContactMask::unsure`].
-    pub unsure: Option<f64>,
-}
-
-impl From<ContactMask> for AutomaticMask {
-    fn from(found: ContactMask) -> Self {
-        Self { mask: Arc::new(found.mask), basis: found.basis, unsure: found.unsure }
-    }
 }

@@ -7,7 +7,7 @@ use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::which_tool::Candidate;
 use touch2touch_pipeline::compare::deviation::Deviation;
-use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::layers::LayerResult;
 use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::Recipe;
@@ -28,9 +28,9 @@ impl CloudKey {
 }
 
 impl Key for CloudKey {
-    type Value = Clouds;
+    type Value = Estimate;
 
-    fn bytes(found: &Clouds) -> usize {
+    fn bytes(found: &Estimate) -> usize {
         found.bytes()
     }
 }

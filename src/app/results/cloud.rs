@@ -5,35 +5,35 @@ use std::sync::Arc;
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{CloudKey, ImprintKey, ImprintSource, MaskKey, MaskVersion};
 use super::super::results;
-use super::super::results::{Computes, Demands, Imprint};
+use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::results::Latest;
 use super::super::state::{Absent, Lookup, State};
-use touch2touch_core::grid::Mask;
 use touch2touch_core::rig::{PadId, PerPad};
-use touch2touch_pipeline::steps::cloud::{Clouds, clouds};
+use touch2touch_pipeline::steps::cloud::Clouds;
+use touch2touch_pipeline::steps::estimate::Estimate;
 
 impl Computes for CloudKey {
-    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Clouds>> {
-        let mut parts: PerPad<(Imprint, Option<Arc<Mask>>)> = PerPad::default();
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Estimate>> {
+        let (mut imprints, mut masks) = (PerPad::default(), PerPad::default());
+        let mut made_by = None;
         for (finger, (imprint, version)) in self.parts.entries() {
-            let mask = match version {
-                None => None,
-                Some(version) => Some(results::mask_pixels(state, version, imprint)?),
-            };
-            parts[finger] = Some((results::imprint_input(state, imprint)?, mask));
+            imprints[finger] = Some(results::imprint_of(state, imprint).ready()?.clone());
+            if let Some(version) = version {
+                masks[finger] = Some(results::mask_of(state, version, imprint)?);
+            }
+            if let Some(MaskVersion::Auto(recipe)) = version {
+                made_by = Some(recipe.clone());
+            }
         }
-        let sample = state.results.samples.get(&self.place()?.0)?.clone();
+        let (pair, side) = self.place()?;
+        let sample = state.results.samples.get(&pair)?.clone();
         Some(Job::new(Lane::Compute, "Point cloud", move |_| {
-            let parts = parts.as_ref().map(|part| {
-                let (imprint, mask) = part?;
-                Some((imprint.get().ok()?, mask.as_deref()))
-            });
-            clouds(&sample, &parts)
+            Estimate::of_masks(side, made_by, imprints, masks, &sample)
         }))
     }
 
-    fn arrived(&self, state: &mut State, _: &Arc<Clouds>) {
+    fn arrived(&self, state: &mut State, _: &Arc<Estimate>) {
         // One of a single finger is of the table of poses, not what the panes show.
         if let Some(at) = self.place().filter(|(_, source)| cloud_key(state, *source) == Ok(Some(self.clone()))) {
             state.results.latest.entry(at).or_default().cloud = Some(self.clone());
@@ -93,7 +93,7 @@ pub(crate) fn automatic_cloud(
     for (finger, imprint) in imprints {
         let camera = results::touch(state, finger).ready().is_some_and(|t| t.camera().is_some());
         let (Ok(recipe), true) = (results::mask_recipe(state, finger), camera) else { continue };
-        if results::imprint_of(state, imprint.clone()).ready().is_none() {
+        if results::imprint_of(state, &imprint).ready().is_none() {
             return Err(Vec::new());
         }
         if let Some(hand) = results::drawn_mask_on(state, &imprint) {
@@ -114,7 +114,7 @@ pub fn cloud(state: &State, source: ImprintSource) -> Lookup<'_, Clouds> {
     let before = || state.results.clouds.get(latest(state, source)?.cloud.as_ref()?);
     // A pair that cannot be read says so, in place of the scene before.
     let unread = state.pair_key().and_then(|pair| state.failure(pair));
-    state.look_or(cloud_key(state, source), before).or_failed(unread).value()
+    state.look_or(cloud_key(state, source), before).or_failed(unread).map(|estimate| estimate.surface())
 }
 
 /// The keys of what was shown last of an imprint of the selected pair.

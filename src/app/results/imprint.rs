@@ -1,17 +1,14 @@
 //! Imprints: those measured lie in the sample, those predicted are made of a raw prediction.
 
-use std::sync::Arc;
-
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{ColorKey, ImprintKey, ImprintSource, MetersKey, PictureKey, TouchKey};
+use super::super::keys::{ColorKey, ImprintSource, MetersKey, PictureKey, TouchKey};
 use super::super::results;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
 use touch2touch_core::rig::PadId;
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::compare::Beside;
+use touch2touch_pipeline::compare::{Beside, beside};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::imprint;
 
@@ -36,39 +33,24 @@ impl Computes for ColorKey {
     }
 }
 
-/// The imprint that a key names, as an input of jobs; `None` if it is not there.
-pub(crate) fn imprint_input(state: &State, key: &ImprintKey) -> Option<Imprint> {
-    Some(match key {
-        ImprintKey::Measured(touch) => Imprint::Measured(state.results.samples.get(&touch.pair)?.clone(), *touch),
-        ImprintKey::Predicted(recipe, shift) => {
-            Imprint::Predicted(state.results.imprints.get(&MetersKey(recipe.clone(), *shift))?.clone())
-        }
-        ImprintKey::Mean(several) => Imprint::Predicted(state.results.means.get(several)?.clone()),
-        ImprintKey::Picture(touch) => Imprint::Picture(state.results.pictures.get(&PictureKey(*touch))?.clone()),
-    })
-}
+impl Computes for PictureKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Beside>> {
+        let pair = self.0.pair;
+        let source = state.library.open.as_ref()?.source.clone();
+        let sample = state.results.samples.get(&pair)?.clone();
+        Some(Job::new(Lane::Files, "Stored picture", move |_| {
+            let dataset = source.as_dataset().ok_or_else(gone)?;
+            beside(dataset, pair.pair, &sample)?.ok_or_else(|| {
+                let why = "no picture of another program's prediction lies beside this pair";
+                TaskError::new("Stored picture", why)
+                    .with_hint("It is read from NAME_vqvae.png beside NAME_bubble.png.")
+            })
+        }))
+    }
 
-/// An imprint wherever it lies, as an input of jobs.
-pub(crate) enum Imprint {
-    Measured(Arc<Sample>, TouchKey),
-    Predicted(Arc<DepthMap>),
-    Picture(Arc<Beside>),
-}
-
-impl Imprint {
-    /// The imprint, meters.
-    ///
-    /// # Errors
-    /// Without a measurement, which was there when the job was prepared: a defect if it ever shows.
-    pub(crate) fn get(&self) -> Result<&DepthMap, TaskError> {
-        match self {
-            Self::Measured(sample, touch) => {
-                let bubble = sample.pad(touch.finger).and_then(|t| t.depth());
-                bubble.map(|bubble| &bubble.imprint).ok_or_else(gone)
-            }
-            Self::Predicted(depth) => Ok(depth),
-            Self::Picture(found) => Ok(&found.imprint),
-        }
+    /// The pane says it in place of the picture.
+    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
+        false
     }
 }
 
@@ -80,7 +62,7 @@ pub(crate) fn gone() -> TaskError {
 /// The imprint shown for one finger, meters, raw bubble orientation.
 pub fn imprint(state: &State, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
     match results::imprint_key(state, source, finger) {
-        Ok(key) => results::imprint_of(state, key),
+        Ok(key) => results::imprint_of(state, &key),
         Err(Absent::NoPrediction) if results::prefetch(state, finger).is_some() => Lookup::Waiting,
         Err(absent) => Lookup::Absent(absent),
     }

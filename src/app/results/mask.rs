@@ -5,60 +5,62 @@ use std::sync::Arc;
 use strum::IntoEnumIterator as _;
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{AutomaticMask, ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
-use super::super::results::{Computes, Demands};
+use super::super::keys::{ImprintKey, ImprintSource, MaskKey, MaskRecipe, MaskVersion, ToolKey};
+use super::super::results::{Computes, Demands, gone};
 use super::super::services::SharedServices;
 use super::super::state::results::Request;
 use super::super::state::tasks::Level;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
-use touch2touch_core::bits::Bits;
-use touch2touch_core::contact::MaskBasis;
-use touch2touch_core::grid::Mask;
+use touch2touch_core::contact::{ContactMask, MaskBasis};
+use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::label::Provenance;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::labels::{DrawnMask, MaskPlace};
-use touch2touch_pipeline::steps::mask::{self, MaskInputs};
+use touch2touch_pipeline::steps::mask::{MaskInputs, contact_mask};
 
-/// The pixels of a mask of an imprint; `None` if they are not there.
-pub(crate) fn mask_pixels(state: &State, version: &MaskVersion, imprint: &ImprintKey) -> Option<Arc<Mask>> {
+/// A mask of an imprint; `None` if it is not there.
+pub(crate) fn mask_of(state: &State, version: &MaskVersion, imprint: &ImprintKey) -> Option<ContactMask> {
     match version {
         MaskVersion::Auto(recipe) => {
             let key = MaskKey { imprint: imprint.clone(), recipe: recipe.clone() };
-            state.results.masks.get(&key).map(|found| found.mask.clone())
+            Some((**state.results.masks.get(&key)?).clone())
         }
         MaskVersion::Hand(revision) => {
-            let hand = drawn_mask_on(state, imprint)?;
-            (hand.revision == *revision).then(|| hand.mask.clone())
+            let hand = drawn_mask_on(state, imprint).filter(|hand| hand.revision == *revision)?;
+            Some(ContactMask { mask: hand.mask.clone(), basis: MaskBasis::Hand, unsure: None })
         }
     }
 }
 
 impl Computes for MaskKey {
-    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<AutomaticMask>> {
-        let imprint = results::imprint_input(state, &self.imprint)?;
+    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<ContactMask>> {
+        let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let touch = self.imprint.touch();
         let sample = state.results.samples.get(&touch.pair)?.clone();
-        if let MaskRecipe::Unet(id, least) = &self.recipe {
-            let (services, runtime, least) = (services.clone(), state.settings.runtime, least.map(Bits::get));
-            let bundle = state.library.bundle(id)?.clone();
-            return Some(Job::new(Lane::Models, "Contact mask by the mask model", move |_| {
-                Ok(services.mask_by_model(&bundle, runtime, imprint.get()?, least)?.into())
-            }));
-        }
-        let recipe = self.recipe.clone();
         let tool = state.library.entry(touch.pair.pair).and_then(|entry| entry.tool.as_deref());
         let tool = tool.map(|tool| ToolKey { dataset: touch.pair.dataset, name: tool.into() });
         let tool = tool.and_then(|key| state.results.tools.get(&key).cloned());
-        Some(Job::new(Lane::Compute, "Contact mask", move |_| {
+        let (lane, what, model) = match &self.recipe {
+            MaskRecipe::Unet(id, _) => {
+                (Lane::Models, "Contact mask by the mask model", Some(state.library.bundle(id)?.clone()))
+            }
+            _ => (Lane::Compute, "Contact mask", None),
+        };
+        let (services, engine, recipe) = (services.clone(), state.settings.runtime, self.recipe.clone());
+        Some(Job::new(lane, what, move |_| {
             let tool = tool.as_deref().map(|tool| &tool.model);
             let inputs = MaskInputs { sample: &sample, tool, labels: None, of: None };
-            Ok(mask::without_model(&recipe, imprint.get()?, touch.finger, inputs)?.into())
+            let by_model = |imprint: &DepthMap| {
+                let bundle = model.as_ref().ok_or_else(gone)?;
+                services.mask_by_model(bundle, engine, imprint, recipe.probability())
+            };
+            contact_mask(&recipe, &imprint, touch.finger, inputs, by_model)
         }))
     }
 
     /// The log says once what a mask is made of where that is not what its recipe names.
-    fn arrived(&self, state: &mut State, found: &Arc<AutomaticMask>) {
+    fn arrived(&self, state: &mut State, found: &Arc<ContactMask>) {
         let Some(why) = found.basis.note() else { return };
         let touch = self.imprint.touch();
         let first = state.results.noted.insert(Request::Mask(self.clone()));
@@ -136,7 +138,7 @@ pub(crate) fn drawn_mask_on<'a>(state: &'a State, imprint: &ImprintKey) -> Optio
     let touch = imprint.touch();
     let name = &state.library.entry(touch.pair.pair)?.name;
     let place = MaskPlace { pad: touch.finger, of: imprint.of()? };
-    state.document.pair(name)?.drawn(&place, results::imprint_input(state, imprint)?.get().ok()?)
+    state.document.pair(name)?.drawn(&place, results::imprint_of(state, imprint).ready()?)
 }
 
 /// The corrected mask of one finger's imprint, if it is there and as large.

@@ -9,50 +9,28 @@ use super::super::services::SharedServices;
 use super::super::state::results::Computed;
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
-use super::imprint::{Imprint, imprint_input};
-use touch2touch_core::align::{Ask, Contacts};
-use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::align::Ask;
 use touch2touch_core::pose::Registration;
-use touch2touch_core::rig::PerPad;
 use touch2touch_core::sample::Sample;
-use touch2touch_core::which_tool::{Candidate, which_tool};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::steps::cloud::{Clouds, images};
-use touch2touch_pipeline::steps::pose::{self, PoseResult};
+use touch2touch_pipeline::steps::estimate::Estimate;
+use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::tool::NamedTool;
 
 /// The inputs of every job about a pose: what is registered.
 pub(crate) struct Registered {
-    pub(crate) clouds: Arc<Clouds>,
+    pub(crate) estimate: Arc<Estimate>,
     pub(crate) tool: Arc<NamedTool>,
-    /// The true pose, `grasp_from_object`, where it is known.
-    pub(crate) truth: Option<PlanarPose>,
-    sample: Arc<Sample>,
-    /// Of the fingers that have a mask.
-    imprints: PerPad<Imprint>,
-    source: ImprintSource,
+    pub(crate) sample: Arc<Sample>,
 }
 
 impl Registered {
     /// Registers it.
     ///
     /// # Errors
-    /// As [`pose::pose`].
-    pub(crate) fn pose(&self, registration: Registration, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
-        self.with_contacts(|contacts| pose::pose(contacts, &self.tool.model, &*registration.method(), ask, self.truth))
-    }
-
-    /// Tools as candidates for what was touched, the likeliest first.
-    pub(crate) fn which_tool(&self, tools: &[Arc<NamedTool>], registration: Registration) -> Vec<Candidate> {
-        let tools = tools.iter().map(|tool| (tool.name.as_str(), &tool.model));
-        self.with_contacts(|contacts| which_tool(contacts, tools, &*registration.method()))
-    }
-
-    fn with_contacts<T>(&self, of: impl FnOnce(Contacts<'_>) -> T) -> T {
-        let points = self.clouds.contact_points();
-        let imprints = self.imprints.as_ref().map(|imprint| imprint?.get().ok());
-        let images = images(&self.sample, &imprints, self.source);
-        of(Contacts { points: &points, images: &images })
+    /// As [`Estimate::pose_by`].
+    pub(crate) fn pose(&self, by: Registration, ask: Ask<'_>) -> Result<PoseResult, TaskError> {
+        self.estimate.pose_by(&self.sample, &self.tool.model, &*by.method(), ask)
     }
 }
 
@@ -64,20 +42,12 @@ fn registering(state: &State, key: &PoseKey, ask: Ask<'static>) -> Option<Job<Po
 
 /// The inputs of a registration; `None` if they are not there.
 pub(crate) fn registered(state: &State, key: &PoseKey) -> Option<Registered> {
-    let (pair, source) = key.cloud.place()?;
+    let (pair, _) = key.cloud.place()?;
     let tool = ToolKey { dataset: pair.dataset, name: key.tool.clone() };
-    let mut imprints = PerPad::default();
-    for (finger, (imprint, _)) in key.cloud.parts.entries().filter(|(_, (_, mask))| mask.is_some()) {
-        imprints[finger] = Some(imprint_input(state, imprint)?);
-    }
-    let sample = state.results.samples.get(&pair)?.clone();
     Some(Registered {
-        clouds: state.results.clouds.get(&key.cloud)?.clone(),
+        estimate: state.results.clouds.get(&key.cloud)?.clone(),
         tool: state.results.tools.get(&tool)?.clone(),
-        truth: sample.grasp_from_object,
-        sample,
-        imprints,
-        source,
+        sample: state.results.samples.get(&pair)?.clone(),
     })
 }
 

@@ -12,7 +12,6 @@ use super::super::services::SharedServices;
 use super::super::state::labels::Stored;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::bits::Bits;
-use touch2touch_core::contact::ContactMask;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
@@ -42,7 +41,7 @@ fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, 
 
 impl Computes for DistancesKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Distances>> {
-        let (imprint, touch) = (results::imprint_input(state, &self.imprint)?, self.imprint.touch());
+        let (imprint, touch) = (results::imprint_of(state, &self.imprint).ready()?.clone(), self.imprint.touch());
         let (at, pose) = cad_pose(state, &self.at, touch.pair)?;
         let (sample, side) = (state.results.samples.get(&touch.pair)?.clone(), self.imprint.side());
         let tool = state.library.entry(touch.pair.pair)?.tool.as_deref()?;
@@ -50,7 +49,7 @@ impl Computes for DistancesKey {
         let tool = state.results.tools.get(&tool)?.clone();
         Some(Job::new(Lane::Compute, "Distances to the CAD model", move |_| {
             let on = OnPad { sample: &sample, pad: touch.finger };
-            let grid = propose::cad_distances(imprint.get()?, side, on, &tool.model, pose)?;
+            let grid = propose::cad_distances(&imprint, side, on, &tool.model, pose)?;
             Ok(Distances { grid, at })
         }))
     }
@@ -58,7 +57,7 @@ impl Computes for DistancesKey {
 
 impl Computes for ProposalKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Proposal>> {
-        let (imprint, touch) = (results::imprint_input(state, &self.imprint)?, self.imprint.touch());
+        let (imprint, touch) = (results::imprint_of(state, &self.imprint).ready()?.clone(), self.imprint.touch());
         let sample = state.results.samples.get(&touch.pair)?.clone();
         let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
             Some(Job::new(Lane::Compute, WHAT, move |_| make()))
@@ -68,10 +67,7 @@ impl Computes for ProposalKey {
                 let found = state.results.masks.get(&self.automatic(recipe))?.clone();
                 let model = state.library.mask_model(recipe).to_owned();
                 let recipe = recipe.clone();
-                job(Box::new(move || {
-                    let (mask, basis, unsure) = ((*found.mask).clone(), found.basis, found.unsure);
-                    Ok(propose::automatic(ContactMask { mask, basis, unsure }, &recipe, &model))
-                }))
+                job(Box::new(move || Ok(propose::automatic((*found).clone(), &recipe, &model))))
             }
             ProposalInputs::Cad(at, within) => {
                 let key = DistancesKey { imprint: self.imprint.clone(), at: at.clone() };
@@ -80,7 +76,7 @@ impl Computes for ProposalKey {
             }
             ProposalInputs::Grow(_) => {
                 let hand = results::drawn_mask_on(state, &self.imprint).cloned();
-                job(Box::new(move || propose::grown(imprint.get()?, hand.as_ref())))
+                job(Box::new(move || propose::grown(&imprint, hand.as_ref())))
             }
             ProposalInputs::Carry(from, _) => {
                 let source = state.library.open.as_ref()?.source.clone();
@@ -92,17 +88,17 @@ impl Computes for ProposalKey {
                 Some(Job::new(Lane::Files, WHAT, move |_| {
                     let labels = labels.map_or_else(|| source.load_labels(&name), Ok)?;
                     let from = loaded.map_or_else(|| source.load(other).map(Arc::new), Ok)?;
-                    let to = Side { sample: &sample, pad, imprint: imprint.get()? };
+                    let to = Side { sample: &sample, pad, imprint: &imprint };
                     propose::carried_from_pair(OtherPair { name: &name, sample: &from, labels: &labels }, to)
                 }))
             }
             ProposalInputs::Across(other, version) => {
-                let mask = results::mask_pixels(state, version, other)?;
-                let (from, pad) = (results::imprint_input(state, other)?, other.touch().finger);
+                let mask = results::mask_of(state, version, other)?.mask;
+                let (from, pad) = (results::imprint_of(state, other).ready()?.clone(), other.touch().finger);
                 let name = state.finger_name(pad).to_lowercase();
                 job(Box::new(move || {
-                    let from = Side { sample: &sample, pad, imprint: from.get()? };
-                    let to = Side { sample: &sample, pad: touch.finger, imprint: imprint.get()? };
+                    let from = Side { sample: &sample, pad, imprint: &from };
+                    let to = Side { sample: &sample, pad: touch.finger, imprint: &imprint };
                     propose::carried_across(&name, from, &mask, to)
                 }))
             }

@@ -1,8 +1,8 @@
 //! The prediction shown for each touch: that of the settings in force, else an earlier one, which says so.
 
 use super::super::keys::{ImprintKey, ImprintSource, MetersKey, PictureKey, PredictionKey, TouchKey};
+use super::super::recipe;
 use super::super::state::{Absent, Lookup, State};
-use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 
@@ -10,7 +10,7 @@ use touch2touch_core::rig::PadId;
 pub fn worked_on(state: &State, finger: PadId) -> ImprintSource {
     let chosen = state.selection.imprint;
     let is_there = |source: &ImprintSource| {
-        imprint_key(state, *source, finger).is_ok_and(|key| imprint_of(state, key).ready().is_some())
+        imprint_key(state, *source, finger).is_ok_and(|key| imprint_of(state, &key).ready().is_some())
     };
     [chosen, chosen.other()].into_iter().find(is_there).unwrap_or(chosen)
 }
@@ -33,15 +33,17 @@ pub fn imprint_key(state: &State, source: ImprintSource, finger: PadId) -> Resul
     }
 }
 
-/// An imprint of the selected pair by its recipe, meters, raw bubble orientation.
-pub(crate) fn imprint_of(state: &State, key: ImprintKey) -> Lookup<'_, DepthMap> {
+/// An imprint by its recipe, meters, raw bubble orientation.
+pub(crate) fn imprint_of<'a>(state: &'a State, key: &ImprintKey) -> Lookup<'a, DepthMap> {
     match key {
         ImprintKey::Measured(touch) => {
-            results::bubble(state, touch.finger).and_then(Absent::NoBubble, |b| Some(&b.imprint))
+            let sample = state.look(touch.pair).value();
+            let felt = sample.and_then(Absent::NoFinger, |sample| sample.pad(touch.finger));
+            felt.and_then(Absent::NoBubble, |felt| Some(&felt.depth()?.imprint))
         }
-        ImprintKey::Predicted(recipe, shift) => state.look(MetersKey(recipe, shift)).value(),
-        ImprintKey::Mean(key) => state.look(key).value(),
-        ImprintKey::Picture(touch) => state.look(PictureKey(touch)).map(|found| &found.imprint),
+        ImprintKey::Predicted(recipe, shift) => state.look(MetersKey(recipe.clone(), *shift)).value(),
+        ImprintKey::Mean(key) => state.look(key.clone()).value(),
+        ImprintKey::Picture(touch) => state.look(PictureKey(*touch)).map(|found| &found.imprint),
     }
 }
 

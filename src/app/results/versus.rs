@@ -9,18 +9,18 @@ use super::super::keys::{
     PoseKey, PredictionKey, ShiftMode, TouchKey, VersusKey,
 };
 use super::super::pane::Demand;
-use super::super::results::{Computes, Demands, Imprint};
+use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::settings::versus::{Versus, VersusMode};
 use super::super::state::{Absent, Lookup, State};
 use super::super::{recipe, results};
 use touch2touch_core::grid::DepthMap;
-use touch2touch_core::rig::{PadId, PerPad};
+use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::compare::depict::mean;
 use touch2touch_pipeline::compare::deviation::{CloudDifference, cloud_difference};
 use touch2touch_pipeline::compare::subject::{MadeFrom, RecipeChange, Subject};
-use touch2touch_pipeline::compare::{Comparison, Depicted, between, tile_of};
+use touch2touch_pipeline::compare::{Beside, Comparison, Depicted, between, tile_of};
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::steps::cloud::Clouds;
 use touch2touch_pipeline::steps::pose::PoseResult;
@@ -50,17 +50,24 @@ impl Computes for ComparedKey {
 
 /// An imprint with what is known of its picture, as an input of a job.
 struct Part {
-    imprint: Imprint,
+    of: ImprintKey,
+    imprint: DepthMap,
     drawn: Option<(Arc<Prediction>, ShiftMode)>,
+    beside: Option<Arc<Beside>>,
 }
 
 impl Part {
-    fn of(key: &ImprintKey, state: &State) -> Option<Self> {
-        let drawn = match key {
-            ImprintKey::Predicted(recipe, shift) => Some((state.results.predictions.get(recipe)?.clone(), *shift)),
-            _ => None,
-        };
-        Some(Self { imprint: results::imprint_input(state, key)?, drawn })
+    fn of(of: &ImprintKey, state: &State) -> Option<Self> {
+        let (mut drawn, mut beside) = (None, None);
+        match of {
+            ImprintKey::Predicted(recipe, shift) => {
+                drawn = Some((state.results.predictions.get(recipe)?.clone(), *shift));
+            }
+            ImprintKey::Picture(touch) => beside = Some(state.results.pictures.get(&PictureKey(*touch))?.clone()),
+            ImprintKey::Measured(_) | ImprintKey::Mean(_) => {}
+        }
+        let imprint = results::imprint_of(state, of).ready()?.clone();
+        Some(Self { of: of.clone(), imprint, drawn, beside })
     }
 
     fn depicted<'a>(
@@ -69,16 +76,15 @@ impl Part {
         pad: PadId,
         tile: Option<&'a DepthMap>,
     ) -> Result<Depicted<'a>, TaskError> {
-        let imprint = self.imprint.get()?;
-        let own = match &self.imprint {
-            Imprint::Measured(..) => tile,
-            Imprint::Picture(found) => Some(&found.tile),
-            Imprint::Predicted(_) => {
+        let own = match (&self.of, &self.beside) {
+            (ImprintKey::Measured(_), _) => tile,
+            (_, Some(found)) => Some(&found.tile),
+            _ => {
                 let drawn = self.drawn.as_ref().map(|(prediction, shift)| (&**prediction, *shift));
-                return Depicted::predicted(imprint, drawn, sample, pad, tile);
+                return Depicted::predicted(&self.imprint, drawn, sample, pad, tile);
             }
         };
-        Ok(Depicted { imprint, tile: own.map(Cow::Borrowed) })
+        Ok(Depicted { imprint: &self.imprint, tile: own.map(Cow::Borrowed) })
     }
 }
 
@@ -107,19 +113,7 @@ impl Computes for CloudDifferenceKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<CloudDifference>> {
         let cloud = |key: &CloudKey| state.results.clouds.get(key).cloned();
         let (a, b) = (cloud(&self.a)?, cloud(&self.b)?);
-        let mut imprints: PerPad<[Imprint; 2]> = PerPad::default();
-        for (pad, (imprint, _)) in self.a.parts.entries() {
-            if let Some((other, _)) = &self.b.parts[pad] {
-                imprints[pad] = Some([results::imprint_input(state, imprint)?, results::imprint_input(state, other)?]);
-            }
-        }
-        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| {
-            let imprints = imprints.as_ref().map(|both| {
-                let [a, b] = both?;
-                Some([a.get().ok()?, b.get().ok()?])
-            });
-            Ok(cloud_difference(&a, &b, &imprints))
-        }))
+        Some(Job::new(Lane::Compute, "Distances between clouds", move |_| Ok(cloud_difference(&a, &b))))
     }
 }
 
@@ -196,7 +190,7 @@ pub fn subject<'a>(state: &'a State, subject: &Subject, finger: PadId) -> Lookup
         }
         _ => None,
     };
-    results::imprint_of(state, key).or_failed(unmade)
+    results::imprint_of(state, &key).or_failed(unmade)
 }
 
 /// One subject against another of a finger.
@@ -221,9 +215,9 @@ fn subject_cloud(state: &State, subject: &Subject) -> Result<CloudKey, Vec<MaskK
 }
 
 /// The surface points of a subject, where they are there, with their recipe.
-pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Arc<Clouds>)> {
+pub(crate) fn subject_points<'a>(state: &'a State, subject: &Subject) -> Option<(CloudKey, &'a Clouds)> {
     let key = subject_cloud(state, subject).ok()?;
-    let found = state.results.clouds.get(&key)?;
+    let found = state.results.clouds.get(&key)?.surface();
     Some((key, found))
 }
 
@@ -307,7 +301,7 @@ pub(crate) fn want_versus(wants: &mut Demands<'_>) {
 }
 
 pub(crate) fn want_is_there(wants: &Demands<'_>, key: &ImprintKey) -> bool {
-    results::imprint_of(wants.state, key.clone()).ready().is_some()
+    results::imprint_of(wants.state, key).ready().is_some()
 }
 
 /// The imprint of a subject, and the predictions that it is made of.
@@ -365,5 +359,28 @@ pub(crate) fn want_subject_place(wants: &mut Demands<'_>, subject: &Subject) {
             subject_pose_key(state, subject).into_iter().for_each(|pose| wants.ask(pose));
         }
         Ok(_) => {}
+    }
+}
+
+/// Prediction against measurement of one finger.
+pub fn comparison(state: &State, finger: PadId) -> Lookup<'_, Comparison> {
+    let Some(recipe) = results::chosen(state, finger) else {
+        return results::sample(state).and_then(Absent::NoPrediction, |_| None);
+    };
+    if state.library.predicts_color(&recipe.bundle) {
+        return Lookup::Absent(Absent::PredictsColor);
+    }
+    if results::bubble(state, finger).ready().is_none() {
+        return results::bubble(state, finger).without();
+    }
+    state.look(VersusKey::measured(recipe.clone(), state.settings.shift)).value()
+}
+
+pub(crate) fn want_comparison(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
+    let state = wants.state;
+    let Some(recipe) = results::shown(state, touch) else { return };
+    let there = |source| results::imprint(state, source, finger).ready().is_some();
+    if there(ImprintSource::Measured) && there(ImprintSource::Predicted) {
+        wants.ask(VersusKey::measured(recipe.clone(), state.settings.shift));
     }
 }

@@ -2,6 +2,7 @@
 //! [`cloud_difference`].
 
 use crate::steps::cloud::Clouds;
+use crate::steps::estimate::Estimate;
 use touch2touch_core::colormap::ColorMap;
 use touch2touch_core::deviation::{Painted, of_points, on_surface, to_cloud};
 use touch2touch_core::frames::PlanarPose;
@@ -52,17 +53,18 @@ impl CloudDifference {
     }
 }
 
-/// Measures the points of `a` against those of `b`. `imprints` are those that the two clouds were made of: they say which
-/// is deeper.
-pub fn cloud_difference(a: &Clouds, b: &Clouds, imprints: &PerPad<[&DepthMap; 2]>) -> CloudDifference {
+/// Measures the surface points of `a` against those of `b`, both by [`Estimate::of_masks`]; their imprints say which is
+/// deeper.
+pub fn cloud_difference(a: &Estimate, b: &Estimate) -> CloudDifference {
     let (mut squares, mut count) = (0.0, 0usize);
     let mut points = PerPad::default();
-    for (pad, cloud) in a.fingers.entries() {
-        let others = b.finger(pad).map_or(&[][..], |cloud| &cloud.points);
+    for (pad, cloud) in a.surface().fingers.entries() {
+        let others = b.surface().finger(pad).map_or(&[][..], |cloud| &cloud.points);
         let mut found = to_cloud(&cloud.points, others);
         for ((d, pixel), contact) in found.iter_mut().zip(&cloud.pixels).zip(&cloud.contact) {
             let at = |depth: &DepthMap| depth.get(pixel[0].into(), pixel[1].into()).copied();
-            let deeper = imprints[pad].as_ref().and_then(|[a, b]| Some(at(a)? - at(b)?));
+            let deeper =
+                a.imprints[pad].as_ref().zip(b.imprints[pad].as_ref()).and_then(|(a, b)| Some(at(a)? - at(b)?));
             if deeper.is_some_and(|deeper| deeper < 0.0) {
                 *d = -*d;
             }

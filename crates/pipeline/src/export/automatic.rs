@@ -53,6 +53,6 @@ impl<'a> Automatic<'a> {
         if let Some(note) = found.basis.note() {
             (self.note)(&format!("note: {} finger: {note}", sample.rig.pad_key(finger)));
         }
-        Ok(found.mask.clone())
+        Ok((*found.mask).clone())
     }
 }

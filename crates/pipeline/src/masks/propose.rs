@@ -7,6 +7,7 @@ mod batch;
 mod touch;
 
 use std::borrow::Cow;
+use std::sync::Arc;
 
 use glam::DAffine3;
 use serde::{Deserialize, Serialize};
@@ -208,7 +209,7 @@ pub fn automatic(found: ContactMask, recipe: &MaskRecipe, model: &str) -> Propos
     let provenance = recipe.provenance(model, found.basis);
     let unsure = found.unsure.map(|share| format!("the model is unsure of {:.1} % of the picture", share * 100.0));
     let note = found.basis.note().into_iter().chain(unsure).collect::<Vec<_>>().join("; ");
-    Proposal { mask: found.mask, provenance, note }
+    Proposal { mask: Arc::unwrap_or_clone(found.mask), provenance, note }
 }
 
 /// The signed distance of each membrane point to the CAD model, meters, negative inside; NaN without depth. From it
@@ -370,7 +371,7 @@ mod tests {
     #[test]
     fn a_model_says_how_sure_it_is() {
         let recipe = MaskRecipe::Unet("id".into(), Some(Bits::from(0.5_f32)));
-        let found = |basis, unsure| ContactMask { mask: Mask::filled(2, 2, true), basis, unsure };
+        let found = |basis, unsure| ContactMask { mask: Arc::new(Mask::filled(2, 2, true)), basis, unsure };
         let sure = automatic(found(MaskBasis::Source, Some(0.012)), &recipe, "model");
         assert_eq!(sure.note, "the model is unsure of 1.2 % of the picture");
         assert!(matches!(sure.provenance, Provenance::Model { .. }), "{:?}", sure.provenance);

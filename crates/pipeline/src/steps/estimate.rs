@@ -11,14 +11,15 @@ use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::{ImprintOf, ImprintSource, PairLabels};
-use crate::steps::cloud::images;
+use crate::steps::cloud::{Clouds, images};
 use crate::steps::imprint::{imprints_of, measured};
-use crate::steps::mask::{Contact, MaskInputs, contact_mask, no_mask_model};
+use crate::steps::mask::{Contact, MaskInputs, MaskRecipe, contact_mask, no_mask_model};
 use crate::steps::models::Models;
 use crate::steps::pose::{PoseResult, pose};
 use crate::steps::prediction::Prediction;
 use crate::steps::recipe::{Recipe, Stage};
 use touch2touch_core::align::{Ask, Contacts, Register};
+use touch2touch_core::contact::ContactMask;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid};
@@ -56,6 +57,7 @@ pub struct Estimate {
     pub imprints: Arc<PerPad<DepthMap>>,
     probabilities: PerPad<Probability>,
     contact: Option<Arc<Contact>>,
+    surface: Option<Arc<Clouds>>,
     points: Option<Arc<Result<Vec<DVec3>, TaskError>>>,
     pose: Option<Arc<Result<PoseResult, TaskError>>>,
 }
@@ -88,6 +90,32 @@ impl Estimate {
     /// Imprints that no recipe makes, such as the mean of several. Nobody can have drawn on them.
     pub fn of_imprints(recipe: &Recipe, imprints: PerPad<DepthMap>) -> Self {
         Self::with_imprints(&Recipe { hand: false, ..recipe.clone() }, imprints)
+    }
+
+    /// The surface of imprints whose masks were made one by one, with the contact points; a pad without a mask has none.
+    /// `made_by` is the recipe of the masks that nobody drew, if there are any.
+    ///
+    /// # Errors
+    /// As [`Contact::clouds`].
+    pub fn of_masks(
+        imprint: ImprintSource,
+        made_by: Option<MaskRecipe>,
+        imprints: PerPad<DepthMap>,
+        masks: PerPad<ContactMask>,
+        sample: &Sample,
+    ) -> Result<Self, TaskError> {
+        let recipe = Recipe { imprint, ..Recipe::default() };
+        let made_by = made_by.map_or_else(|| recipe.mask_recipe(), Ok)?;
+        let contact = Contact { imprints, masks, recipe: made_by, model: None };
+        Ok(Self {
+            recipe,
+            reached: Some(Stage::Cloud),
+            imprints: Arc::new(contact.imprints.clone()),
+            surface: Some(Arc::new(contact.clouds(sample)?)),
+            points: Some(Arc::new(contact.points(sample))),
+            contact: Some(Arc::new(contact)),
+            ..Self::default()
+        })
     }
 
     /// The pose that one from other imprints is compared with: the true one, or that of the measured imprints of pictures,
@@ -178,8 +206,9 @@ impl Estimate {
                     self.points = self.contact.as_ref().map(|contact| Arc::new(contact.points(sample)));
                 }
                 Stage::Pose => {
-                    let found = self.pose_by(touch, &*self.recipe.registration.method(), ask);
-                    self.pose = Some(Arc::new(found));
+                    let by = self.recipe.registration.method();
+                    let tool = touch.tool.map_err(Clone::clone);
+                    self.pose = Some(Arc::new(tool.and_then(|tool| self.pose_by(sample, tool, &*by, ask))));
                 }
             }
             self.reached = Some(next);
@@ -210,13 +239,12 @@ impl Estimate {
     /// Before [`Stage::Cloud`].
     pub fn pose_by(
         &self,
-        touch: Touch<'_>,
+        sample: &Sample,
+        tool: &ToolModel,
         registration: &dyn Register,
         ask: Ask<'_>,
     ) -> Result<PoseResult, TaskError> {
-        let tool = touch.tool.map_err(Clone::clone)?;
-        let truth = touch.sample.grasp_from_object;
-        self.with_contacts(touch, |contacts| pose(contacts, tool, registration, ask, truth))?
+        self.with_contacts(sample, |contacts| pose(contacts, tool, registration, ask, sample.grasp_from_object))?
     }
 
     /// Candidates for the tool of the touch, the likeliest first.
@@ -228,23 +256,19 @@ impl Estimate {
     /// Before [`Stage::Cloud`].
     pub fn which_tool<'t>(
         &self,
-        touch: Touch<'_>,
+        sample: &Sample,
         tools: impl IntoIterator<Item = (&'t str, &'t ToolModel)>,
         registration: &dyn Register,
     ) -> Result<Vec<Candidate>, TaskError> {
-        self.with_contacts(touch, |contacts| which_tool(contacts, tools, registration))
+        self.with_contacts(sample, |contacts| which_tool(contacts, tools, registration))
     }
 
     /// The contact points with the imprints that they are from, as every registration takes them.
-    ///
-    /// # Errors
-    /// If there are no contact points.
-    ///
-    /// # Panics
-    /// Before [`Stage::Cloud`].
-    pub fn with_contacts<T>(&self, touch: Touch<'_>, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
-        let points = self.points().map_err(Clone::clone)?;
-        let images = images(touch.sample, &self.contact().imprints.as_ref(), self.recipe.imprint);
+    fn with_contacts<T>(&self, sample: &Sample, of: impl FnOnce(Contacts<'_>) -> T) -> Result<T, TaskError> {
+        let (points, contact) = (self.points().map_err(Clone::clone)?, self.contact());
+        let masked =
+            sample.rig.pads().map(|pad| contact.imprints[pad].as_ref().filter(|_| contact.masks[pad].is_some()));
+        let images = images(sample, &masked.collect(), self.recipe.imprint);
         Ok(of(Contacts { points, images: &images }))
     }
 
@@ -293,6 +317,13 @@ impl Estimate {
         Ok(Contact { imprints: (*imprints).clone(), masks, recipe: made_by, model })
     }
 
+    /// Bytes held of imprints, masks and points.
+    pub fn bytes(&self) -> usize {
+        let pixels: usize = self.imprints.iter().flatten().map(Grid::len).sum();
+        let points = self.points.as_deref().and_then(|points| points.as_ref().ok()).map_or(0, Vec::len);
+        self.surface.as_ref().map_or(0, |surface| surface.bytes()) + pixels * 9 + points * size_of::<DVec3>()
+    }
+
     /// True where it came to a stage.
     pub fn has(&self, stage: Stage) -> bool {
         self.reached >= Some(stage)
@@ -309,6 +340,14 @@ impl Estimate {
     /// Before [`Stage::Mask`].
     pub fn contact(&self) -> &Contact {
         self.contact.as_ref().expect("the masks were asked for")
+    }
+
+    /// All surface points, with the contact points marked.
+    ///
+    /// # Panics
+    /// If it was not made by [`Self::of_masks`].
+    pub fn surface(&self) -> &Clouds {
+        self.surface.as_ref().expect("the surface is made with the points of masks")
     }
 
     /// The contact points of all pads, grasp frame, meters.

@@ -1,12 +1,13 @@
 //! Looking into a registration: the recorded run, and what the layers show of it.
 
 use crate::error::TaskError;
-use crate::steps::cloud::{Clouds, FingerCloud};
+use crate::steps::cloud::FingerCloud;
+use crate::steps::estimate::Estimate;
 use crate::steps::pose::PoseResult;
 use touch2touch_core::align::PointFit;
 use touch2touch_core::align::reason::{self, Reason, ReasonCounts, reasons};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::{Grid, Mask};
+use touch2touch_core::grid::Grid;
 use touch2touch_core::rig::{PadId, PerPad};
 
 /// Layers of one registration.
@@ -50,12 +51,13 @@ const RANGE_KERNELS: f64 = 4.0;
 /// Range of the heat map for an engine without a kernel, meters.
 const RANGE_M: f64 = 4e-3;
 
-/// Layers of a recorded registration of `clouds` with the masks they were made with.
+/// Layers of a recorded registration of an estimate by [`Estimate::of_masks`].
 ///
 /// # Errors
-/// If the run did not record what became of the points, or they are not those of the clouds.
-pub fn layers(clouds: &Clouds, masks: &PerPad<&Mask>, run: &PoseResult) -> Result<LayerResult, TaskError> {
+/// If the run did not record what became of the points, or they are not those of the estimate.
+pub fn layers(estimate: &Estimate, run: &PoseResult) -> Result<LayerResult, TaskError> {
     const WHAT: &str = "Layers";
+    let (clouds, masks) = (estimate.surface(), &estimate.contact().masks);
     let mut rest = run.report.fits.as_slice();
     let mut grids = PerPad::default();
     let mut fits = PerPad::default();
@@ -67,7 +69,7 @@ pub fn layers(clouds: &Clouds, masks: &PerPad<&Mask>, run: &PoseResult) -> Resul
         };
         rest = others;
         fits[finger] = Some(part.to_vec());
-        grids[finger] = masks[finger].and_then(|mask| reasons(mask, &pixels, part));
+        grids[finger] = masks[finger].as_ref().and_then(|found| reasons(&found.mask, &pixels, part));
     }
     if !rest.is_empty() {
         return Err(TaskError::new(WHAT, "the registration was of other points than those shown"));

@@ -199,6 +199,14 @@ impl MaskRecipe {
         self.provenance(model, MaskBasis::Source).text()
     }
 
+    /// The least probability of contact, where it is not the mask model's own.
+    pub fn probability(&self) -> Option<f32> {
+        match self {
+            Self::Unet(_, least) => least.map(Bits::get),
+            _ => None,
+        }
+    }
+
     /// The source that it is of.
     pub fn source(&self) -> MaskSource {
         match self {
@@ -248,7 +256,7 @@ pub fn contact_mask(
     unet: impl FnOnce(&DepthMap) -> Result<ContactMask, TaskError>,
 ) -> Result<ContactMask, TaskError> {
     if let Some(hand) = inputs.drawn(pad, imprint) {
-        return Ok(ContactMask { mask: (*hand.mask).clone(), basis: MaskBasis::Hand, unsure: None });
+        return Ok(ContactMask { mask: hand.mask.clone(), basis: MaskBasis::Hand, unsure: None });
     }
     match recipe {
         MaskRecipe::Unet(..) => unet(imprint),
@@ -260,7 +268,7 @@ pub fn contact_mask(
 ///
 /// # Errors
 /// If something the recipe needs is not there, or the sizes differ.
-pub fn without_model(
+fn without_model(
     recipe: &MaskRecipe,
     imprint: &DepthMap,
     pad: PadId,
@@ -351,7 +359,7 @@ impl Contact {
     /// # Errors
     /// As [`contact_points`].
     pub fn points(&self, sample: &Sample) -> Result<Vec<DVec3>, TaskError> {
-        contact_points(sample, &self.imprints.as_ref(), &self.masks.as_ref().map(|found| Some(&found?.mask)))
+        contact_points(sample, &self.imprints.as_ref(), &self.masks.as_ref().map(|found| Some(&*found?.mask)))
     }
 
     /// All surface points of the pair, with the contact points marked.
@@ -359,7 +367,7 @@ impl Contact {
     /// # Errors
     /// As [`clouds`].
     pub fn clouds(&self, sample: &Sample) -> Result<Clouds, TaskError> {
-        let part = |pad| Some((self.imprints[pad].as_ref()?, self.masks[pad].as_ref().map(|found| &found.mask)));
+        let part = |pad| Some((self.imprints[pad].as_ref()?, self.masks[pad].as_ref().map(|found| &*found.mask)));
         clouds(sample, &sample.rig.pads().map(part).collect())
     }
 }
@@ -397,7 +405,7 @@ mod tests {
         let right = contact_mask(&threshold, &imprint, lab::RIGHT, inputs, never).unwrap();
         let left = contact_mask(&threshold, &imprint, lab::LEFT, inputs, never).unwrap();
         assert_eq!((right.basis, left.basis), (MaskBasis::Source, MaskBasis::Hand));
-        assert_eq!(left.mask, drawn);
+        assert_eq!(*left.mask, drawn);
         // One of another size is of another image.
         let small = DepthMap::from_fn(60, 60, |x, _| if x < 30 { 0.008 } else { 0.0 });
         assert_eq!(contact_mask(&threshold, &small, lab::LEFT, inputs, never).unwrap().basis, MaskBasis::Source);

@@ -77,7 +77,7 @@ fn update_surface(cx: &Cx<'_>, memory: &mut Memory, source: ImprintSource, key: 
     let mut fingers = PerPad::default();
     for (pad, imprint) in key.entries() {
         let camera = results::sample(cx.state).ready().and_then(|sample| sample.pad(pad)?.camera());
-        let imprint = results::imprint_of(cx.state, imprint.clone()).ready();
+        let imprint = results::imprint_of(cx.state, imprint).ready();
         let made = imprint.zip(camera).and_then(|(imprint, camera)| membrane(imprint, camera).ok());
         fingers[pad] = made.map(Arc::new);
     }

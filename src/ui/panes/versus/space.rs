@@ -119,7 +119,7 @@ fn update(cx: &Cx<'_>, space: &mut Space, versus: &Versus) {
         (None, _) => space.apart = None,
         (Some((key, _)), Some((held, ..))) if *held == key => {}
         (Some((key, difference)), _) => {
-            if let Some(clouds) = cx.state.results.clouds.get(&key.a) {
+            if let Some(clouds) = cx.state.results.clouds.get(&key.a).map(|estimate| estimate.surface()) {
                 space.revision += 1;
                 let colored = |pad, values: &Vec<f32>| {
                     let points = clouds.finger(pad)?.points.as_slice().into();

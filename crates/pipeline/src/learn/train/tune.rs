@@ -1,6 +1,7 @@
 //! The training itself, and what it is worth on what was left out.
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde_json::json;
@@ -209,7 +210,7 @@ impl Judge<'_> {
             let said =
                 Grid::from_vec(input.size[0], input.size[1], said).map_err(|err| TaskError::from_error(WHAT, &err))?;
             let said = if input.rotation_deg == 180 { said.rotated_180() } else { said };
-            let mut found = contact_of(&said, &drawn.imprint, least).mask;
+            let mut found = Arc::unwrap_or_clone(contact_of(&said, &drawn.imprint, least).mask);
             let mut truth = drawn.mask.clone();
             if let Some(counted) = &drawn.counted {
                 for ((found, truth), counted) in

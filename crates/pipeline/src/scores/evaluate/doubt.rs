@@ -27,7 +27,7 @@ pub(super) fn doubt(estimate: &mut Estimate, labels: &PairLabels, models: &Model
         if let Some((hand, ignored)) = hand.and_then(|hand| Some((hand, hand.marks.ignored()?))) {
             // Where a person says nothing there is nothing to disagree about.
             let said = |x: usize, y: usize| if ignored[(x, y)] { hand.mask[(x, y)] } else { model[(x, y)] };
-            model = Mask::from_fn(model.width(), model.height(), said);
+            model = Mask::from_fn(model.width(), model.height(), said).into();
         }
         doubt = doubt.or(Doubt::of(probability, &model, hand.map(|hand| &*hand.mask)));
     }

@@ -1,0 +1,202 @@
+//! What is looked at of a registration: recorded runs, their steps and layers, distances to the model, other tools.
+
+use std::sync::Arc;
+
+use strum::IntoEnumIterator as _;
+
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{
+    DeviationKey, ImprintSource, Inspection, InspectionKey, LayersKey, PoseBits, RankingKey, RunKey, ToolKey,
+};
+use super::super::results;
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::inspect::Inspected;
+use super::super::state::{Absent, Lookup, State};
+use touch2touch_core::align::Ask;
+use touch2touch_core::which_tool::Candidate;
+use touch2touch_pipeline::compare::deviation::{self, Deviation};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::layers::{self, LayerResult};
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::tool::{NamedTool, named_tool};
+
+impl Computes for RunKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<PoseResult>> {
+        let registered = results::registered(state, &self.pose)?;
+        let (registration, start) = (self.pose.registration, self.start.map(PoseBits::get));
+        Some(Job::new(Lane::Compute, "Registration, recorded", move |_| {
+            let ask = Ask { starts: start.as_ref().map(std::slice::from_ref), record: true, ..Ask::default() };
+            registered.pose(registration, ask)
+        }))
+    }
+}
+
+/// The recorded registration from the registration's own starts; `None` while its inputs are not there.
+pub(crate) fn run_key(state: &State, source: ImprintSource) -> Option<RunKey> {
+    Some(RunKey { pose: results::pose_key(state, source).ok()??, start: None })
+}
+
+impl Computes for InspectionKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Inspection>> {
+        let (registered, by) = (results::registered(state, &self.0.pose)?, self.0.pose.registration);
+        let run = state.results.runs.get(&self.0)?.clone();
+        Some(Job::new(Lane::Compute, "Steps of the registration", move |_| {
+            let points = registered.estimate.points().map_err(Clone::clone)?.clone();
+            Ok(Inspection::new(run, points, &registered.tool.model, by))
+        }))
+    }
+
+    fn arrived(&self, state: &mut State, _: &Arc<Inspection>) {
+        if let Some(at) = self.0.pose.cloud.place() {
+            state.results.latest.entry(at).or_default().inspection = Some(self.clone());
+        }
+    }
+}
+
+/// The recipe of the recorded run that is looked at; `Ok(None)` while something it is made from is missing.
+///
+/// # Errors
+/// Why there can be none.
+pub(crate) fn inspection_key(state: &State) -> Result<Option<RunKey>, Absent> {
+    let pose = results::pose_key(state, state.inspect.source)?;
+    Ok(pose.map(|pose| RunKey { pose, start: state.inspect.start }))
+}
+
+/// The recorded run that is looked at.
+pub fn inspection(state: &State) -> Lookup<'_, Arc<Inspection>> {
+    if let failed @ Lookup::Failed(_) = results::tool(state) {
+        return failed.without();
+    }
+    let before = || state.results.inspections.get(results::latest(state, state.inspect.source)?.inspection.as_ref()?);
+    let key = inspection_key(state);
+    let run = key.clone().ok().flatten().and_then(|run| state.failure(run));
+    state.look_or(key.map(|key| key.map(InspectionKey)), before).or_failed(run)
+}
+
+/// The steps that are looked at, or the recorded registration that they are of.
+pub(crate) fn want_inspection(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if let (true, Ok(Some(run))) = (results::shows_steps(state, state.inspect.source), inspection_key(state)) {
+        let there = state.results.runs.contains(&run);
+        let key = InspectionKey(run.clone());
+        match there || state.results.inspections.contains(&key) {
+            true => wants.ask(key),
+            false => wants.ask(run),
+        }
+    }
+}
+
+/// The step that is looked at, of the run shown (also of the one before, while the next is computed).
+pub fn inspected(state: &State) -> Option<Inspected<'_>> {
+    let inspection = inspection(state).shown()?;
+    let last_run = inspection.num_runs().checked_sub(1)?;
+    let run = state.inspect.run.unwrap_or(inspection.report().winner).min(last_run);
+    let last = inspection.num_steps(run).checked_sub(1)?;
+    let at = state.inspect.at.unwrap_or(last).min(last);
+    Some(Inspected { inspection, run, at, step: inspection.step(run, at)? })
+}
+
+/// The step that the 3D view of a side shows instead of the registered pose.
+pub(crate) fn inspected_in(state: &State, source: ImprintSource) -> Option<Inspected<'_>> {
+    if results::shows_steps(state, source) { inspected(state) } else { None }
+}
+
+impl Computes for LayersKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<LayerResult>> {
+        let estimate = state.results.clouds.get(&self.0.cloud)?.clone();
+        let run = state.results.runs.get(&self.run())?.clone();
+        Some(Job::new(Lane::Compute, "Layers of the registration", move |_| layers::layers(&estimate, &run)))
+    }
+}
+
+/// The layers of an imprint.
+pub fn layers(state: &State, source: ImprintSource) -> Lookup<'_, LayerResult> {
+    let key = results::pose_key(state, source).map(|key| key.map(LayersKey));
+    let run = key.clone().ok().flatten().and_then(|key| state.failure(key.run()));
+    state.look_or(key, || None).or_failed(run).value()
+}
+
+/// The layers of an imprint, or the recorded registration that they need.
+pub(crate) fn want_layers(wants: &mut Demands<'_>, source: ImprintSource) {
+    let state = wants.state;
+    let Some(run) = results::run_key(state, source).filter(|_| results::shows_layers(state, source)) else { return };
+    let key = LayersKey(run.pose.clone());
+    match state.results.runs.contains(&run) || state.results.layers.contains(&key) {
+        true => wants.ask(key),
+        false => wants.ask(run),
+    }
+}
+
+impl Computes for DeviationKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Deviation>> {
+        let registered = results::registered(state, &self.0)?;
+        let pose = state.results.poses.get(&self.0)?.grasp_from_object;
+        Some(Job::new(Lane::Compute, "Distances to the model", move |_| {
+            Ok(deviation::deviation(registered.estimate.surface(), &registered.tool.model, pose))
+        }))
+    }
+}
+
+/// The distances of the contact points of an imprint from the model at its registered pose.
+pub fn deviation(state: &State, source: ImprintSource) -> Lookup<'_, Deviation> {
+    let key = results::pose_key(state, source).map(|key| key.map(DeviationKey));
+    state.look_or(key, || None).value()
+}
+
+/// The distances of an imprint, once its pose is there.
+pub(crate) fn want_deviation(wants: &mut Demands<'_>, source: ImprintSource) {
+    let state = wants.state;
+    let Ok(Some(pose)) = results::pose_key(state, source) else { return };
+    if results::shows_deviation(state, source) && state.results.poses.contains(&pose) {
+        wants.ask(DeviationKey(pose));
+    }
+}
+
+impl Computes for RankingKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Candidate>>> {
+        let open = state.library.open.as_ref()?;
+        let (source, registered, registration) =
+            (open.source.clone(), results::registered(state, &self.0)?, self.0.registration);
+        let known = |name: String| {
+            let key = ToolKey { dataset: open.seq, name: name.as_str().into() };
+            (name, state.results.tools.get(&key).cloned())
+        };
+        let tools: Vec<(String, Option<Arc<NamedTool>>)> = open.index().tools().into_iter().map(known).collect();
+        Some(Job::new(Lane::Compute, "Which tool", move |cx| {
+            let mut models = Vec::with_capacity(tools.len());
+            for (name, known) in tools {
+                if cx.cancel.is_cancelled() {
+                    return Err(TaskError::cancelled("Which tool"));
+                }
+                // A model that cannot be used is no candidate.
+                let read = || Some(Arc::new(named_tool(&name, source.tool_mesh(&name).ok()?).ok()?));
+                models.extend(known.or_else(read));
+            }
+            let tools = models.iter().map(|tool| (tool.name.as_str(), &tool.model));
+            registered.estimate.which_tool(&registered.sample, tools, &*registration.method())
+        }))
+    }
+
+    fn wanted(wants: &mut Demands<'_>) {
+        for source in ImprintSource::iter() {
+            if let Some(key) = ranking_key(wants.state, source)
+                && wants.state.results.poses.contains(&key.0)
+            {
+                wants.ask(key);
+            }
+        }
+    }
+}
+
+/// The key of the ranking; `None` where nobody asked for one, or there is no pose.
+fn ranking_key(state: &State, source: ImprintSource) -> Option<RankingKey> {
+    let asked = state.workbench.tools_tried.filter(|asked| state.pair_key() == Some(*asked));
+    asked.and_then(|_| Some(RankingKey(results::pose_key(state, source).ok()??)))
+}
+
+/// The tools of the data set, ranked for a side of the selected pair; `None` where nobody asked for it.
+pub fn ranking(state: &State, source: ImprintSource) -> Option<Lookup<'_, Vec<Candidate>>> {
+    let key = ranking_key(state, source)?;
+    Some(state.look_or(Ok(Some(key)), || None).value())
+}
