@@ -103,7 +103,6 @@ fn how(action: Action) -> How {
         A::GrowMask => Verb(&["label", "demo", "--pair", "a", "--clean", "grow=1"]),
         A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
         A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
-        A::TakeOver => Verb(&["label", "demo", "--pair", "a", "--imprint", "predicted", "--from", "measured"]),
         A::Propose | A::NextProposal => Verb(&["label", "demo", "--pair", "a", "--propose", "cad_registered"]),
         A::ProposeAll => Verb(&["masks", "propose", "demo", "--source", "cad_truth", "--limit", "8"]),
         A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
@@ -489,7 +488,7 @@ fn a_pair_in_files_is_the_same_in_both() {
     studio.predict(1);
     studio.send(LabelsCommand::AdoptAutomatic.into());
     studio.send(ViewCommand::SelectImprint(ImprintSource::Predicted).into());
-    studio.send(LabelsCommand::TakeOver.into());
+    studio.send(LabelsCommand::AdoptAutomatic.into());
     let name = studio.state.pair_name().to_owned();
     for source in ImprintSource::iter() {
         let [by_studio, by_verb] = ["studio", "verb"].map(|by| home.path().join(by));

@@ -172,14 +172,12 @@ macro_rules! actions {
             state => editable(state, LabelsCommand::AdoptAutomatic);
         Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
-        NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes, other masks", [shift(K::G)],
+        NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes", [shift(K::G)],
             _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
         ProposeAll, Mask, "Propose for all listed", "Makes what the source proposes the mask of every pair in the list that is not marked done, flagged or skipped; hand work stays, and each pair can be undone", [],
             state => when(labels::can_propose_all(state), LabelsCommand::ProposeAll);
         LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)],
             state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
-        TakeOver, Mask, "Take the other imprint's mask", "Copies the mask of the measured imprint to the predicted one, or the other way round; each keeps its own", [],
-            state => editable(state, LabelsCommand::TakeOver);
         ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
         Undo, Mask, "Undo", "Takes back the last change of what is on screen, or the last corner of the open polygon", [ctrl(K::Z)],
@@ -455,7 +453,6 @@ impl Action {
             Self::PaintIgnore => "unknown unsure void class",
             Self::Propose | Self::NextProposal | Self::ProposeAll => "prelabel batch pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
-            Self::TakeOver => "copy mask across measured predicted",
             Self::ResetMask => "delete mask automatic again",
             Self::ClearMask => "delete erase empty nothing start over reset",
             Self::Undo => "revert back",

@@ -57,8 +57,6 @@ pub enum LabelsCommand {
     CleanUp(CleanUp),
     /// Makes the automatic mask the corrected one.
     AdoptAutomatic,
-    /// Makes a copy of the other imprint's mask the corrected one.
-    TakeOver,
     /// Makes the proposal that is shown the corrected mask; what was painted by hand stays, unless the preferences say.
     AcceptProposal,
     /// Makes what the source proposes the mask of every pair in the list that nobody judged yet.
@@ -116,7 +114,6 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
             clean(state, clean_up, effects);
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
-        LabelsCommand::TakeOver => take_over(state, effects),
         LabelsCommand::AcceptProposal => accept_proposal(state, effects),
         LabelsCommand::ProposeAll => batch::propose_all(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
@@ -441,26 +438,6 @@ fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Remove the correction") {
         change_mask(state, &place, LabelEdit::Remove(place.clone()), effects);
     }
-}
-
-/// Makes a copy of the other imprint's mask that of the one worked on. Nothing else carries a mask from one to another.
-fn take_over(state: &mut State, effects: &mut Vec<Effect>) {
-    const WHAT: &str = "Take the other imprint's mask";
-    end_stroke(state, effects);
-    if !check_editable(state, WHAT) {
-        return;
-    }
-    let finger = state.selection.finger;
-    let to = results::worked_on(state, finger);
-    let from = to.other();
-    let size = results::imprint(state, to, finger).ready().map(|imprint| imprint.size());
-    let places = results::mask_place(state, from, finger).zip(results::mask_place(state, to, finger));
-    let (Some(mask), Some((other, place))) = (start_from(state, from, finger), places) else {
-        let why = format!("there is no mask on the {} imprint", from.key());
-        return state.log.error(&TaskError::new(WHAT, why));
-    };
-    let from = TakenUp { place: other, mask };
-    change_mask(state, &place, LabelEdit::TakeOver { from, to: place.clone(), size }, effects);
 }
 
 pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Effect>) {

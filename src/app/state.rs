@@ -308,8 +308,6 @@ pub enum Absent {
     NoHandPose,
     /// Nothing was painted by hand on the mask.
     NoStrokes,
-    /// Nobody worked on another pair of the tool.
-    NoOtherMask,
 }
 
 impl Absent {
@@ -339,7 +337,6 @@ impl Absent {
             Self::NoStrokes => {
                 "Nothing to grow from: paint a short stroke of contact, and with the right button one that is free."
             }
-            Self::NoOtherMask => "Nobody worked on another pair of this tool yet.",
         }
     }
 }

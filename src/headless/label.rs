@@ -1,4 +1,4 @@
-//! `touch2touch label`: masks drawn or taken over, review states and accepted poses, as the studio stores them.
+//! `touch2touch label`: masks drawn or proposed, review states and accepted poses, as the studio stores them.
 
 mod args;
 mod report;
@@ -63,12 +63,10 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
 
 /// The arguments as a value. The models of a recipe are looked for where it decides something.
 fn setup(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<LabelSetup> {
-    let carry_from = args.carry_from.as_ref().map(|name| find_pair(dataset, name)).transpose()?;
-    let begin = match (args.remove_mask, args.adopt, args.from, args.propose) {
+    let begin = match (args.remove_mask, args.adopt, args.propose) {
         (true, ..) => Begin::Removed,
-        (_, true, ..) => Begin::Adopted,
-        (_, _, Some(from), _) => Begin::TakenOver(from),
-        (_, _, _, Some(source)) => Begin::Proposed { source, over_drawn: args.over_drawn, carry_from },
+        (_, true, _) => Begin::Adopted,
+        (_, _, Some(source)) => Begin::Proposed { source, over_drawn: args.over_drawn },
         _ => Begin::AsTheyAre,
     };
     let setup = LabelSetup {

@@ -57,23 +57,15 @@ fn what_is_proposed_is_the_same_on_the_screen_and_by_verb() {
     let folder = lab_folder(home.path());
     let path = folder.to_str().unwrap();
     let listed = json(&["pose", path], home.path());
-    let (name, other) = (name_of(&listed, 1), name_of(&listed, 0));
-    // The pair before has a mask that can be carried.
-    let adopt = ["label", path, "--pair", &other, "--adopt", "--mask", "truth", "--review", "done"];
-    json(&adopt, home.path());
+    let name = name_of(&listed, 1);
     let stored = || {
         let labels = Labels::of(&Dataset::open(&folder).unwrap()).load(&name).unwrap();
         labels.measured(lab::RIGHT).cloned()
     };
     let choice = MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() };
-    for source in [
-        ProposalSource::Automatic,
-        ProposalSource::CadTruth,
-        ProposalSource::CadRegistered,
-        ProposalSource::Grow,
-        ProposalSource::Carry,
-        ProposalSource::OtherFinger,
-    ] {
+    for source in
+        [ProposalSource::Automatic, ProposalSource::CadTruth, ProposalSource::CadRegistered, ProposalSource::Grow]
+    {
         let mut studio = open(&folder, home.path());
         let at = studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().position(|p| p.name == name);
         studio.send(LibraryCommand::Select(PairId(at.unwrap() as u32)).into());
@@ -293,7 +285,6 @@ fn proposing_for_many_stops_between_pairs_and_keeps_what_was_done() {
                 ..Recipe::default()
             },
             pose: None,
-            carry_from: None,
         },
         pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
         over_drawn: false,

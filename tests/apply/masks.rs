@@ -305,7 +305,7 @@ fn opening_again_brings_the_masks_back() {
 }
 
 #[test]
-fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
+fn a_mask_belongs_to_one_imprint() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Masks]));
     bench.send(PredictCommand::Generate);
@@ -315,20 +315,15 @@ fn a_mask_belongs_to_one_imprint_until_it_is_taken_over() {
     bench.settle();
     assert!(label(&bench, MEASURED).starts_with("By hand"));
     assert!(!label(&bench, ImprintSource::Predicted).starts_with("By hand"), "painted on another picture");
-    // The explicit way, which says so.
-    bench.send(ViewCommand::SelectImprint(ImprintSource::Predicted));
-    bench.send(LabelsCommand::TakeOver);
-    bench.settle();
-    let taken = label(&bench, ImprintSource::Predicted);
-    assert!(taken.contains("the measured imprint's mask"), "{taken}");
-    let masks = [MEASURED, ImprintSource::Predicted]
-        .map(|source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().mask.clone());
-    assert_eq!(masks[0], masks[1]);
-    // From now on each goes its own way.
-    bench.send(LabelsCommand::CleanUp(CleanKind::LargestIsland.into()));
-    let changed = results::mask_in_force(&bench.state, ImprintSource::Predicted, lab::RIGHT).unwrap().mask.clone();
-    assert_ne!(changed, masks[0]);
-    assert_eq!(*results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().mask, masks[0]);
+    let in_force =
+        |bench: &Bench, source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().mask.clone();
+    let measured = in_force(&bench, MEASURED);
+    let source = ImprintSource::Predicted;
+    bench.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source, at_px: [12.0, 2.0], erase: false });
+    bench.send(LabelsCommand::EndStroke);
+    let changed = in_force(&bench, source);
+    assert!(label(&bench, source).starts_with("By hand"));
+    assert_eq!(in_force(&bench, MEASURED), measured);
     // Another prediction has none, and undo does not reach the one that is not on screen.
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();

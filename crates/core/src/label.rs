@@ -3,7 +3,6 @@
 //! Everything is a function of masks; who may edit what, and where masks are stored, is decided elsewhere.
 
 mod agreement;
-mod carry;
 mod clean_up;
 mod doubt;
 mod drawing;
@@ -23,7 +22,6 @@ use glam::DVec2;
 use super::grid::Mask;
 
 pub use agreement::{Agreement, agreement, iou};
-pub use carry::{Carried, Surface, across, carry};
 pub use clean_up::{CleanKind, CleanUp};
 pub use doubt::{Doubt, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};

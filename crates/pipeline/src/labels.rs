@@ -295,14 +295,6 @@ impl DrawnMask {
         clean != *self.mask && self.replace(&clean, Provenance::CleanUp { what: clean_up }, false)
     }
 
-    /// A copy of it for the other imprint of the touch, `from` being that of this one.
-    #[must_use]
-    pub fn copied(&self, from: ImprintSource) -> Self {
-        let whose = if self.marks.has_hand_work() { "By hand".into() } else { self.base() };
-        let from = format!("the {} imprint's mask ({whose})", from.name().to_lowercase());
-        Self::new(self.mask.clone(), Provenance::Copied { from, moved: None })
-    }
-
     /// True for the same pixels of the same provenances, whatever the revision.
     pub fn is_same(&self, other: &Self) -> bool {
         self.mask == other.mask && self.marks == other.marks

@@ -12,7 +12,7 @@ use touch2touch_core::label::{CleanUp, Drawing};
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_pipeline::export::{self, Automatic, DrawnMasks, ExportChoice, ExportSetup, Which};
 use touch2touch_pipeline::io::exchange::Format;
-use touch2touch_pipeline::labels::{ImprintSource, Review};
+use touch2touch_pipeline::labels::Review;
 use touch2touch_pipeline::masks::label_pair::{Begin, LabelSetup, label_pair};
 use touch2touch_pipeline::masks::propose::ProposalSource;
 
@@ -28,8 +28,8 @@ use crate::recipe::{Recipe, choice, given_or};
 /// "rectangle" and "wand" (`tolerance_m`); they paint "contact", "free" or "ignore". `clean`: clean-ups after that, "fill_holes",
 /// "largest_island", "clear_border", "clear", or with a size in millimeters "grow=1.5", "shrink", "open", "close", "smooth",
 /// "drop_small". `begin`: what is drawn on: the mask in force (`None`), "adopt" (the automatic one), "remove" (no corrected mask),
-/// "measured" or "predicted" (the other imprint's), or a proposal: "automatic", "cad_truth", "cad_registered", "cad_hand", "grow",
-/// "carry", "other_finger"; `over_drawn`: it replaces what was painted by hand as well. `finger`: "right", "left" or "both".
+/// or a proposal: "automatic", "cad_truth", "cad_registered", "cad_hand", "grow"; `over_drawn`: it replaces what was painted by hand
+/// as well. `finger`: "right", "left" or "both".
 ///
 /// `recipe` says which imprint is meant, and what makes automatic masks and poses. `accept`: accept its pose, the registration's
 /// or `pose`: (angle, y, z) of `grasp_from_object` in radians and meters. `review`: "todo", "in_progress", "done", "flagged",
@@ -103,8 +103,7 @@ fn pads(finger: &str, rig: &Rig) -> PyResult<Vec<PadId>> {
 
 fn begun(name: &str, over_drawn: bool) -> PyResult<Begin> {
     let mut all = vec![("adopt", Begin::Adopted), ("remove", Begin::Removed)];
-    all.extend(ImprintSource::iter().map(|source| (source.key(), Begin::TakenOver(source))));
-    let proposed = |source: ProposalSource| Begin::Proposed { source, over_drawn, carry_from: None };
+    let proposed = |source: ProposalSource| Begin::Proposed { source, over_drawn };
     all.extend(ProposalSource::iter().map(|source| (source.key(), proposed(source))));
     choice("begin", name, all)
 }

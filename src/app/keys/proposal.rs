@@ -1,6 +1,6 @@
 //! Keys of proposals.
 
-use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, MaskVersion, PairKey, PoseKey, Revision};
+use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, PoseKey, Revision};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
@@ -60,10 +60,6 @@ pub enum ProposalInputs {
     Cad(CadPlace, Bits),
     /// The strokes, by the revision of the mask.
     Grow(Revision),
-    /// The mask of another pair, by its revision where it is known.
-    Carry(PairKey, Option<Revision>),
-    /// The other finger's mask in force.
-    Across(ImprintKey, MaskVersion),
 }
 
 /// A proposal for one imprint.

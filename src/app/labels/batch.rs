@@ -103,7 +103,7 @@ fn batch_setup(state: &State) -> BatchSetup {
     let mask = &state.settings.mask;
     let recipe = recipe::in_force(state, imprint);
     BatchSetup {
-        propose: ProposeSetup { source: mask.proposal, recipe, pose: None, carry_from: None },
+        propose: ProposeSetup { source: mask.proposal, recipe, pose: None },
         pairs: state.library.order.clone(),
         over_drawn: mask.over_drawn,
         person: state.settings.known_labeler(),

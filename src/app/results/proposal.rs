@@ -9,15 +9,13 @@ use super::super::keys::{
 use super::super::results;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
-use super::super::state::labels::Stored;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::bits::Bits;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::labels::MaskPlace;
-use touch2touch_pipeline::masks::propose::{self, CadAt, OtherPair, Proposal, Side, Takes, hand_pose};
+use touch2touch_pipeline::masks::propose::{self, CadAt, Proposal, Takes, hand_pose};
 use touch2touch_pipeline::steps::on_pad::OnPad;
 
 const WHAT: &str = "Propose a mask";
@@ -57,8 +55,7 @@ impl Computes for DistancesKey {
 
 impl Computes for ProposalKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Proposal>> {
-        let (imprint, touch) = (results::imprint_of(state, &self.imprint).ready()?.clone(), self.imprint.touch());
-        let sample = state.results.samples.get(&touch.pair)?.clone();
+        let imprint = results::imprint_of(state, &self.imprint).ready()?.clone();
         let job = |make: Box<dyn FnOnce() -> Result<Proposal, TaskError> + Send>| {
             Some(Job::new(Lane::Compute, WHAT, move |_| make()))
         };
@@ -78,39 +75,8 @@ impl Computes for ProposalKey {
                 let hand = results::drawn_mask_on(state, &self.imprint).cloned();
                 job(Box::new(move || propose::grown(&imprint, hand.as_ref())))
             }
-            ProposalInputs::Carry(from, _) => {
-                let source = state.library.open.as_ref()?.source.clone();
-                let name = state.library.entry(from.pair)?.name.clone();
-                let known = state.document.stored.get(&name) == Some(&Stored::Loaded);
-                let labels = known.then(|| state.document.labels.get(&name).cloned()).flatten();
-                let loaded = state.results.samples.get(from).cloned();
-                let (other, pad) = (from.pair, touch.finger);
-                Some(Job::new(Lane::Files, WHAT, move |_| {
-                    let labels = labels.map_or_else(|| source.load_labels(&name), Ok)?;
-                    let from = loaded.map_or_else(|| source.load(other).map(Arc::new), Ok)?;
-                    let to = Side { sample: &sample, pad, imprint: &imprint };
-                    propose::carried_from_pair(OtherPair { name: &name, sample: &from, labels: &labels }, to)
-                }))
-            }
-            ProposalInputs::Across(other, version) => {
-                let mask = results::mask_of(state, version, other)?.mask;
-                let (from, pad) = (results::imprint_of(state, other).ready()?.clone(), other.touch().finger);
-                let name = state.finger_name(pad).to_lowercase();
-                job(Box::new(move || {
-                    let from = Side { sample: &sample, pad, imprint: &from };
-                    let to = Side { sample: &sample, pad: touch.finger, imprint: &imprint };
-                    propose::carried_across(&name, from, &mask, to)
-                }))
-            }
         }
     }
-}
-
-/// The pair whose mask would be carried to the selected one.
-pub(crate) fn carries_from(state: &State) -> Option<PairKey> {
-    let (open, to) = (state.library.open.as_ref()?, state.selection.pair?);
-    let from = propose::carries_from(open.source.index(), to, |name| state.document.review(name))?;
-    Some(open.key(from))
 }
 
 /// The recipe of the proposal for one finger's imprint; `Ok(None)` while something that it takes is not there yet.
@@ -144,21 +110,6 @@ pub fn proposal_key(state: &State, source: ImprintSource, finger: PadId) -> Resu
             let hand = results::drawn_mask(state, source, finger).filter(|hand| hand.marks.has_hand_work());
             ProposalInputs::Grow(hand.ok_or(Absent::NoStrokes)?.revision)
         }
-        Takes::OtherPair => {
-            let from = carries_from(state).ok_or(Absent::NoOtherMask)?;
-            let name = state.library.entry(from.pair).map(|entry| entry.name.as_str()).unwrap_or_default();
-            let hand = state.document.drawn_mask(name, &MaskPlace::measured(finger));
-            ProposalInputs::Carry(from, hand.map(|hand| hand.revision))
-        }
-        Takes::OtherPad => {
-            let other = state.rig().other_pad(finger).ok_or(Absent::NoFinger)?;
-            let key = results::imprint_key(state, source, other)?;
-            match results::mask_in_force(state, source, other) {
-                Ok(mask) => ProposalInputs::Across(key, mask.version),
-                Err(Lookup::Absent(absent)) => return Err(absent),
-                Err(_) => return Ok(None),
-            }
-        }
     };
     Ok(Some(ProposalKey { imprint, of }))
 }
@@ -188,17 +139,11 @@ pub(crate) fn want_proposal(wants: &mut Demands<'_>) {
     {
         return;
     }
-    let takes = state.settings.mask.proposal.takes();
-    if matches!(takes, Takes::CadModel(_))
+    if state.settings.mask.proposal.is_cad()
         && results::tool_name(state).is_ok()
         && results::tool(state).ready().is_none()
     {
         return results::want_tool(wants);
-    }
-    if takes == Takes::OtherPad
-        && let Some(other) = state.rig().other_pad(finger)
-    {
-        results::want_mask(wants, source, other);
     }
     let Ok(Some(key)) = proposal_key(state, source, finger) else { return };
     match &key.of {

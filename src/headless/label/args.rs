@@ -42,19 +42,13 @@ pub(in super::super) struct LabelArgs {
     /// Make the mask of `--mask` the corrected one.
     #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
     pub(super) adopt: bool,
-    /// Take the mask of this imprint over to that of `--imprint`.
-    #[arg(long, value_name = "IMPRINT", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ImprintSource>())]
-    pub(super) from: Option<ImprintSource>,
     /// Propose a mask and accept it: what was painted by hand stays, unless `--over-drawn`. Numbers of it
     /// are those of `--mask`, such as `--mask cad:mm=1`.
-    #[arg(long, value_name = "SOURCE", requires = "pair", conflicts_with_all = ["adopt", "from", "remove_mask"], value_parser = keyed::<ProposalSource>())]
+    #[arg(long, value_name = "SOURCE", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ProposalSource>())]
     pub(super) propose: Option<ProposalSource>,
     /// Let the proposal replace what was painted by hand as well.
     #[arg(long, requires = "propose")]
     pub(super) over_drawn: bool,
-    /// The pair whose mask is carried; else the nearest one before of the same tool that somebody worked on.
-    #[arg(long, value_name = "PAIR", requires = "propose")]
-    pub(super) carry_from: Option<String>,
     /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, `clear`, or with a size in millimeters
     /// `drop_small=MM`, `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask")]

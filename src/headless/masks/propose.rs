@@ -5,7 +5,7 @@ use clap::Args;
 use super::super::args::{DatasetArgs, LimitArgs, RegistrationParser, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
-use super::super::{Common, Output, ToolArgs, VerbResult, find_pair};
+use super::super::{Common, Output, ToolArgs, VerbResult};
 use touch2touch_core::dataset::{PairEntry, PairId};
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::labels::filter::Filter;
@@ -30,9 +30,6 @@ pub(in super::super) struct ProposeArgs {
     /// `is:todo`, `note:edge`, `has:note`.
     #[arg(long, value_name = "WORDS", default_value = "", hide_default_value = true)]
     filter: String,
-    /// The pair whose masks are carried; else for each pair the nearest one before of the same tool that somebody worked on.
-    #[arg(long, value_name = "PAIR")]
-    carry_from: Option<String>,
     /// The registration of `cad_registered`.
     #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
     registration: Registration,
@@ -73,7 +70,6 @@ pub(super) fn run(args: &ProposeArgs) -> VerbResult {
             source: args.source,
             recipe: args.model.posed(args.imprint, &dataset.rig, &args.mask, args.registration)?,
             pose: None,
-            carry_from: args.carry_from.as_ref().map(|name| find_pair(&dataset, name)).transpose()?,
         },
         pairs,
         over_drawn: args.over_drawn,

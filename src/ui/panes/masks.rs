@@ -52,7 +52,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             source::show(cx, ui);
             fold(ui, "Clean up", "Clean up the mask by one click", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "What is shown, drawing in 3D, the other imprint's mask", |ui| {
+            fold(ui, "More", "What is shown, drawing in 3D, whose mask is corrected", |ui| {
                 overlay(cx, ui);
                 opacity(cx, ui);
                 in_3d(cx, ui);
@@ -252,7 +252,6 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
-        cx.action_button(ui, Action::TakeOver, "Other's mask");
         cx.action_button(ui, Action::ResetMask, "Remove");
     });
 }

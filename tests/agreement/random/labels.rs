@@ -95,12 +95,6 @@ pub(in crate::agreement) fn random_edits_of_masks_by_hand_are_those_of_the_verb(
         label(&both, &["--finger", &name, "--imprint", source.key(), "--draw", &drawing, "--clean", &cleaned]);
         counts.push(same_labels(&both, &twin, &format!("{drawing}, {cleaned}, {what}")));
 
-        let other = source.other();
-        both.studio.send(ViewCommand::SelectImprint(other).into());
-        both.studio.send(LabelsCommand::TakeOver.into());
-        label(&both, &["--finger", &name, "--imprint", other.key(), "--from", source.key()]);
-        counts.push(same_labels(&both, &twin, &format!("taken over, {what}")));
-
         let review = draws.of(&[Review::Done, Review::Flagged, Review::Skip]);
         let pair_name = both.studio.state.pair_name().to_owned();
         both.studio.send(LabelsCommand::SetNote(pair_name, "the edge".into()).into());

@@ -439,7 +439,6 @@ draws! {
         2 Corner(position()),
         4 CleanUp((any_of::<CleanKind>(), number()).prop_map(|(kind, size)| CleanUp { kind, size_mm: size.into() })),
         2 AdoptAutomatic,
-        1 TakeOver,
         3 AcceptProposal,
         1 ProposeAll,
         1 ResetMask,

@@ -1,6 +1,8 @@
 //! [`Provenance`]: where the value of a pixel of a corrected mask comes from.
 
-use serde::{Deserialize, Serialize};
+use serde::de::Error as _;
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::Value;
 
 use super::clean_up::CleanUp;
 use crate::frames::PlanarPose;
@@ -36,7 +38,7 @@ impl CadPose {
 
 /// Provenance of the value of a pixel.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "snake_case")]
+#[serde(remote = "Self", tag = "kind", rename_all = "snake_case")]
 pub enum Provenance {
     /// Nothing: nobody and nothing said that it is contact.
     #[default]
@@ -86,14 +88,6 @@ pub enum Provenance {
     },
     /// Grown from what a person painted.
     Grown,
-    /// A copy of another mask.
-    Copied {
-        /// Words for the mask it was copied from.
-        from: String,
-        /// Motion in the grasp frame before it was copied, where it was moved.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        moved: Option<PlanarPose>,
-    },
     /// A clean-up of what was there.
     CleanUp {
         /// Clean-up.
@@ -116,6 +110,36 @@ pub enum Provenance {
         /// Words of the file.
         text: String,
     },
+}
+
+impl Serialize for Provenance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        Self::serialize(self, serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Provenance {
+    /// One of a kind that this program does not know is read as its words: no mask is refused for where it comes from.
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let stored = Value::deserialize(deserializer)?;
+        Self::deserialize(&stored).or_else(|err| {
+            let kind = stored.get("kind").and_then(Value::as_str);
+            kind.map(|_| Self::told(words(&stored))).ok_or_else(|| D::Error::custom(err))
+        })
+    }
+}
+
+/// The words of a stored provenance: its kind, then its fields.
+fn words(stored: &Value) -> String {
+    match stored {
+        Value::Object(fields) => {
+            let kind = fields.get("kind").and_then(Value::as_str).map(|kind| kind.replace('_', " "));
+            let rest = fields.iter().filter(|(name, _)| *name != "kind").map(|(_, field)| words(field));
+            kind.into_iter().chain(rest).collect::<Vec<_>>().join(" ")
+        }
+        Value::String(text) => text.clone(),
+        other => other.to_string(),
+    }
 }
 
 impl Provenance {
@@ -157,11 +181,6 @@ impl Provenance {
                 format!("Depth {}: {instead_of} found no contact", text_mm((*min_m).into()))
             }
             Self::Grown => "Grown from strokes".into(),
-            Self::Copied { from, moved: None } => from.clone(),
-            Self::Copied { from, moved: Some(by) } => {
-                let turned = text_deg(-by.theta_rad);
-                format!("{from}, carried by {turned}, y {}, z {}", text_mm(by.y_m), text_mm(by.z_m))
-            }
             Self::CleanUp { what } if what.kind.is_sized() => {
                 format!("{}, {}", what.kind.name(), text_mm(what.size_mm * 1e-3))
             }
@@ -170,6 +189,34 @@ impl Provenance {
             Self::Accepted { person, was } => format!("Accepted by {person}: {}", was.text()),
             Self::Imported { file } => format!("Imported from {file}"),
             Self::Told { text } => text.clone(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_file_names_that_is_not_known_is_read_as_its_words() {
+        for (stored, words) in [
+            (
+                r#"{"kind": "copied", "from": "the mask of a/1", "moved": {"y_m": 0.001}}"#,
+                "copied the mask of a/1 0.001",
+            ),
+            (r#"{"kind": "clean_up", "what": {"kind": "clear_border", "size_mm": 0.0}}"#, "clean up clear border 0.0"),
+            (r#"{"kind": "of_another_program"}"#, "of another program"),
+        ] {
+            let read: Provenance = serde_json::from_str(stored).unwrap();
+            assert_eq!(read, Provenance::told(words), "{stored}");
+            assert_eq!(serde_json::from_value::<Provenance>(serde_json::to_value(&read).unwrap()).unwrap(), read);
+        }
+        let accepted = r#"{"kind": "accepted", "person": "Anna", "was": {"kind": "copied", "from": "it"}}"#;
+        assert_eq!(serde_json::from_str::<Provenance>(accepted).unwrap().text(), "Accepted by Anna: copied it");
+        let known = Provenance::Threshold { min_m: 0.002 };
+        assert_eq!(serde_json::from_str::<Provenance>(&serde_json::to_string(&known).unwrap()).unwrap(), known);
+        for broken in ["1", "{}", r#"{"kind": 1}"#] {
+            assert!(serde_json::from_str::<Provenance>(broken).is_err(), "{broken}");
         }
     }
 }

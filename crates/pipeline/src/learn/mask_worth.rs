@@ -8,7 +8,7 @@ use crate::error::TaskError;
 use crate::infer::engine::EngineChoice;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
-use crate::labels::{ImprintSource, Labels, PairLabels};
+use crate::labels::{ImprintSource, PairLabels};
 use crate::masks::propose::{ProposalSource, Proposals, ProposeSetup, propose};
 use crate::steps::bundles::BundleInfo;
 use crate::steps::estimate::{Estimate, Touch, estimate};
@@ -51,8 +51,8 @@ pub(super) fn from_cad(touch: Touch<'_>, models: &Models) -> Result<Proposals, T
     let recipe = Recipe { hand: false, ..Recipe::default() };
     let estimate = estimate(touch, &recipe, Stage::Imprint, models, &JobCx::unwatched())?;
     let pads: Vec<PadId> = estimate.imprints.entries().map(|(pad, _)| pad).collect();
-    let setup = ProposeSetup { source: ProposalSource::CadTruth, recipe, pose: None, carry_from: None };
-    propose(touch, &Labels::of(touch.dataset), &estimate, &pads, &setup, models)
+    let setup = ProposeSetup { source: ProposalSource::CadTruth, recipe, pose: None };
+    propose(touch, &estimate, &pads, &setup, models)
 }
 
 /// A mask model on pairs; `None` where tool, CAD model or true pose of none of them is known. What people drew plays no part.

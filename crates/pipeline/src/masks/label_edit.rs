@@ -40,15 +40,6 @@ pub enum LabelEdit<'a> {
     },
     /// Makes an automatic mask the corrected one.
     Adopt(TakenUp),
-    /// Makes a copy of the other imprint's mask that of an imprint.
-    TakeOver {
-        /// The other imprint's mask.
-        from: TakenUp,
-        /// The imprint that it becomes the mask of.
-        to: MaskPlace,
-        /// The size of that imprint; `None` where there is none.
-        size: Option<[usize; 2]>,
-    },
     /// Makes a proposal the mask.
     AcceptProposal {
         /// The imprint that it is for.
@@ -104,7 +95,6 @@ impl LabelEdit<'_> {
             }
             Self::CleanUp { clean_up, .. } => with(clean_up.kind.name(), serde_json::to_value(clean_up)),
             Self::Adopt(_) => Operation::named("automatic mask taken over"),
-            Self::TakeOver { .. } => Operation::named("mask of the other imprint taken over"),
             Self::AcceptProposal { proposal, .. } => {
                 with("proposal accepted", serde_json::to_value(&proposal.provenance))
             }
@@ -138,13 +128,6 @@ pub fn edit(labels: &PairLabels, edit: LabelEdit<'_>) -> Result<Option<Edited>, 
             }
         }
         LabelEdit::Adopt(TakenUp { place, mask }) => now.draw(&place, Some(mask)),
-        LabelEdit::TakeOver { from, to, size } => {
-            if Some(from.mask.mask.size()) != size {
-                let err = TaskError::new("Take the other imprint's mask", "the imprints are not of one size");
-                return Err(err);
-            }
-            now.draw(&to, Some(from.mask.copied(from.place.of.source())));
-        }
         LabelEdit::AcceptProposal { place, proposal, over_drawn } => {
             let drawn = now.drawn_of_size(&place, proposal.mask.size());
             let mask = accepted(drawn, proposal, over_drawn);
@@ -203,12 +186,8 @@ mod tests {
         assert!(cleaned.deed.how.is_some() && cleaned.change.review.is_none());
         cleaned.change.apply_to(&mut labels);
         let on = TakenUp { place: place.clone(), mask: labels.measured(lab::LEFT).unwrap().clone() };
-        assert_eq!(edit(&labels, LabelEdit::CleanUp { on: on.clone(), clean_up: clear, rig: &rig }), Ok(None));
+        assert_eq!(edit(&labels, LabelEdit::CleanUp { on, clean_up: clear, rig: &rig }), Ok(None));
         let of = ImprintOf::unknown();
-        let to = MaskPlace { pad: lab::LEFT, of: of.clone() };
-        let over = |size| LabelEdit::TakeOver { from: on.clone(), to: to.clone(), size };
-        assert!(edit(&labels, over(Some([8, 5]))).is_err() && edit(&labels, over(None)).is_err());
-        assert!(edit(&labels, over(Some([8, 4]))).unwrap().is_some());
         assert_eq!(edit(&labels, LabelEdit::Review(Review::InProgress)), Ok(None));
         // Done accepts what nobody drew, and nothing else.
         let right = MaskPlace::measured(lab::RIGHT);

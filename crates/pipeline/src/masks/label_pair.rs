@@ -17,7 +17,6 @@ use crate::steps::tool::load_tool;
 use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::{CleanUp, Drawing, Ground, Provenance};
 use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
@@ -37,16 +36,12 @@ pub enum Begin {
     Removed,
     /// The automatic masks, which become the corrected ones.
     Adopted,
-    /// Copies of the masks of this imprint.
-    TakenOver(ImprintSource),
     /// Proposals, which are accepted.
     Proposed {
         /// Source of the proposals.
         source: ProposalSource,
         /// Replace what was painted by hand as well.
         over_drawn: bool,
-        /// Pair whose masks are carried; else the nearest one before of the same tool that somebody worked on.
-        carry_from: Option<PairId>,
     },
 }
 
@@ -93,11 +88,7 @@ impl LabelSetup {
 
     /// The last of the imprints that it is about: predicted where one is.
     pub fn farthest(&self) -> ImprintSource {
-        let from = match self.begin {
-            Begin::TakenOver(from) => Some(from),
-            _ => None,
-        };
-        [Some(self.imprint), from, self.accept, self.withdraw].into_iter().flatten().max().unwrap_or_default()
+        [Some(self.imprint), self.accept, self.withdraw].into_iter().flatten().max().unwrap_or_default()
     }
 }
 
@@ -116,7 +107,7 @@ pub fn label_pair(
     let entry = dataset.index.get(pair).ok_or_else(|| TaskError::new(WHAT, "there is no such pair"))?;
     let mut stored = all.load(&entry.name)?;
     let mut changes = Changes { now: stored.clone(), made: Vec::new() };
-    change(dataset, all, pair, setup, models, &mut changes)?;
+    change(dataset, pair, setup, models, &mut changes)?;
     for Edited { deed, change } in changes.made {
         change.apply_to(&mut stored);
         all.save(&entry.name, &stored, &Operation { person: setup.person.clone(), ..deed })?;
@@ -126,7 +117,6 @@ pub fn label_pair(
 
 fn change(
     dataset: &Dataset,
-    all: &Labels,
     pair: PairId,
     setup: &LabelSetup,
     models: &Models,
@@ -137,7 +127,7 @@ fn change(
     let load = || Maker::load(dataset, pair, setup, models);
     let maker = setup.makes_masks().then(load).transpose()?;
     if let Some(maker) = &maker {
-        maker.masks(all, &by(), labels)?;
+        maker.masks(&by(), labels)?;
     }
     let of = |imprint| setup.recipe.of(imprint).imprint_of();
     if let Some(imprint) = setup.withdraw {
@@ -238,7 +228,7 @@ impl<'a> Maker<'a> {
     }
 
     /// Changes the masks of the fingers.
-    fn masks(&self, all: &Labels, by: &str, labels: &mut Changes) -> Result<(), TaskError> {
+    fn masks(&self, by: &str, labels: &mut Changes) -> Result<(), TaskError> {
         let setup = self.setup;
         let to = self.recipe(setup.imprint).imprint_of();
         let place = |pad| MaskPlace { pad, of: to.clone() };
@@ -248,24 +238,16 @@ impl<'a> Maker<'a> {
             }
             return Ok(());
         }
-        let from = if let Begin::TakenOver(from) = setup.begin { Some(from) } else { None };
-        let start = self.contact(from.unwrap_or(setup.imprint), setup.begin != Begin::Adopted, &labels.now)?;
-        let imprints = match from {
-            Some(_) => self.felt(&self.recipe(setup.imprint), Stage::Imprint, &labels.now)?.imprints,
-            None => start.imprints.clone(),
-        };
+        let start = self.contact(setup.imprint, setup.begin != Begin::Adopted, &labels.now)?;
+        let imprints = start.imprints.clone();
         let pads: Vec<PadId> = setup.pads.iter().copied().filter(|pad| start.contact().masks[*pad].is_some()).collect();
-        let proposed = self.proposals(all, &start, &pads, &labels.now)?;
+        let proposed = self.proposals(&start, &pads, &labels.now)?;
         let mut drawn_on = vec![false; setup.draw.len()];
         for pad in pads {
             let Some(begun) = taken_up(&start, pad, &labels.now) else { continue };
             match setup.begin {
                 Begin::AsTheyAre | Begin::Removed => {}
                 Begin::Adopted => drop(labels.make(LabelEdit::Adopt(begun.clone()))?),
-                Begin::TakenOver(_) => {
-                    let size = imprints[pad].as_ref().map(DepthMap::size);
-                    labels.make(LabelEdit::TakeOver { from: begun.clone(), to: place(pad), size })?;
-                }
                 Begin::Proposed { over_drawn, .. } => {
                     if let Some(proposal) = &proposed[pad] {
                         labels.make(LabelEdit::AcceptProposal { place: place(pad), proposal, over_drawn })?;
@@ -302,16 +284,15 @@ impl<'a> Maker<'a> {
     /// The proposals that are asked for; `felt` are the imprints.
     fn proposals(
         &self,
-        all: &Labels,
         estimate: &Estimate,
         pads: &[PadId],
         labels: &PairLabels,
     ) -> Result<PerPad<Proposal>, TaskError> {
         let mut out = PerPad::default();
-        let Begin::Proposed { source, carry_from, .. } = self.setup.begin else { return Ok(out) };
+        let Begin::Proposed { source, .. } = self.setup.begin else { return Ok(out) };
         let recipe = self.recipe(self.setup.imprint);
-        let setup = ProposeSetup { source, recipe, pose: self.setup.pose.map(Into::into), carry_from };
-        for (pad, made) in propose(self.touch(labels), all, estimate, pads, &setup, self.models)? {
+        let setup = ProposeSetup { source, recipe, pose: self.setup.pose.map(Into::into) };
+        for (pad, made) in propose(self.touch(labels), estimate, pads, &setup, self.models)? {
             out[pad] = Some(made?);
         }
         Ok(out)

@@ -1,7 +1,7 @@
 //! Proposals: masks that a person looks at, and accepts or not. Nothing here changes a mask.
 //!
-//! Masks by threshold, share and mask model are those of [`crate::steps::mask`]; what comes here takes more than one imprint: a pose,
-//! strokes, another pair's mask.
+//! Masks by threshold, share and mask model are those of [`crate::steps::mask`]; what comes here takes more than the imprint: a
+//! pose, strokes.
 
 mod batch;
 mod touch;
@@ -9,20 +9,17 @@ mod touch;
 use std::borrow::Cow;
 use std::sync::Arc;
 
-use glam::DAffine3;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
-use crate::labels::{DrawnMask, ImprintSource, MaskPlace, PairLabels, Review};
+use crate::labels::{DrawnMask, ImprintSource};
 use crate::steps::mask::MaskRecipe;
 use crate::steps::on_pad::OnPad;
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
-use touch2touch_core::dataset::{Index, PairId};
-use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::label::{CadPose, Provenance, Surface, across, carry, grow_from};
+use touch2touch_core::label::{CadPose, Provenance, grow_from};
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
@@ -32,12 +29,6 @@ pub use batch::{Batch, BatchSetup, propose_all};
 pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";
-
-/// Distance that a membrane may lie at most from where it was in the other pair and still be in contact with the same
-/// place of the tool, meters.
-const CARRY_GATE_M: f64 = 0.0015;
-/// Distance likewise from finger to finger: tools are not the same on both sides to the tenth of a millimeter.
-const ACROSS_GATE_M: f64 = 0.003;
 
 /// The greatest distance to the CAD model that a mask can be made of, meters.
 pub const FARTHEST_M: f64 = 0.01;
@@ -73,10 +64,6 @@ pub enum ProposalSource {
     CadHand,
     /// Grown from what a person painted.
     Grow,
-    /// Another pair's mask, moved as the tool was.
-    Carry,
-    /// The other finger's mask.
-    OtherFinger,
 }
 
 impl ProposalSource {
@@ -93,8 +80,6 @@ impl ProposalSource {
             Self::CadRegistered => "CAD at the registered pose",
             Self::CadHand => "CAD at the pose by hand",
             Self::Grow => "Grow from strokes",
-            Self::Carry => "Carried from another pair",
-            Self::OtherFinger => "The other finger's mask",
         }
     }
 
@@ -110,8 +95,6 @@ impl ProposalSource {
             Self::Grow => {
                 "From the strokes painted by hand, contact and free, to the steps of the imprint between them"
             }
-            Self::Carry => "The mask of an earlier pair of the same tool, moved as the tool moved between the grasps",
-            Self::OtherFinger => "The other finger's mask, as the tool would press on this side",
         }
     }
 
@@ -123,8 +106,6 @@ impl ProposalSource {
             Self::CadRegistered => Takes::CadModel(CadAt::Registered),
             Self::CadHand => Takes::CadModel(CadAt::Hand),
             Self::Grow => Takes::DrawnMask,
-            Self::Carry => Takes::OtherPair,
-            Self::OtherFinger => Takes::OtherPad,
         }
     }
 
@@ -143,10 +124,6 @@ pub enum Takes {
     CadModel(CadAt),
     /// The mask that a person drew on the imprint: [`grown`].
     DrawnMask,
-    /// The mask that a person drew of the pair that [`carries_from`] names: [`carried_from_pair`].
-    OtherPair,
-    /// The mask in force of the other pad: [`carried_across`].
-    OtherPad,
 }
 
 /// Pose of the CAD model.
@@ -261,95 +238,6 @@ pub fn grown(imprint: &DepthMap, hand: Option<&DrawnMask>) -> Result<Proposal, T
     let note =
         if free.as_slice().contains(&true) { "" } else { "no stroke says what is free: the edge of the image is" };
     Ok(Proposal { mask, provenance: Provenance::Grown, note: note.into() })
-}
-
-/// One finger of a pair with a mask to carry from.
-#[derive(Clone, Copy, Debug)]
-pub struct Side<'a> {
-    /// The pair.
-    pub sample: &'a Sample,
-    /// The finger.
-    pub pad: PadId,
-    /// Imprint of the finger, meters.
-    pub imprint: &'a DepthMap,
-}
-
-impl<'a> Side<'a> {
-    /// Without its grain: a pixel that was dropped would be carried nowhere.
-    fn smooth(self) -> Cow<'a, DepthMap> {
-        smooth_imprint(self.imprint, ImprintSource::Measured, &self.sample.rig)
-    }
-}
-
-fn carried(
-    from: Side<'_>,
-    mask: &Mask,
-    to: Side<'_>,
-    from_to: DAffine3,
-    gate_m: f64,
-    provenance: Provenance,
-) -> Result<Proposal, TaskError> {
-    let (from_imprint, to_imprint) = (from.smooth(), to.smooth());
-    let to = Surface { imprint: &to_imprint, camera: camera_of(to.sample, to.pad)? };
-    let from = Surface { imprint: &from_imprint, camera: camera_of(from.sample, from.pad)? };
-    let found = carry(from, mask, to, from_to, gate_m).map_err(|err| fail(&err))?;
-    let note = match found.drift_m {
-        Some(drift) => format!("the membranes lie {:.2} mm apart (median)", drift * 1e3),
-        None => "nothing of it is in contact here".into(),
-    };
-    Ok(Proposal { mask: found.mask, provenance, note })
-}
-
-/// Another pair, which has a mask to carry.
-#[derive(Clone, Copy, Debug)]
-pub struct OtherPair<'a> {
-    /// Name of the pair.
-    pub name: &'a str,
-    /// The pair.
-    pub sample: &'a Sample,
-    /// Labels that people gave the pair.
-    pub labels: &'a PairLabels,
-}
-
-/// Another pair's mask, moved as the tool moved between the two grasps, whose true poses are known.
-///
-/// # Errors
-/// If there is no such mask, a pose or a camera is not known, or sizes differ.
-pub fn carried_from_pair(from: OtherPair<'_>, to: Side<'_>) -> Result<Proposal, TaskError> {
-    let OtherPair { name, sample, labels } = from;
-    let measured = sample.pad(to.pad).and_then(PadTouch::depth).map(|depth| &depth.imprint);
-    let hand = measured.and_then(|imprint| labels.drawn(&MaskPlace::measured(to.pad), imprint));
-    let (Some(imprint), Some(hand)) = (measured, hand) else {
-        return Err(TaskError::new(WHAT, format!("nobody painted this finger's mask of {name}")));
-    };
-    let from = Side { sample, pad: to.pad, imprint };
-    let pose = |sample: &Sample, whose: &str| {
-        let why = || TaskError::new(WHAT, format!("the true pose of {whose} is not known, so its move is not either"));
-        sample.grasp_from_object.ok_or_else(why)
-    };
-    let (a, b) = (pose(sample, name)?, pose(to.sample, "this pair")?);
-    let moved = PlanarPose { theta_rad: b.theta_rad - a.theta_rad, y_m: b.y_m - a.y_m, z_m: b.z_m - a.z_m };
-    let provenance = Provenance::Copied { from: format!("the mask of {name}"), moved: Some(moved) };
-    carried(from, &hand.mask, to, a.to_affine() * b.to_affine().inverse(), CARRY_GATE_M, provenance)
-}
-
-/// The other finger's mask of the same grasp. `name` is that finger's.
-///
-/// # Errors
-/// If a camera is not known, or sizes differ.
-pub fn carried_across(name: &str, from: Side<'_>, mask: &Mask, to: Side<'_>) -> Result<Proposal, TaskError> {
-    let provenance = Provenance::Copied { from: format!("the {name} finger's mask"), moved: None };
-    carried(from, mask, to, across(), ACROSS_GATE_M, provenance)
-}
-
-/// The pair whose masks are carried to another: of the same tool and looked at by somebody, the nearest before it in the data
-/// set, else the nearest behind it. `None` if there is none.
-pub fn carries_from(index: &Index, to: PairId, review: impl Fn(&str) -> Review) -> Option<PairId> {
-    let tool = index.get(to)?.tool.as_ref()?;
-    let is_begun = |name: &str| !matches!(review(name), Review::Todo | Review::Skip);
-    let pairs = (0..).map(PairId).zip(&index.pairs);
-    let begun = pairs.filter(|(id, pair)| *id != to && pair.tool.as_ref() == Some(tool) && is_begun(&pair.name));
-    begun.map(|(id, _)| id).min_by_key(|id| if id.0 < to.0 { (0, to.0 - id.0) } else { (1, id.0 - to.0) })
 }
 
 /// The mask that accepting a proposal whole makes. Of the one that was drawn, what a person painted stays unless

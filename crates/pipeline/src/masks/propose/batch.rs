@@ -155,7 +155,7 @@ impl ProposalBatch<'_> {
         if pads.is_empty() {
             return Err(TaskError::new(WHAT, "there is no such imprint"));
         }
-        let proposals = propose(touch, all, &estimate, &pads, &setup.propose, models)?;
+        let proposals = propose(touch, &estimate, &pads, &setup.propose, models)?;
         let (mut new, mut how) = (0, Vec::new());
         for (pad, proposal) in proposals {
             let proposal = match proposal {

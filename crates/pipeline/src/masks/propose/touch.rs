@@ -1,17 +1,13 @@
 //! [`propose`]: what any source proposes for the fingers of a pair, from what its files say.
 
-use super::{
-    CadAt, OtherPair, Proposal, ProposalSource, Side, Takes, WHAT, automatic, cad_distances, carried_across,
-    carried_from_pair, carries_from, grown, hand_pose, near_cad,
-};
+use super::{CadAt, Proposal, ProposalSource, Takes, WHAT, automatic, cad_distances, grown, hand_pose, near_cad};
 use crate::error::TaskError;
 use crate::job::JobCx;
-use crate::labels::{Labels, MaskPlace};
+use crate::labels::MaskPlace;
 use crate::steps::estimate::{Estimate, Touch};
 use crate::steps::models::Models;
 use crate::steps::on_pad::OnPad;
 use crate::steps::recipe::{Recipe, Stage};
-use touch2touch_core::dataset::PairId;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::CadPose;
 use touch2touch_core::manual::ManualPose;
@@ -27,21 +23,17 @@ pub struct ProposeSetup {
     pub recipe: Recipe,
     /// The pose of [`ProposalSource::CadHand`]; `None` takes the one accepted for the pair, if a person set it.
     pub pose: Option<ManualPose>,
-    /// The pair of [`ProposalSource::Carry`]; `None` takes the nearest of the same tool that somebody worked on.
-    pub carry_from: Option<PairId>,
 }
 
 /// Proposals for some pads, or reasons why there are none.
 pub type Proposals = Vec<(PadId, Result<Proposal, TaskError>)>;
 
-/// Proposals for each of `pads`; `felt` are the imprints of the touch by the recipe of `setup`, and `all` the labels of
-/// its data set.
+/// Proposals for each of `pads`; `estimate` has the imprints of the touch by the recipe of `setup`.
 ///
 /// # Errors
 /// The reason that holds for all of them: what the source lacks.
 pub fn propose(
     touch: Touch<'_>,
-    all: &Labels,
     estimate: &Estimate,
     pads: &[PadId],
     setup: &ProposeSetup,
@@ -92,30 +84,5 @@ pub fn propose(
             let place = MaskPlace { pad, of: of.clone() };
             grown(imprint, labels.drawn(&place, imprint))
         }),
-        Takes::OtherPair => {
-            let reviews = all.reviews().states;
-            let review = |name: &str| reviews.get(name).copied().unwrap_or_default();
-            let from = setup.carry_from.or_else(|| carries_from(&touch.dataset.index, touch.pair, review));
-            let from = from.ok_or_else(|| {
-                lacks("nobody worked on another pair of this tool yet").with_hint("Correct the mask of one first.")
-            })?;
-            let name = &touch.dataset.index.get(from).ok_or_else(|| lacks("there is no such pair"))?.name;
-            let other = touch.dataset.load(from).map_err(|err| TaskError::from_error(WHAT, &err))?;
-            let other_labels = all.load(name)?;
-            let from = OtherPair { name, sample: &other, labels: &other_labels };
-            each(&|pad, imprint| carried_from_pair(from, Side { sample, pad, imprint }))
-        }
-        Takes::OtherPad => {
-            let (rig, estimate) = (&touch.dataset.rig, reach(&setup.recipe, Stage::Mask)?);
-            let found = estimate.contact();
-            each(&|pad, imprint| {
-                let other = rig.other_pad(pad).ok_or_else(|| lacks("there is no other finger"))?;
-                let (Some(there), Some(mask)) = (&found.imprints[other], &found.masks[other]) else {
-                    return Err(lacks("the other finger has no mask"));
-                };
-                let from = Side { sample, pad: other, imprint: there };
-                carried_across(&rig.pad_key(other), from, &mask.mask, Side { sample, pad, imprint })
-            })
-        }
     }
 }
