@@ -104,7 +104,6 @@ fn how(action: Action) -> How {
         A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
         A::AdoptAutomatic => Verb(&["label", "demo", "--pair", "a", "--adopt", "--mask", "top_percent"]),
         A::Propose | A::NextProposal => Verb(&["label", "demo", "--pair", "a", "--propose", "cad_registered"]),
-        A::ProposeAll => Verb(&["masks", "propose", "demo", "--source", "cad_truth", "--limit", "8"]),
         A::ResetMask => Verb(&["label", "demo", "--pair", "a", "--remove-mask"]),
         A::DoneAndNext => Verb(&["label", "demo", "--pair", "a", "--review", "done"]),
         A::Flag => Verb(&["label", "demo", "--pair", "a", "--review", "flagged"]),

@@ -174,8 +174,6 @@ macro_rules! actions {
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
         NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes", [shift(K::G)],
             _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
-        ProposeAll, Mask, "Propose for all listed", "Makes what the source proposes the mask of every pair in the list that is not marked done, flagged or skipped; hand work stays, and each pair can be undone", [],
-            state => when(labels::can_propose_all(state), LabelsCommand::ProposeAll);
         LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)],
             state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
         ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
@@ -451,7 +449,7 @@ impl Action {
             Self::AdoptAutomatic => "use copy automatic mask",
             Self::PaintIn3d | Self::PaintLayers => "cloud points brush lasso front occlusion",
             Self::PaintIgnore => "unknown unsure void class",
-            Self::Propose | Self::NextProposal | Self::ProposeAll => "prelabel batch pre-label suggest auto cad",
+            Self::Propose | Self::NextProposal => "prelabel pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
             Self::ResetMask => "delete mask automatic again",
             Self::ClearMask => "delete erase empty nothing start over reset",

@@ -1,12 +1,11 @@
 //! The room of the document: strokes, clean-ups, review states, accepted poses, undo, saving.
 
-mod batch;
+mod import;
 pub(super) mod unsaved;
 
 pub(crate) use super::state::labels::{Changed, Merged};
 pub use super::state::labels::{Document, DrawnMask, MaskPlace, PairLabels, Question, Review, Stored, Stroke};
-pub(crate) use batch::can_propose_all;
-pub use batch::{ImportMasks, ProposeAll};
+pub use import::ImportMasks;
 pub use unsaved::{UnsavedCommand, unsaved};
 
 use std::borrow::Cow;
@@ -59,8 +58,6 @@ pub enum LabelsCommand {
     AdoptAutomatic,
     /// Makes the proposal that is shown the corrected mask; what was painted by hand stays, unless the preferences say.
     AcceptProposal,
-    /// Makes what the source proposes the mask of every pair in the list that nobody judged yet.
-    ProposeAll,
     /// Removes the corrected mask: the automatic source is in force again.
     ResetMask,
     /// Takes back the last change of what is on screen.
@@ -115,7 +112,6 @@ pub(super) fn step(state: &mut State, command: LabelsCommand, effects: &mut Vec<
         }
         LabelsCommand::AdoptAutomatic => adopt_automatic(state, effects),
         LabelsCommand::AcceptProposal => accept_proposal(state, effects),
-        LabelsCommand::ProposeAll => batch::propose_all(state, effects),
         LabelsCommand::ResetMask => reset(state, effects),
         LabelsCommand::Undo => undo(state, effects),
         LabelsCommand::Redo => redo(state, effects),

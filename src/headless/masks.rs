@@ -1,7 +1,6 @@
 //! `touch2touch masks`: contact masks as training folders, which to look at first, and a mask model trained on them.
 
 mod import;
-mod propose;
 mod queue;
 mod train;
 
@@ -31,8 +30,6 @@ pub(super) enum MasksVerb {
     Export(ExportArgs),
     /// Take masks over that lie in one of these forms. What was painted by hand stays, and no pair is marked.
     Import(import::ImportArgs),
-    /// Propose masks for many pairs at once. What was painted by hand stays, and every pair is still to be looked at.
-    Propose(Box<propose::ProposeArgs>),
     /// List the pairs, the most uncertain masks first.
     Queue(Box<queue::QueueArgs>),
     /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
@@ -109,7 +106,6 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
         MasksVerb::Import(args) => return import::run(args),
-        MasksVerb::Propose(args) => return propose::run(args),
         MasksVerb::Queue(args) => return queue::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };

@@ -1,15 +1,11 @@
 //! Proposals: nothing changes before they are accepted, hand work stays, and the verb makes the same masks.
 
 use touch2touch::app::command::ViewCommand;
-use touch2touch::app::labels::{DrawnMask, Review};
+use touch2touch::app::labels::DrawnMask;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::tasks::TaskKind;
 use touch2touch_core::label::{Paint, Provenance};
-use touch2touch_pipeline::job::{Cancel, JobCx};
-use touch2touch_pipeline::masks::propose::{BatchSetup, ProposalSource, ProposeSetup, propose_all};
-use touch2touch_pipeline::steps::models::Models;
-use touch2touch_pipeline::steps::recipe::Recipe;
+use touch2touch_pipeline::masks::propose::ProposalSource;
 
 use super::*;
 
@@ -211,101 +207,4 @@ fn two_windows_on_one_folder_lose_nothing_of_each_other() {
     // What was taken in is not taken back.
     anna.send(LabelsCommand::Undo.into());
     both(&stored());
-}
-
-#[test]
-pub(super) fn what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did() {
-    let (home, second) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-    let (folder, copy) = (lab_folder(home.path()), lab_folder(second.path()));
-    let name =
-        |studio: &Studio, at: usize| studio.state.library.open.as_ref().unwrap().source.index().pairs[at].name.clone();
-    let mut studio = open(&folder, home.path());
-    let (first, judged) = (name(&studio, 0), name(&studio, 1));
-    let mask = MaskSettings { proposal: ProposalSource::CadTruth, radius_px: 3.0, ..MaskSettings::default() };
-    studio.send(prefer(move |s| s.mask = mask.clone()).into());
-    studio.send(LibraryCommand::Select(PairId(1)).into());
-    studio.send(LabelsCommand::SetReview(Review::Done).into());
-    studio.send(LibraryCommand::Select(PairId(0)).into());
-    strokes(&mut studio);
-    let painted = hand(&studio).unwrap();
-    studio.send(LabelsCommand::ProposeAll.into());
-    assert!(studio.state.tasks.of_kind(TaskKind::Propose).is_none());
-    let said = &studio.state.log.entries.back().unwrap().text;
-    assert!(said.contains("proposed in") && said.contains("1 pair judged before"), "{said}");
-
-    // On screen at once, hand work as it was, and one undo takes it back.
-    let made = hand(&studio).unwrap();
-    let checked = painted.marks.manual_checked();
-    assert!(!made.is_same(&painted) && checked.as_slice().contains(&true));
-    let kept = |(i, by_hand): (usize, &bool)| !by_hand || made.mask.as_slice()[i] == painted.mask.as_slice()[i];
-    assert!(checked.as_slice().iter().enumerate().all(kept), "what was painted stays");
-    let stored = |folder: &Path, name: &str| Labels::of(&Dataset::open(folder).unwrap()).load(name).unwrap();
-    // Done accepted the automatic masks of the pair that somebody judged, and those stay.
-    let accepted = stored(&folder, &judged).masks;
-    assert!(accepted.len() == 2 && accepted.values().all(|mask| mask.base().starts_with("Accepted")), "{accepted:?}");
-    studio.send(LabelsCommand::Undo.into());
-    assert!(hand(&studio).unwrap().is_same(&painted), "undo");
-    studio.send(LabelsCommand::Redo.into());
-    assert!(hand(&studio).unwrap().is_same(&made), "redo");
-    let pairs = studio.state.library.open.as_ref().unwrap().source.index().pairs.len();
-    let names: Vec<String> = (0..pairs).map(|at| name(&studio, at)).collect();
-    drop(studio);
-
-    // The verb, over the same folder as it was.
-    let path = copy.to_str().unwrap();
-    json(&["label", path, "--pair", &judged, "--review", "done"], second.path());
-    let made = json(&["masks", "propose", path, "--source", "cad_truth"], second.path());
-    assert_eq!((made["judged"].as_u64(), made["complete"].as_bool()), (Some(1), Some(true)));
-    assert_eq!(made["changed"].as_array().unwrap().len(), pairs - 1);
-    for name in names.iter().filter(|name| **name != first) {
-        let (by_studio, by_verb) = (stored(&folder, name), stored(&copy, name));
-        let untouched = if *name == judged { Review::Done } else { Review::Todo };
-        assert_eq!([by_studio.review, by_verb.review], [untouched; 2], "{name}");
-        assert_eq!(by_studio.masks.len(), by_verb.masks.len(), "{name}");
-        for (place, mask) in &by_studio.masks {
-            assert!(mask.is_same(&by_verb.masks[place]), "{name}");
-        }
-    }
-    // A second time there is nothing to change.
-    let again = json(&["masks", "propose", path, "--source", "cad_truth"], second.path());
-    assert_eq!(again["masks"].as_u64(), Some(0));
-    assert_eq!(again["same"], made["masks"]);
-}
-
-#[test]
-fn proposing_for_many_stops_between_pairs_and_keeps_what_was_done() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = lab_folder(home.path());
-    let dataset = Dataset::open(&folder).unwrap();
-    let setup = BatchSetup {
-        propose: ProposeSetup {
-            source: ProposalSource::Automatic,
-            recipe: Recipe {
-                mask: MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() },
-                ..Recipe::default()
-            },
-            pose: None,
-        },
-        pairs: (0..dataset.index.pairs.len() as u32).map(PairId).collect(),
-        over_drawn: false,
-        person: None,
-    };
-    let labeled = || {
-        let labels = Labels::of(&dataset);
-        dataset.index.pairs.iter().filter(|pair| !labels.load(&pair.name).unwrap().masks.is_empty()).count()
-    };
-    let before = Cancel::default();
-    before.cancel();
-    let stopped = propose_all(&dataset, &setup, &Models::new(None), &JobCx::new(before, Arc::new(|_| {})));
-    assert!(stopped.unwrap_err().is_cancelled());
-    assert_eq!(labeled(), 0);
-    // The first pair is under way when it is told to stop: that one is finished.
-    let cancel = Cancel::default();
-    let at_once = cancel.clone();
-    let cx = JobCx::new(cancel, Arc::new(move |_| at_once.cancel()));
-    let found = propose_all(&dataset, &setup, &Models::new(None), &cx).unwrap();
-    assert!(!found.complete && found.text().ends_with("stopped early"), "{}", found.text());
-    assert_eq!((found.changed.len(), labeled()), (1, 1));
-    let none = BatchSetup { pairs: Vec::new(), ..setup };
-    assert!(propose_all(&dataset, &none, &Models::new(None), &JobCx::unwatched()).is_err());
 }

@@ -52,15 +52,12 @@ fn held(verb: &str) -> Option<Held> {
         "adapt" => By(&[learned::TESTS[0]]),
         "label" => By(&[
             labels::random_edits_of_masks_by_hand_are_those_of_the_verb,
+            labels::masks_proposed_by_a_random_recipe_are_those_of_the_verb,
             super::edits::a_drawing_and_a_clean_up_are_the_same_by_hand_and_by_verb,
         ]),
         "masks export" | "masks import" => {
             By(&[exchange::masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back])
         }
-        "masks propose" => By(&[
-            labels::masks_proposed_by_a_random_recipe_for_all_pairs_are_those_of_the_verb,
-            proposals::what_is_proposed_for_all_listed_is_what_the_verb_makes_and_keeps_what_people_did,
-        ]),
         "masks queue" => By(&[
             tables::a_random_recipe_orders_the_masks_the_same_in_the_list_and_by_the_verb,
             super::the_most_uncertain_masks_are_in_one_order_in_both,

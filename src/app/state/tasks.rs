@@ -61,9 +61,6 @@ kinds! {
     /// Masks are taken over that lie in a form of other programs.
     Import, "Import masks", Files,
         "Stop; the masks that were taken over stay";
-    /// Masks are proposed for many pairs.
-    Propose, "Propose masks", Batch,
-        "Stop; the pairs that were done until then keep their masks";
     /// A data set is scored.
     Evaluate, "Evaluate", Batch,
         "Stop, and show what was scored until then";

@@ -22,7 +22,7 @@ use touch2touch::app::keys::{AmbiguityKey, Preview};
 use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
-use touch2touch::app::labels::{ImportMasks, PairLabels, ProposeAll, Review, StrokeIn3d};
+use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::services::{Followed, Services as _};
@@ -328,9 +328,6 @@ fn ended() -> impl Strategy<Value = Ended> {
             TaskKind::Import => {
                 Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
             }
-            TaskKind::Propose => {
-                Ended::of::<ProposeAll>(Batch { masks: 1, changed: vec![name.to_owned()], ..Batch::default() })
-            }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
             TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
@@ -440,7 +437,6 @@ draws! {
         4 CleanUp((any_of::<CleanKind>(), number()).prop_map(|(kind, size)| CleanUp { kind, size_mm: size.into() })),
         2 AdoptAutomatic,
         3 AcceptProposal,
-        1 ProposeAll,
         1 ResetMask,
         3 Undo,
         3 Redo,

@@ -3,7 +3,6 @@
 //! Masks by threshold, share and mask model are those of [`crate::steps::mask`]; what comes here takes more than the imprint: a
 //! pose, strokes.
 
-mod batch;
 mod touch;
 
 use std::borrow::Cow;
@@ -25,7 +24,6 @@ use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
 
-pub use batch::{Batch, BatchSetup, propose_all};
 pub use touch::{Proposals, ProposeSetup, propose};
 
 const WHAT: &str = "Propose a mask";

@@ -10,7 +10,6 @@ use crate::app::action::Action;
 use crate::app::keys::ImprintSource;
 use crate::app::settings::{MaskChoice, MaskSettings, MaskSource, ProposalSource};
 use crate::app::state::Lookup;
-use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{PROPOSED, SMALL, caption};
 use touch2touch_core::rig::PadId;
@@ -166,7 +165,7 @@ fn origin(cx: &Cx<'_>, source: ImprintSource, finger: PadId) -> String {
     format!("{}, {}: {text}", cx.state.finger_name(finger), source.key())
 }
 
-/// Buttons that show, accept or reject what the source proposes, or make it the mask of every pair in the list.
+/// Buttons that show, accept or reject what the source proposes.
 fn offer(cx: &mut Cx<'_>, ui: &mut Ui) {
     if results::proposes(cx.state) {
         cx.action_button(ui, Action::Accept, "Accept");
@@ -178,14 +177,7 @@ fn offer(cx: &mut Cx<'_>, ui: &mut Ui) {
         }
         return;
     }
-    if let Some((_, task)) = cx.state.tasks.of_kind(TaskKind::Propose) {
-        return cx.under_way(ui, task, &task.progress.text);
-    }
     cx.action_button(ui, Action::Propose, "Propose");
-    // Said here as well: the box that sets it is on screen only with a proposal.
-    let over = if cx.state.settings.mask.over_drawn { ", over hand work" } else { "" };
-    let text = format!("For {} listed{over}", cx.state.library.order.len());
-    cx.action_button(ui, Action::ProposeAll, &text);
 }
 
 /// Provenance of the proposal, or the reason why there is none.
