@@ -152,22 +152,12 @@ macro_rules! actions {
             state => clean_up(state, CleanKind::FillHoles);
         LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)],
             state => clean_up(state, CleanKind::LargestIsland);
-        DropSmall, Mask, "Drop small islands", "Removes islands smaller across than the clean-up size", [],
-            state => clean_up(state, CleanKind::DropSmall);
-        OpenMask, Mask, "Open the mask", "Removes what is thinner than the clean-up size", [],
-            state => clean_up(state, CleanKind::Open);
-        CloseMask, Mask, "Close the mask", "Fills gaps thinner than the clean-up size", [],
-            state => clean_up(state, CleanKind::Close);
         SmoothMask, Mask, "Smooth the mask", "Makes each pixel what most around it are, within the clean-up size", [],
             state => clean_up(state, CleanKind::Smooth);
         GrowMask, Mask, "Grow the mask", "Adds what lies within the clean-up size", [],
             state => clean_up(state, CleanKind::Grow);
         ShrinkMask, Mask, "Shrink the mask", "Removes what lies within the clean-up size of the outside", [],
             state => clean_up(state, CleanKind::Shrink);
-        ClearBorder, Mask, "Clear the border", "Removes islands that touch the edge of the image", [],
-            state => clean_up(state, CleanKind::ClearBorder);
-        ClearMask, Mask, "Clear the mask", "Leaves no contact in the mask, to draw it anew", [plain(K::Delete)],
-            state => clean_up(state, CleanKind::Clear);
         AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)],
             state => editable(state, LabelsCommand::AdoptAutomatic);
         Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)],
@@ -452,7 +442,6 @@ impl Action {
             Self::Propose | Self::NextProposal => "prelabel pre-label suggest auto cad",
             Self::Accept => "confirm take yes",
             Self::ResetMask => "delete mask automatic again",
-            Self::ClearMask => "delete erase empty nothing start over reset",
             Self::Undo => "revert back",
             Self::BrushSmaller | Self::BrushLarger => "pen size radius width",
             Self::RunPose => "retry recompute register registration icp failed",

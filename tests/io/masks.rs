@@ -8,7 +8,7 @@ use serde_json::Value;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Mask;
-use touch2touch_core::label::{self, Marks, Provenance};
+use touch2touch_core::label::{self, CleanKind, CleanUp, Marks, Provenance};
 use touch2touch_core::manual::{AcceptedPose, ManualPose};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
@@ -380,4 +380,28 @@ fn nothing_is_written_where_the_data_set_is_not_any_more() {
     std::fs::remove_dir(&root).unwrap();
     std::fs::rename(&elsewhere, &root).unwrap();
     store.save(PAIR, lab::RIGHT, Some(&mask)).unwrap();
+}
+
+#[test]
+fn a_mask_with_a_clean_up_that_is_not_known_is_read_with_its_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let store = MaskStore::in_folder(folder.path().join("masks"));
+    let mut mask = Mask::filled(20, 10, true);
+    let mut marks = Marks::all(mask.size(), Provenance::Truth);
+    let what = CleanUp { kind: CleanKind::Smooth, size_mm: 1.5 };
+    let smaller = Mask::from_fn(20, 10, |x, _| x < 10);
+    assert!(marks.replace(&mut mask, &smaller, Provenance::CleanUp { what }, false));
+    let stored = StoredMask { mask: mask.clone(), marks, person: "Anna".into(), saved_unix_s: 1 };
+    store.save("a", lab::LEFT, Some(&stored)).unwrap();
+    let file = store.mask_file("a", lab::LEFT);
+    let text = std::fs::read_to_string(&file).unwrap();
+    assert!(text.contains("smooth"), "{text}");
+    std::fs::write(&file, text.replace("smooth", "clear_border")).unwrap();
+    let read = store.load("a", lab::LEFT).unwrap().unwrap();
+    assert_eq!(read.mask, mask);
+    assert_eq!(read.marks.at(15, 5), Some(&Provenance::told("clean up clear border 1.5")));
+    assert_eq!(read.marks.at(5, 5), Some(&Provenance::Truth));
+    // It can be written again.
+    store.save("a", lab::LEFT, Some(&read)).unwrap();
+    assert_eq!(store.load("a", lab::LEFT).unwrap(), Some(read));
 }

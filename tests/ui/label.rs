@@ -216,7 +216,7 @@ fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_onc
         let state = rig.harness.state().state();
         state.document.review(state.pair_name())
     };
-    let letters = [Key::T, Key::H, Key::K, Key::Delete];
+    let letters = [Key::T, Key::H, Key::K];
     for (workspace, asking) in [(Workspace::Inspect, false), (Workspace::Inspect, true), (Workspace::Label, true)] {
         rig.send(prefer(move |s| s.workspace = workspace));
         rig.send(ExportCommand::AskMasks(asking));

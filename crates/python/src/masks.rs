@@ -26,10 +26,9 @@ use crate::recipe::{Recipe, choice, given_or};
 /// `draw`: drawings on the mask, one after the other, as dictionaries: `{"tool": "lasso", "paint": "contact", "points": [[x, y],
 /// ...]}` in image pixels, (0, 0) the center of the upper left one; tools are "brush" (`radius_px`), "lasso", "polygon",
 /// "rectangle" and "wand" (`tolerance_m`); they paint "contact", "free" or "ignore". `clean`: clean-ups after that, "fill_holes",
-/// "largest_island", "clear_border", "clear", or with a size in millimeters "grow=1.5", "shrink", "open", "close", "smooth",
-/// "drop_small". `begin`: what is drawn on: the mask in force (`None`), "adopt" (the automatic one), "remove" (no corrected mask),
-/// or a proposal: "automatic", "cad_truth", "cad_registered", "cad_hand", "grow"; `over_drawn`: it replaces what was painted by hand
-/// as well. `finger`: "right", "left" or "both".
+/// "largest_island", or with a size in millimeters "grow=1.5", "shrink", "smooth". `begin`: what is drawn on: the mask in force
+/// (`None`), "adopt" (the automatic one), "remove" (no corrected mask), or a proposal: "automatic", "cad_truth", "cad_registered",
+/// "cad_hand", "grow"; `over_drawn`: it replaces what was painted by hand as well. `finger`: "right", "left" or "both".
 ///
 /// `recipe` says which imprint is meant, and what makes automatic masks and poses. `accept`: accept its pose, the registration's
 /// or `pose`: (angle, y, z) of `grasp_from_object` in radians and meters. `review`: "todo", "in_progress", "done", "flagged",

@@ -49,8 +49,8 @@ pub(in super::super) struct LabelArgs {
     /// Let the proposal replace what was painted by hand as well.
     #[arg(long, requires = "propose")]
     pub(super) over_drawn: bool,
-    /// Clean the mask up: `fill_holes`, `largest_island`, `clear_border`, `clear`, or with a size in millimeters
-    /// `drop_small=MM`, `open=MM`, `close=MM`, `smooth=MM`, `grow=MM`, `shrink=MM`. Several are done in turn.
+    /// Clean the mask up: `fill_holes`, `largest_island`, or with a size in millimeters `smooth=MM`, `grow=MM`, `shrink=MM`.
+    /// Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask")]
     pub(super) clean: Vec<CleanUp>,
     /// Draw on the mask: `{"tool": "lasso", "paint": "contact", "points": [[X, Y], ...]}` in image pixels; tools are

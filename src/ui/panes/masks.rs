@@ -309,11 +309,6 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         for (action, text) in [
             (Action::FillHoles, "Fill holes"),
             (Action::LargestIsland, "Largest"),
-            (Action::ClearBorder, "No border"),
-            (Action::ClearMask, "Clear"),
-            (Action::DropSmall, "Drop small"),
-            (Action::OpenMask, "Open"),
-            (Action::CloseMask, "Close"),
             (Action::SmoothMask, "Smooth"),
             (Action::GrowMask, "Grow"),
             (Action::ShrinkMask, "Shrink"),
@@ -327,8 +322,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
         let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
         let slider = ui.add(slider).accessible_name("Clean-up size");
-        let tip =
-            "Of Drop small (across), Open, Close, Smooth, Grow and Shrink (radius). Less than a pixel changes nothing";
+        let tip = "Radius of Smooth, Grow and Shrink. Less than a pixel changes nothing";
         if slider.on_hover_text(tip).changed() {
             cx.push(prefer(move |s| s.mask = new.clone()));
         }

@@ -137,7 +137,7 @@ mod tests {
             }
         }
         assert!(letters > 20, "{letters} letters are of labeling");
-        for action in [Action::AdoptAutomatic, Action::FillHoles, Action::ClearMask, Action::ResetMask, Action::Flag] {
+        for action in [Action::AdoptAutomatic, Action::FillHoles, Action::ResetMask, Action::Flag] {
             assert!(action.is_of_labeling(), "{action:?}");
         }
     }

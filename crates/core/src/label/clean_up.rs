@@ -5,7 +5,7 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use strum::{EnumIter, EnumString, IntoEnumIterator as _, IntoStaticStr};
 
-use super::morphology::{fill_holes, grow, islands, largest_island, remove_islands, shrink};
+use super::morphology::{fill_holes, grow, largest_island, shrink};
 use crate::grid::Mask;
 
 /// A kind of clean-up.
@@ -31,22 +31,12 @@ pub enum CleanKind {
     FillHoles,
     /// Keeps the largest island.
     LargestIsland,
-    /// Removes islands smaller than a disc of this diameter.
-    DropSmall,
-    /// Removes what a disc of this radius does not fit into.
-    Open,
-    /// Fills what a disc of this radius does not fit into outside.
-    Close,
     /// Each pixel as most of those within this radius.
     Smooth,
     /// Adds what is within this distance.
     Grow,
     /// Removes what is within this distance of the outside.
     Shrink,
-    /// Removes islands that touch the edge of the image.
-    ClearBorder,
-    /// Leaves nothing: to begin anew.
-    Clear,
 }
 
 impl CleanKind {
@@ -60,20 +50,15 @@ impl CleanKind {
         match self {
             Self::FillHoles => "Fill holes",
             Self::LargestIsland => "Largest island",
-            Self::DropSmall => "Drop small",
-            Self::Open => "Open",
-            Self::Close => "Close",
             Self::Smooth => "Smooth",
             Self::Grow => "Grow",
             Self::Shrink => "Shrink",
-            Self::ClearBorder => "Clear border",
-            Self::Clear => "Clear",
         }
     }
 
     /// True where the kind has a size.
     pub fn is_sized(self) -> bool {
-        !matches!(self, Self::FillHoles | Self::LargestIsland | Self::ClearBorder | Self::Clear)
+        !matches!(self, Self::FillHoles | Self::LargestIsland)
     }
 }
 
@@ -82,7 +67,7 @@ impl CleanKind {
 pub struct CleanUp {
     /// Kind of clean-up.
     pub kind: CleanKind,
-    /// Radius, distance or (of [`CleanKind::DropSmall`]) diameter, millimeters; without meaning where the kind has none.
+    /// Radius or distance, millimeters; without meaning where the kind has none.
     pub size_mm: f64,
 }
 
@@ -123,21 +108,9 @@ impl CleanUp {
         match self.kind {
             CleanKind::FillHoles => fill_holes(mask),
             CleanKind::LargestIsland => largest_island(mask),
-            CleanKind::DropSmall => {
-                let area = (std::f64::consts::PI * px * px / 4.0).ceil();
-                if area.is_finite() { remove_islands(mask, area as usize) } else { mask.clone() }
-            }
-            CleanKind::Open => grow(&shrink(mask, px), px),
-            CleanKind::Close => {
-                // What is set stays set where the disc is cut by the edge of the image.
-                let closed = shrink(&grow(mask, px), px);
-                Mask::from_fn(mask.width(), mask.height(), |x, y| closed[(x, y)] || mask[(x, y)])
-            }
             CleanKind::Smooth => smooth(mask, px),
             CleanKind::Grow => grow(mask, px),
             CleanKind::Shrink => shrink(mask, px),
-            CleanKind::ClearBorder => clear_border(mask),
-            CleanKind::Clear => mask.map(|_| false),
         }
     }
 }
@@ -176,20 +149,6 @@ fn smooth(mask: &Mask, radius_px: f64) -> Mask {
     })
 }
 
-fn clear_border(mask: &Mask) -> Mask {
-    let (labels, sizes) = islands(mask);
-    let (width, height) = (mask.width(), mask.height());
-    let mut touches = vec![false; sizes.len() + 1];
-    for y in 0..height {
-        for x in 0..width {
-            if x == 0 || y == 0 || x + 1 == width || y + 1 == height {
-                touches[labels[(x, y)] as usize] = true;
-            }
-        }
-    }
-    labels.map(|&label| label != 0 && !touches[label as usize])
-}
-
 #[cfg(test)]
 mod tests {
     use strum::IntoEnumIterator as _;
@@ -220,16 +179,8 @@ mod tests {
         assert!(clean(CleanKind::FillHoles, f64::NAN, &scene)[(25, 20)]);
         let largest = clean(CleanKind::LargestIsland, 0.0, &scene);
         assert!(!largest[(50, 5)] && !largest[(58, 35)] && largest[(40, 20)]);
-        let dropped = clean(CleanKind::DropSmall, 1.0, &scene);
-        assert!(!dropped[(50, 5)] && dropped[(58, 35)], "27 px are more than a disc of 2 px across");
-        let opened = clean(CleanKind::Open, 1.0, &scene);
-        assert!(!opened[(42, 20)] && !opened[(50, 5)] && opened[(25, 12)]);
-        assert!(clean(CleanKind::Close, 1.0, &scene)[(25, 20)]);
         let smooth = clean(CleanKind::Smooth, 1.0, &scene);
         assert!(smooth[(25, 20)] && !smooth[(42, 20)] && !smooth[(50, 5)]);
-        let border = clean(CleanKind::ClearBorder, 0.0, &scene);
-        assert!(!border[(58, 35)] && border[(25, 12)] && border[(50, 5)]);
-        assert_eq!(count(&clean(CleanKind::Clear, 0.0, &scene)), 0);
         assert!(count(&clean(CleanKind::Grow, 1.0, &scene)) > count(&scene));
         assert!(count(&clean(CleanKind::Shrink, 1.0, &scene)) < count(&scene));
     }

@@ -2,13 +2,8 @@
 
 use crate::grid::{Grid, Mask};
 
-/// Numbers the islands of `mask` (pixels that touch at sides or corners): 0 is background, island `i` has number
-/// `i + 1`. The second value holds their sizes in pixels.
-pub fn islands(mask: &Mask) -> (Grid<u32>, Vec<usize>) {
-    components(mask, true, true)
-}
-
-/// Connected regions of pixels equal to `value`, over sides, and over corners if `corners`.
+/// Numbers the connected regions of pixels equal to `value`, over sides, and over corners if `corners`: region `i` has number
+/// `i + 1`, all else 0. The second value holds their sizes in pixels.
 fn components(mask: &Mask, value: bool, corners: bool) -> (Grid<u32>, Vec<usize>) {
     let (width, height) = (mask.width(), mask.height());
     let mut labels = Grid::filled(width, height, 0u32);
@@ -59,15 +54,10 @@ pub fn fill_holes(mask: &Mask) -> Mask {
 
 /// Keeps the island with the most pixels; of equal ones the first in reading order.
 pub fn largest_island(mask: &Mask) -> Mask {
-    let (labels, sizes) = islands(mask);
+    // Pixels that touch at sides or corners are of one island.
+    let (labels, sizes) = components(mask, true, true);
     let largest = sizes.iter().enumerate().max_by_key(|&(i, &n)| (n, std::cmp::Reverse(i))).map(|(i, _)| i as u32 + 1);
     labels.map(|&label| Some(label) == largest)
-}
-
-/// Removes the islands with fewer than `min_pixels` pixels.
-pub(crate) fn remove_islands(mask: &Mask, min_pixels: usize) -> Mask {
-    let (labels, sizes) = islands(mask);
-    labels.map(|&label| label != 0 && sizes[label as usize - 1] >= min_pixels)
 }
 
 /// Adds the pixels within `radius_px` of the mask. A radius below 1, or NaN, changes nothing.
@@ -133,9 +123,8 @@ mod tests {
     #[test]
     fn islands_touch_at_corners() {
         let m = mask(&["#..#", ".#..", "...#", "#..#"]);
-        assert_eq!(islands(&m).1, [2, 1, 2, 1]);
+        assert_eq!(components(&m, true, true).1, [2, 1, 2, 1]);
         assert_eq!(text(&largest_island(&m)), ["#...", ".#..", "....", "...."]);
-        assert_eq!(text(&remove_islands(&m, 2)), ["#...", ".#..", "...#", "...#"]);
         let none = Mask::filled(3, 2, false);
         assert_eq!(largest_island(&none), none);
         assert_eq!(fill_holes(&Mask::filled(0, 0, false)).len(), 0);

@@ -173,20 +173,21 @@ mod tests {
         let (rig, place) = (Rig::lab(), MaskPlace::measured(lab::LEFT));
         let mut labels = PairLabels::default();
         assert_eq!(edit(&labels, LabelEdit::Remove(place.clone())), Ok(None), "there is none, so that nothing begins");
-        let full = TakenUp { place: place.clone(), mask: drawn(true) };
+        let holed = DrawnMask::new(Mask::from_fn(8, 4, |x, y| (x, y) != (3, 2)), Provenance::Nothing);
+        let full = TakenUp { place: place.clone(), mask: holed.clone() };
         let adopted = edit(&labels, LabelEdit::Adopt(full.clone())).unwrap().unwrap();
         assert_eq!(
             (&*adopted.deed.name, adopted.change.review),
             ("automatic mask taken over", Some([Review::Todo, Review::InProgress]))
         );
         adopted.change.apply_to(&mut labels);
-        assert_eq!(labels.measured(lab::LEFT), Some(&drawn(true)));
-        let clear = CleanUp { kind: CleanKind::Clear, size_mm: 0.0 };
-        let cleaned = edit(&labels, LabelEdit::CleanUp { on: full, clean_up: clear, rig: &rig }).unwrap().unwrap();
+        assert_eq!(labels.measured(lab::LEFT), Some(&holed));
+        let fill = CleanUp { kind: CleanKind::FillHoles, size_mm: 0.0 };
+        let cleaned = edit(&labels, LabelEdit::CleanUp { on: full, clean_up: fill, rig: &rig }).unwrap().unwrap();
         assert!(cleaned.deed.how.is_some() && cleaned.change.review.is_none());
         cleaned.change.apply_to(&mut labels);
         let on = TakenUp { place: place.clone(), mask: labels.measured(lab::LEFT).unwrap().clone() };
-        assert_eq!(edit(&labels, LabelEdit::CleanUp { on, clean_up: clear, rig: &rig }), Ok(None));
+        assert_eq!(edit(&labels, LabelEdit::CleanUp { on, clean_up: fill, rig: &rig }), Ok(None));
         let of = ImprintOf::unknown();
         assert_eq!(edit(&labels, LabelEdit::Review(Review::InProgress)), Ok(None));
         // Done accepts what nobody drew, and nothing else.
