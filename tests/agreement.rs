@@ -21,8 +21,8 @@ use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Command, DoctorCommand, EvaluateCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane,
-    PredictCommand, ViewCommand,
+    AdaptCommand, Command, DoctorCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand,
+    ViewCommand,
 };
 use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
@@ -46,7 +46,6 @@ use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::images;
 use touch2touch_pipeline::labels::Labels;
-use touch2touch_pipeline::masks::queue::QueueBy;
 
 use crate::support::run;
 
@@ -88,17 +87,12 @@ fn how(action: Action) -> How {
         A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
-        A::RankMasks => Verb(&["masks", "queue", "demo"]),
+        A::RankMasks => Verb(&["evaluate", "demo"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
         A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),
         A::LargestIsland => Verb(&["label", "demo", "--pair", "a", "--clean", "largest_island"]),
-        A::ClearBorder => Verb(&["label", "demo", "--pair", "a", "--clean", "clear_border"]),
-        A::ClearMask => Verb(&["label", "demo", "--pair", "a", "--clean", "clear"]),
-        A::DropSmall => Verb(&["label", "demo", "--pair", "a", "--clean", "drop_small=1"]),
-        A::OpenMask => Verb(&["label", "demo", "--pair", "a", "--clean", "open=1"]),
-        A::CloseMask => Verb(&["label", "demo", "--pair", "a", "--clean", "close=1"]),
         A::SmoothMask => Verb(&["label", "demo", "--pair", "a", "--clean", "smooth=1"]),
         A::GrowMask => Verb(&["label", "demo", "--pair", "a", "--clean", "grow=1"]),
         A::ShrinkMask => Verb(&["label", "demo", "--pair", "a", "--clean", "shrink=1"]),
@@ -442,33 +436,6 @@ fn on_a_lab_folder_drawn_masks_and_reviews_count_in_both() {
     // Left out where it is asked for.
     let without = json(&["pose", path, "--no-hand"], home.path());
     assert_eq!(without["cases"][0]["mask"], "unet");
-}
-
-#[test]
-fn the_most_uncertain_masks_are_in_one_order_in_both() {
-    let home = tempfile::tempdir().unwrap();
-    let folder = lab_folder(home.path());
-    let path = folder.to_str().unwrap();
-    let names: Vec<String> = Dataset::open(&folder).unwrap().index.pairs.iter().map(|pair| pair.name.clone()).collect();
-    json(&["label", path, "--pair", &names[1], "--clean", "grow=1.5"], home.path());
-    let mut studio = Studio::open(Place::Path(folder.clone()), home.path());
-    studio.send(ViewCommand::ShowPanes([Pane::Browser].into_iter().collect()).into());
-    studio.send(EvaluateCommand::Rank.into());
-    for by in QueueBy::iter() {
-        studio.send(LibraryCommand::SetUncertainBy(by).into());
-        let verb = json(&["masks", "queue", path, "--by", by.key()], home.path());
-        let library = &studio.state.library;
-        let order: Vec<&str> = library.order.iter().filter_map(|id| Some(library.entry(*id)?.name.as_str())).collect();
-        let said: Vec<&str> = verb["pairs"].as_array().unwrap().iter().map(|p| p["pair"].as_str().unwrap()).collect();
-        assert_eq!(order, said, "{by:?}");
-        for (id, line) in library.order.iter().zip(verb["pairs"].as_array().unwrap()) {
-            let queued = studio.state.table.scores.queue.get(*id).expect("it is ranked");
-            assert_eq!(line["overall"], optional(queued.overall), "{by:?} {line}");
-            let why = queued.reason(by).map_or_else(String::new, |part| part.text());
-            assert_eq!(line["why"], why, "{by:?}");
-        }
-    }
-    assert!(studio.state.table.scores.queue.known() == names.len() && names.len() >= 3);
 }
 
 #[test]

@@ -18,9 +18,9 @@ mod documented;
 mod hostile;
 mod links;
 #[cfg(feature = "onnx")]
+mod notes;
 mod outputs;
 mod pages;
-mod queue;
 mod read_as;
 mod refused;
 #[cfg(feature = "onnx")]

@@ -20,7 +20,7 @@ use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
-use super::{adapt, export, labels, results, train};
+use super::{adapt, export, results, train};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 

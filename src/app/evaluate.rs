@@ -10,11 +10,12 @@ use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
 use super::source::DataSource;
 use super::state::State;
+use super::state::library::Sort;
 use super::state::tasks::{Level, TaskKind};
 use super::{results, tasks};
+use touch2touch_core::evaluation::Metric;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::{JobCx, Progress};
-use touch2touch_pipeline::masks::queue::measured_only;
 use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
 
 /// The grasps after which the scores so far are looked up while all pairs are scored.
@@ -67,10 +68,14 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
     }
 }
 
-/// Has the measured imprints of every pair scored.
+/// Has the measured imprints of every pair scored, and the list ordered by how unsure the mask model is of them.
 fn rank(state: &mut State, effects: &mut Vec<Effect>) {
-    let setup = results::setup_of_all(state).map(|setup| measured_only(&setup));
+    let setup = results::setup_of_all(state).map(|setup| Setup { bundles: Vec::new(), ..setup });
     start(state, setup, "Rank the masks of", effects);
+    let measured = Some(evaluate::MEASURED.into());
+    state.table.chosen = ScoreChoice { source: measured, metric: Some(Metric::Unsure), best_first: false };
+    state.library.sort = Sort::Score;
+    state.reorder();
 }
 
 /// Has the open data set scored. One at a time: a second would only take the cores from the first.

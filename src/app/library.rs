@@ -25,7 +25,6 @@ use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::io::dataset::ToolUnit;
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::masks::queue::QueueBy;
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::tool::UnitSet;
 
@@ -55,8 +54,6 @@ pub enum LibraryCommand {
     SetSort(Sort),
     /// Sorts it by a score.
     SetScore(ScoreChoice),
-    /// Sorts it by what is uncertain.
-    SetUncertainBy(QueueBy),
     /// The rows of the list that are on screen.
     ShowRows(Range<usize>),
     /// Shows a pair.
@@ -108,11 +105,6 @@ pub(super) fn step(state: &mut State, command: LibraryCommand, effects: &mut Vec
         LibraryCommand::SetScore(choice) => {
             state.table.chosen = choice;
             state.library.sort = Sort::Score;
-            state.reorder();
-        }
-        LibraryCommand::SetUncertainBy(by) => {
-            state.table.uncertain_by = by;
-            state.library.sort = Sort::Uncertain;
             state.reorder();
         }
         LibraryCommand::ShowRows(rows) => state.library.rows = rows,

@@ -7,15 +7,12 @@ use strum::IntoEnumIterator as _;
 
 use touch2touch_core::dataset::{Index, PairId};
 use touch2touch_core::evaluation::{GraspScore, Metric, Scores};
-use touch2touch_pipeline::masks::queue::Queue;
 
 /// The scores of the pairs of a data set by each source.
 #[derive(Debug, Default)]
 pub struct ScoreTable {
     /// The measured imprints first, where they are scored; each has scores.
     pub sources: Vec<SourceScores>,
-    /// The queue of pairs that are worth a look first.
-    pub queue: Queue,
 }
 
 /// The scores of the pairs by one source.
@@ -81,7 +78,6 @@ impl SourceScores {
 impl ScoreTable {
     /// Of the pairs of an index, by name.
     pub fn new(index: &Index, scores: Vec<Scores>) -> Self {
-        let queue = Queue::of(index, &scores);
         let places: BTreeMap<&str, usize> = index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
         let source = |scores: Scores| {
             let mut grasps = vec![None; index.pairs.len()];
@@ -103,13 +99,12 @@ impl ScoreTable {
             let scored = grasps.iter().flatten().count();
             SourceScores { name, upper_bound, scored, grasps, metrics }
         };
-        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect(), queue }
+        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect() }
     }
 
     /// Bytes that it holds, about.
     pub(in crate::app) fn bytes(&self) -> usize {
-        let queued: usize = self.queue.pairs.iter().map(|queued| 64 + 32 * queued.parts.len()).sum();
-        queued + self.sources.iter().map(|source| source.grasps.len() * 768).sum::<usize>()
+        self.sources.iter().map(|source| source.grasps.len() * 768).sum::<usize>()
     }
 
     /// The source of a name, or whose name has a word in it, whatever its case.

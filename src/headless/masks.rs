@@ -1,7 +1,6 @@
-//! `touch2touch masks`: contact masks as training folders, which to look at first, and a mask model trained on them.
+//! `touch2touch masks`: contact masks as training folders, and a mask model trained on them.
 
 mod import;
-mod queue;
 mod train;
 
 use std::collections::BTreeMap;
@@ -30,8 +29,6 @@ pub(super) enum MasksVerb {
     Export(ExportArgs),
     /// Take masks over that lie in one of these forms. What was painted by hand stays, and no pair is marked.
     Import(import::ImportArgs),
-    /// List the pairs, the most uncertain masks first.
-    Queue(Box<queue::QueueArgs>),
     /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
     /// pairs that were left out.
     Train(train::TrainArgs),
@@ -106,7 +103,6 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
     let args = match verb {
         MasksVerb::Export(args) => args,
         MasksVerb::Import(args) => return import::run(args),
-        MasksVerb::Queue(args) => return queue::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };
     let dataset = args.dataset.open_with(args.tool.tool_scale)?;

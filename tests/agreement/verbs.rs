@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::random::{compared, files, labels, posed, tables, watched};
-use super::{exchange, proposals, python, recipes, stills};
+use super::{exchange, python, recipes, stills};
 use crate::support::run;
 
 /// Comparison of a verb with the studio.
@@ -58,10 +58,6 @@ fn held(verb: &str) -> Option<Held> {
         "masks export" | "masks import" => {
             By(&[exchange::masks_are_imported_by_the_studio_as_by_the_verb_and_undo_takes_it_back])
         }
-        "masks queue" => By(&[
-            tables::a_random_recipe_orders_the_masks_the_same_in_the_list_and_by_the_verb,
-            super::the_most_uncertain_masks_are_in_one_order_in_both,
-        ]),
         "masks train" => By(&[learned::TESTS[1]]),
         "simulate" => Not("the studio opens what it wrote, and simulates nothing but the demo"),
         "doctor" => By(&[

@@ -49,7 +49,6 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch masks train", How::Run(&[("10", "0.01")], "--test-in-train", &[0])),
     ("touch2touch masks train PATH --from cad", How::Run(&[], "--minutes 0.01 --test-in-train", &[0])),
     ("touch2touch masks train PATH --from cad --minutes", How::Run(&[("3", "0.01")], "--test-in-train", &[0])),
-    ("touch2touch masks queue", How::Run(&[], "", &[0])),
     ("touch2touch doctor", How::Run(&[], "", &[0])),
     ("touch2touch bundle check", How::Run(&[], "", &[0])),
     // Without an engine on the machine it says so by its exit code.

@@ -1,17 +1,17 @@
-//! A data set at the labeling desk: notes, and the most uncertain first.
+//! A data set at the labeling desk: notes, and what the mask model is least sure of first.
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand};
+use touch2touch::app::command::{EvaluateCommand, LabelsCommand, LibraryCommand};
 use touch2touch::app::labels::Review;
 use touch2touch::app::library::{Place, Sort};
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskTool, Workspace};
 use touch2touch::app::state::State;
+use touch2touch_core::evaluation::Metric;
 use touch2touch_core::label::{CleanKind, CleanUp};
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::MaskStore;
-use touch2touch_pipeline::masks::queue::QueueBy;
 
 use super::rig::{Rig, write_dataset};
 
@@ -73,22 +73,20 @@ fn a_note_is_typed_without_a_key_firing_and_is_found_again() {
 }
 
 #[test]
-fn the_most_uncertain_come_first_and_say_why() {
+fn what_the_mask_model_is_least_sure_of_comes_first() {
     let folder = tempfile::tempdir().unwrap();
     write_dataset(folder.path(), 3);
     let Some(mut rig) = Rig::live(SIZE, Place::Path(folder.path().to_owned())) else { return };
     desk(&mut rig);
-    rig.send(LibraryCommand::SetUncertainBy(QueueBy::default()));
-    rig.harness.get_by_label("Rank by uncertainty").click();
-    rig.harness.step();
+    rig.send(EvaluateCommand::Rank);
     rig.settle();
-    assert_eq!((state(&rig).library.sort, state(&rig).table.scores.queue.known()), (Sort::Uncertain, 6));
+    let (by, metric) = state(&rig).table.by().unwrap();
+    assert_eq!((state(&rig).library.sort, by.upper_bound, metric), (Sort::Score, true, Metric::Unsure));
     assert!(state(&rig).table.result.is_none(), "a ranking is no results table");
     rig.shoot("queue-uncertain");
     let order = state(&rig).library.order.clone();
-    let queue = &state(&rig).table.scores.queue;
-    let overall: Vec<f64> = order.iter().map(|id| queue.get(*id).unwrap().overall.unwrap()).collect();
-    assert!(overall.is_sorted_by(|a, b| a >= b) && overall[0] > overall[5], "{overall:?}");
+    let unsure: Vec<f64> = order.iter().map(|id| state(&rig).table.value(*id).unwrap()).collect();
+    assert!(unsure.len() == 6 && unsure.is_sorted_by(|a, b| a >= b) && unsure[0] > unsure[5], "{unsure:?}");
     rig.send(LibraryCommand::Last);
     rig.send(LabelsCommand::SetReview(Review::Done));
     for expected in [0, 1, 2, 3, 4, 0] {
@@ -98,12 +96,10 @@ fn the_most_uncertain_come_first_and_say_why() {
     // A mask that is drawn otherwise is a disagreement, once it is ranked again.
     rig.send(LabelsCommand::AdoptAutomatic);
     rig.send(LabelsCommand::CleanUp(CleanUp { kind: CleanKind::Grow, size_mm: 3.0 }));
-    rig.harness.get_by_label("Rank by uncertainty").click();
-    rig.harness.step();
+    rig.send(EvaluateCommand::Rank);
     rig.settle();
     let pair = state(&rig).selection.pair.unwrap();
-    let queued = state(&rig).table.scores.queue.get(pair).unwrap().clone();
-    let disagreement = queued.parts.iter().find(|part| part.text().starts_with("Hand against model"));
-    assert!(disagreement.is_some_and(|part| part.value > 0.05), "{queued:?}");
-    rig.shoot("queue-disagreement");
+    let (by, _) = state(&rig).table.by().unwrap();
+    let apart = by.value(pair, Metric::Disagreement);
+    assert!(apart.is_some_and(|apart| apart > 0.05), "{apart:?}");
 }

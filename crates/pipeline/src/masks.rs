@@ -3,4 +3,3 @@
 pub mod label_edit;
 pub mod label_pair;
 pub mod propose;
-pub mod queue;

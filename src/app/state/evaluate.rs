@@ -7,7 +7,6 @@ use super::super::keys::TableKey;
 use super::super::scores::{ScoreTable, SourceScores};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::{Condition, Metric, Row, paper_rows};
-use touch2touch_pipeline::masks::queue::QueueBy;
 use touch2touch_pipeline::scores::evaluate::Evaluation;
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
@@ -34,8 +33,6 @@ pub struct TableState {
     pub(in crate::app) next_look: u64,
     /// The score that the list is ordered by, as it was chosen.
     pub chosen: ScoreChoice,
-    /// The measure of uncertainty, where the list is ordered by that.
-    pub uncertain_by: QueueBy,
 }
 
 /// The score that the list is ordered, colored and filtered by.

@@ -51,8 +51,6 @@ pub enum Sort {
     Review,
     /// By the chosen score, the worst first unless chosen otherwise; what was not scored last.
     Score,
-    /// The most uncertain masks first; of what was not ranked, as in the data set.
-    Uncertain,
 }
 
 impl Sort {
@@ -64,7 +62,6 @@ impl Sort {
             Self::Tool => "Tool",
             Self::Review => "Review state",
             Self::Score => "Score",
-            Self::Uncertain => "Uncertain",
         }
     }
 }
@@ -193,7 +190,6 @@ impl Library {
         let entry = |id: &PairId| &pairs[id.0 as usize];
         match self.sort {
             Sort::Natural | Sort::Score => {}
-            Sort::Uncertain => table.scores.queue.sort(&mut order, table.uncertain_by),
             Sort::Name => order.sort_by(|a, b| entry(a).name.cmp(&entry(b).name)),
             Sort::Tool => order.sort_by(|a, b| entry(a).tool.cmp(&entry(b).tool)),
             Sort::Review => order.sort_by_key(|id| review(entry(id))),

@@ -23,7 +23,6 @@ use crate::ui::parts::widget::texture::depth_image;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::evaluation::Metric;
 use touch2touch_core::units::counted;
-use touch2touch_pipeline::masks::queue::QueueBy;
 
 /// Height of a row, points.
 const ROW: f32 = 40.0;
@@ -111,7 +110,6 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         response.response.accessible_name("Sort").on_hover_text("Order of the list");
     });
     score_row(cx, ui);
-    uncertain_row(cx, ui);
     if let Some(open) = &cx.state.library.open
         && open.tools.len() > 1
     {
@@ -132,11 +130,10 @@ fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
     }
 }
 
-/// By which score the list is ordered, colored and filtered; nothing while there are no scores, or where the list is
-/// ordered by what is uncertain.
+/// By which score the list is ordered, colored and filtered; nothing while there are no scores.
 fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let table = &cx.state.table;
-    let Some((by, metric)) = table.by().filter(|_| cx.state.library.sort != Sort::Uncertain) else { return };
+    let Some((by, metric)) = table.by() else { return };
     let (chosen, sorted) = (table.chosen.clone(), cx.state.library.sort == Sort::Score);
     let mut next = None;
     ui.horizontal(|ui| {
@@ -175,30 +172,6 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     if let Some(next) = next {
         cx.push(LibraryCommand::SetScore(next));
-    }
-}
-
-/// Row with the metric that orders the list where the most uncertain come first, and the number of ranked pairs.
-fn uncertain_row(cx: &mut Cx<'_>, ui: &mut Ui) {
-    if cx.state.library.sort != Sort::Uncertain {
-        return;
-    }
-    let by = cx.state.table.uncertain_by;
-    let combo = egui::ComboBox::from_id_salt("uncertain").width(ui.available_width()).selected_text(by.name());
-    let response = combo.truncate().show_ui(ui, |ui| {
-        for other in QueueBy::iter() {
-            if ui.selectable_label(other == by, other.name()).on_hover_text(other.tip()).clicked() {
-                cx.out.push(Command::Library(LibraryCommand::SetUncertainBy(other)));
-            }
-        }
-    });
-    response.response.accessible_name("Uncertain by").on_hover_text("What uncertain means. ".to_owned() + by.tip());
-    let (known, total) = (cx.state.table.scores.queue.known(), cx.state.library.pairs().len());
-    if cx.state.tasks.of_kind(TaskKind::Evaluate).is_none() {
-        ui.horizontal_wrapped(|ui| {
-            cx.action_button(ui, Action::RankMasks, "Rank");
-            ui.label(caption(format!("{known} of {total} ranked"), cx.p));
-        });
     }
 }
 
@@ -383,10 +356,6 @@ fn row_ui(cx: &mut Cx<'_>, ui: &mut Ui, id: PairId, selected: bool) {
     if !note.is_empty() {
         tip += &format!("\nNote: {note}");
     }
-    for part in cx.state.table.scores.queue.get(id).into_iter().flat_map(|queued| &queued.parts) {
-        let worse = (100.0 * part.rank).round();
-        tip += &format!("\n{}: more than {worse:.0} % of the others", part.text());
-    }
     if response.on_hover_text(tip).clicked() {
         cx.push(LibraryCommand::Select(id));
     }
@@ -405,18 +374,9 @@ fn note_mark(painter: &egui::Painter, center: egui::Pos2, color: Color32) {
     }
 }
 
-/// The score of a pair that the list is about; where the most uncertain come first, why it stands where it does.
+/// The score of a pair that the list is about.
 fn figure_text(cx: &Cx<'_>, pair: PairId) -> Option<(String, Color32)> {
     let table = &cx.state.table;
-    if cx.state.library.sort == Sort::Uncertain {
-        let part = table.scores.queue.get(pair)?.reason(table.uncertain_by)?;
-        let color = match part.rank {
-            rank if rank > 0.9 => cx.p.wrong,
-            rank if rank > 0.7 => cx.p.caution,
-            _ => cx.p.text,
-        };
-        return Some((format!("{} {}", part.metric.short(), part.metric.text(part.value)), color));
-    }
     let (source, metric) = table.by()?;
     let value = source.value(pair, metric)?;
     Some((metric.text(value), score_color(cx.p, source, metric, value)))

@@ -1,11 +1,8 @@
 //! Figures of a whole data set: statistics of its predictions and the order of its masks.
 
-use strum::IntoEnumIterator as _;
-use touch2touch::app::command::EvaluateCommand;
 use touch2touch::app::{recipe, results};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_pipeline::io::names::Outputs;
-use touch2touch_pipeline::masks::queue::QueueBy;
 use touch2touch_pipeline::steps::recipe::Stage;
 
 use super::*;
@@ -65,45 +62,4 @@ pub(in crate::agreement) fn statistics_of_a_random_recipe_are_the_same_by_button
     }
     compared(&counts, 14);
     compared(&shifted, 24_500);
-}
-
-#[test]
-pub(in crate::agreement) fn a_random_recipe_orders_the_masks_the_same_in_the_list_and_by_the_verb() {
-    let home = tempfile::tempdir().unwrap();
-    let mut draws = Draws::new(9);
-    let mut counts = Vec::new();
-    let mut both = Both::open(Place::Path(lab_folder(home.path())), home.path());
-    both.show(&[Pane::Browser]);
-    for _ in 0..2 {
-        put(&mut both.studio, &draws.posed());
-        both.studio.send(EvaluateCommand::Rank.into());
-        let mut count = 0;
-        for by in QueueBy::iter() {
-            both.studio.send(LibraryCommand::SetUncertainBy(by).into());
-            let begin = ["masks", "queue", &both.path, "--by", by.key()].map(str::to_owned);
-            let words =
-                recipe::in_force(&both.studio.state, ImprintSource::Measured).until(Stage::Pose).words(Stage::Pose);
-            let said = both.run(&begin.into_iter().chain(words.list()).collect::<Vec<_>>()).unwrap();
-            let state = &both.studio.state;
-            let lines: Vec<_> = state
-                .library
-                .order
-                .iter()
-                .map(|id| {
-                    let queued = state.table.scores.queue.get(*id).expect("it is ranked");
-                    let why = queued.reason(by).map_or_else(String::new, |part| part.text());
-                    serde_json::json!([state.library.entry(*id).unwrap().name, queued.overall, why])
-                })
-                .collect();
-            let verb: Vec<_> = said["pairs"]
-                .as_array()
-                .unwrap()
-                .iter()
-                .map(|line| serde_json::json!([line["pair"], line["overall"], line["why"]]))
-                .collect();
-            count += same(&written(&lines), &verb.into(), &format!("{by:?}"));
-        }
-        counts.push(count);
-    }
-    compared(&counts, 3);
 }

@@ -56,8 +56,6 @@ use touch2touch_pipeline::io::statistics::ShiftStatistics;
 use touch2touch_pipeline::job::{PreviewPicture, Progress};
 use touch2touch_pipeline::labels::Operation;
 use touch2touch_pipeline::learn::train::{MasksFrom, TrainChoice};
-use touch2touch_pipeline::masks::propose::Batch;
-use touch2touch_pipeline::masks::queue::QueueBy;
 use touch2touch_pipeline::scores::evaluate::{Evaluation, Setup};
 use touch2touch_pipeline::steps::tool::UnitSet;
 use touch2touch_pipeline::still::space::{Ground, ViewAngles};
@@ -399,7 +397,6 @@ draws! {
         1 Last,
         1 NextUnfinished,
         1 NextWorst,
-        1 SetUncertainBy(any_of::<QueueBy>()),
         1 DoneAndNext,
     }
     follow: FollowCommand {

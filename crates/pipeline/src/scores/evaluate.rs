@@ -38,6 +38,8 @@ pub use export::{Report, csv, export, latex, markdown, rows};
 
 /// Name of the task in errors.
 const WHAT: &str = "Evaluate";
+/// Name of the row of the measured imprints themselves.
+pub const MEASURED: &str = "Measured (upper bound)";
 
 /// Settings of an evaluation.
 #[derive(Clone, Debug, PartialEq, Serialize)]

@@ -266,7 +266,7 @@ impl Method {
     /// The name of the row.
     pub(super) fn name(&self) -> &str {
         match self {
-            Self::Measured => "Measured (upper bound)",
+            Self::Measured => super::MEASURED,
             Self::Generator(method) => &method.name,
             Self::Stored => "Stored predictions (lab's VQ-VAE)",
         }
