@@ -34,13 +34,12 @@ use clap::{Args, CommandFactory as _, Parser, Subcommand};
 
 use output::PrintError;
 
-pub use args::{DatasetArgs, JsonArgs, LimitArgs, at_least_one, keyed};
+pub use args::{DatasetArgs, LimitArgs, at_least_one, keyed};
 pub use output::{Output, says};
 pub use recipe::{ModelArgs, RuntimeArg};
 pub use simulate::condition;
 
 use touch2touch_core::rig::Rig;
-use touch2touch_pipeline::io::dataset::ToolScale;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
@@ -111,15 +110,6 @@ pub struct Common {
     pub json: bool,
 }
 
-/// The option of the verbs that read CAD models.
-#[derive(Debug, Clone, Copy, Args)]
-pub struct ToolArgs {
-    /// Unit of the CAD models (tools_stls/*.stl): m, cm, mm, um, in, a factor to meters, or `auto` for the one that
-    /// makes them as large as a hand-held tool. Without it, what tools_stls/unit.txt says, else meters.
-    #[arg(long, value_name = "UNIT")]
-    pub tool_scale: Option<ToolScale>,
-}
-
 /// Result of a verb: true where everything asked for was done.
 pub type VerbResult = anyhow::Result<bool>;
 
@@ -154,8 +144,7 @@ pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
 /// # Errors
 /// The message that the program would print.
 pub fn check_command<T: Into<OsString> + Clone>(arguments: impl IntoIterator<Item = T>) -> Result<(), String> {
-    let arguments = arguments.into_iter().map(Into::into).collect();
-    match Cli::try_parse_from(args::JsonArgs::with_equals(arguments)) {
+    match Cli::try_parse_from(arguments) {
         // Help and version are answers.
         Err(err) if err.use_stderr() => Err(err.to_string()),
         _ => Ok(()),
@@ -186,7 +175,7 @@ fn parse(arguments: impl IntoIterator<Item = OsString>) -> anyhow::Result<Option
     {
         check_studio_path(Path::new(first))?;
     }
-    match Cli::try_parse_from(args::JsonArgs::with_equals(arguments)) {
+    match Cli::try_parse_from(arguments) {
         Ok(cli) => Ok(Some(cli)),
         Err(err) if err.use_stderr() => {
             let text = err.to_string();

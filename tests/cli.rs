@@ -142,20 +142,18 @@ fn a_cad_model_in_millimeters_is_refused_with_an_offer_that_can_be_accepted() {
     let refused = run(&["pose", set_text, "--mask", "cad", "--json"], dir.path());
     assert_eq!(refused.status.code(), Some(1));
     let said = error_text(&refused);
-    assert!(said.contains("scale it by 0.001") && said.contains("--tool-scale auto"), "{said}");
-    let accept = |args: &[&str]| {
-        let done = run(&[&["pose", set_text, "--mask", "cad", "--json"], args].concat(), dir.path());
+    assert!(said.contains("scale it by 0.001") && said.contains("unit.txt"), "{said}");
+    let unit = set.join("tools_stls/unit.txt");
+    for word in ["auto", "mm", "0.001"] {
+        std::fs::write(&unit, word).unwrap();
+        let done = run(&["pose", set_text, "--mask", "cad", "--json"], dir.path());
         assert!(done.status.success(), "{}", error_text(&done));
         let (a, b) = (&json(&done)["cases"][0]["angle_deg"], &meters["cases"][0]["angle_deg"]);
         assert!((a.as_f64().unwrap() - b.as_f64().unwrap()).abs() < 1e-3, "{a} {b}");
-    };
-    accept(&["--tool-scale", "auto"]);
-    accept(&["--tool-scale", "mm"]);
-    accept(&["--tool-scale", "0.001"]);
-    std::fs::write(set.join("tools_stls/unit.txt"), "mm\n").unwrap();
-    accept(&[]);
-    let unknown = run(&["pose", set_text, "--tool-scale", "furlong"], dir.path());
-    assert!(error_text(&unknown).contains("is no unit"), "{}", error_text(&unknown));
+    }
+    std::fs::write(&unit, "furlong").unwrap();
+    let unknown = run(&["pose", set_text], dir.path());
+    assert!(error_text(&unknown).contains("furlong"), "{}", error_text(&unknown));
 }
 
 #[test]

@@ -6,12 +6,11 @@ use std::time::Duration;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, LimitArgs, RegistrationParser, parse_minutes};
+use super::args::{DatasetArgs, LimitArgs, RegistrationArgs, parse_minutes};
 use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::learn::adapt::{AdaptSetup, Adapted, Scored, Tuning, adapt};
 
@@ -48,9 +47,8 @@ pub(super) struct AdaptArgs {
     limit: LimitArgs,
     #[command(flatten)]
     mask: MaskArgs,
-    /// The registration that gives the angles, where tools and cameras are known.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    registration: Registration,
+    #[command(flatten)]
+    registration: RegistrationArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -80,7 +78,7 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     };
     let output = Output::new(args.common, "fitting", pairs.len());
     let models = args.model.models();
-    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.registration)?;
+    let recipe = args.model.posed(ImprintSource::Predicted, &dataset.rig, &args.mask, args.registration.one()?)?;
     let setup = AdaptSetup {
         recipe,
         pairs,

@@ -1,7 +1,6 @@
 //! Options that several verbs share, read in one way.
 
 use std::convert::Infallible;
-use std::ffi::OsString;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -9,14 +8,11 @@ use std::time::Duration;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use serde::Serialize;
 use strum::IntoEnumIterator;
 
-use super::Common;
 use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::{PadId, Rig};
-use touch2touch_pipeline::io::atomic;
-use touch2touch_pipeline::io::dataset::{Dataset, ToolScale};
+use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::pairs;
 
 /// The data set that a verb reads.
@@ -35,64 +31,10 @@ impl DatasetArgs {
     }
 
     /// The folder's data set, or the built-in one of that name; says first what is wrong with it.
-    pub(super) fn open(&self) -> anyhow::Result<Dataset> {
+    pub fn open(&self) -> anyhow::Result<Dataset> {
         let dataset = Dataset::open(&self.path).map_err(|err| anyhow::anyhow!("{err}; {}", err.hint()))?;
         super::notes::say_problems(&dataset);
         Ok(dataset)
-    }
-
-    /// [`Self::open`] with the unit of the CAD models as the command line has it.
-    pub fn open_with(&self, tool_scale: Option<ToolScale>) -> anyhow::Result<Dataset> {
-        let mut dataset = self.open()?;
-        dataset.tool_scale = tool_scale;
-        Ok(dataset)
-    }
-}
-
-/// Destination of the result as one JSON object.
-#[derive(Debug, Clone, Args)]
-pub struct JsonArgs {
-    /// Print one JSON object on standard output, as every verb does; with `=FILE`, write it to a file and print the text
-    /// for people.
-    #[arg(long, value_name = "FILE", num_args = 0..=1, require_equals = true)]
-    json: Option<Option<PathBuf>>,
-}
-
-impl JsonArgs {
-    /// Use of standard output.
-    pub fn common(&self) -> Common {
-        Common { json: matches!(self.json, Some(None)) }
-    }
-
-    /// The file to write.
-    pub fn file(&self) -> Option<&Path> {
-        self.json.as_ref()?.as_deref()
-    }
-
-    /// Writes the file, where one is named.
-    pub fn write(&self, report: &impl Serialize) -> anyhow::Result<()> {
-        let Some(file) = self.file() else { return Ok(()) };
-        atomic::write_bytes(file, serde_json::to_string_pretty(report)?.as_bytes())
-            .map_err(|err| anyhow::anyhow!("cannot write {}: {err}", file.display()))
-    }
-
-    /// Old command lines put a space before the file's name: `--json FILE.json`.
-    pub fn with_equals(arguments: Vec<OsString>) -> Vec<OsString> {
-        let mut out: Vec<OsString> = Vec::with_capacity(arguments.len());
-        // `bench` takes no other word.
-        let bench = arguments.get(1).is_some_and(|verb| verb == "bench");
-        for argument in arguments {
-            let word = !argument.to_string_lossy().starts_with('-');
-            let file = Path::new(&argument).extension().is_some_and(|ending| ending == "json") || (bench && word);
-            match out.last_mut() {
-                Some(last) if last == "--json" && file => {
-                    last.push("=");
-                    last.push(argument);
-                }
-                _ => out.push(argument),
-            }
-        }
-        out
     }
 }
 
@@ -141,25 +83,44 @@ impl<T: FromStr<Err = String> + Clone + Send + Sync + 'static> TypedValueParser 
     }
 }
 
-/// Reads a registration, and lists them in the help.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct RegistrationParser;
+/// The registration, or several where a verb takes them.
+#[derive(Debug, Clone, Args)]
+pub(super) struct RegistrationArgs {
+    /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which contacts are let go.
+    #[arg(long = "engine", value_name = "ENGINE", default_value = Registration::default().key(), value_parser = registrations())]
+    chosen: Registrations,
+}
 
-impl TypedValueParser for RegistrationParser {
-    type Value = Registration;
+#[derive(Debug, Clone)]
+struct Registrations(Vec<Registration>);
 
-    fn parse_ref(
-        &self,
-        cmd: &clap::Command,
-        arg: Option<&clap::Arg>,
-        value: &std::ffi::OsStr,
-    ) -> Result<Registration, clap::Error> {
-        let read: fn(&str) -> Result<Registration, String> = str::parse;
-        read.parse_ref(cmd, arg, value)
+impl FromStr for Registrations {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        Ok(Self(if text == "all" { Registration::iter().collect() } else { vec![text.parse()?] }))
+    }
+}
+
+fn registrations() -> Listed<Registrations> {
+    listed(|| {
+        let one = Registration::iter().map(|by| PossibleValue::new(by.key()).help(by.description()));
+        one.chain([PossibleValue::new("all").help("All of them, one after the other, for `pose`")]).collect()
+    })
+}
+
+impl RegistrationArgs {
+    /// All of them, in this order.
+    pub(super) fn all(&self) -> &[Registration] {
+        &self.chosen.0
     }
 
-    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = PossibleValue> + '_>> {
-        Some(Box::new(Registration::iter().map(|e| PossibleValue::new(e.key()).help(e.description()))))
+    /// The only one.
+    pub(super) fn one(&self) -> anyhow::Result<Registration> {
+        match self.all() {
+            [registration] => Ok(*registration),
+            _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
+        }
     }
 }
 
@@ -176,12 +137,24 @@ impl LimitArgs {
     pub fn spread(self, len: usize) -> Vec<usize> {
         pairs::spread(len, self.limit).collect()
     }
+}
 
+/// One pair, or a number of them.
+#[derive(Debug, Clone, Args)]
+pub(super) struct PairArgs {
+    /// Only this pair, by its name or a part of it that no other has.
+    #[arg(long, conflicts_with = "limit")]
+    pair: Option<String>,
+    #[command(flatten)]
+    limit: LimitArgs,
+}
+
+impl PairArgs {
     /// The position of the pair that is named, else those that are taken of all.
-    pub(crate) fn or_pair(self, dataset: &Dataset, pair: Option<&str>) -> anyhow::Result<Vec<usize>> {
-        match pair {
+    pub(super) fn of(&self, dataset: &Dataset) -> anyhow::Result<Vec<usize>> {
+        match &self.pair {
             Some(name) => Ok(vec![super::find_pair(dataset, name)?.0 as usize]),
-            None => Ok(self.spread(dataset.index.pairs.len())),
+            None => Ok(self.limit.spread(dataset.index.pairs.len())),
         }
     }
 }
@@ -232,17 +205,6 @@ pub(super) fn parse_minutes(text: &str) -> Result<Duration, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_json_file_may_follow_a_space_and_a_path_is_no_json_file() {
-        let with =
-            |words: &str| JsonArgs::with_equals(words.split(' ').map(OsString::from).collect()).join(" ".as_ref());
-        assert_eq!(with("t pose --json a/b.json demo"), "t pose --json=a/b.json demo");
-        assert_eq!(with("t pose --json demo --pair x.json"), "t pose --json demo --pair x.json");
-        assert_eq!(with("t bench generator --json out --grasps 3"), "t bench generator --json=out --grasps 3");
-        assert_eq!(with("t bench generator --json --grasps 3"), "t bench generator --json --grasps 3");
-        assert_eq!(with("t pose demo --json"), "t pose demo --json");
-    }
 
     #[test]
     fn nothing_to_do_is_no_number_of_things() {

@@ -5,17 +5,16 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, JsonArgs, RegistrationParser};
+use super::args::{DatasetArgs, RegistrationArgs};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::notes::Notes;
 use super::recipe::ModelArgs;
-use super::{Output, ToolArgs, VerbResult};
+use super::{Common, Output, VerbResult};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::findings::Finding;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::picture::colored;
-use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Text;
 use touch2touch_core::units::{fixed, mm};
 use touch2touch_pipeline::compare::depict::{SubjectImprints, depict};
@@ -56,14 +55,11 @@ pub(super) struct CompareArgs {
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
-    tool: ToolArgs,
-    /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    registration: Registration,
+    registration: RegistrationArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
-    json: JsonArgs,
+    common: Common,
 }
 
 /// Figures of one imprint against another.
@@ -139,10 +135,10 @@ pub(super) fn made_from(
 }
 
 pub(super) fn run(args: &CompareArgs) -> VerbResult {
-    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let dataset = args.dataset.open()?;
     let id = super::find_pair(&dataset, &args.pair)?;
     let entry = &dataset.index.pairs[id.0 as usize];
-    let output = Output::new(args.json.common(), "comparing", 1);
+    let output = Output::new(args.common, "comparing", 1);
     let sample = dataset.load(id)?;
     let mut notes = Notes::of(&dataset);
     notes.take(&output, &sample.notes);
@@ -156,7 +152,7 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
     let tool = tool.as_ref().map(|loaded| &loaded.model);
     let touch = Touch { dataset: &dataset, pair: id, sample: &sample, tool: tool.ok_or(&lacks), labels: &labels };
     let models = args.model.models();
-    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration);
+    let recipe = |model: &ModelArgs, imprint| model.posed(imprint, &dataset.rig, &args.mask, args.registration.one()?);
     let measuring = recipe(&args.model, ImprintSource::Measured)?;
     let find = |subject: &Subject| -> anyhow::Result<SubjectImprints> {
         let from = made_from(subject, &args.model, |model| recipe(model, ImprintSource::Predicted))?;
@@ -204,7 +200,6 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         poses,
         notes: notes.into_list(&output),
     };
-    args.json.write(&report)?;
     output.finish(&report, || text(&report))?;
     Ok(true)
 }

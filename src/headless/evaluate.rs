@@ -5,13 +5,12 @@ use touch2touch_pipeline::io::dataset::Dataset;
 
 use clap::Args;
 
-use super::args::{DatasetArgs, FingerArg, RegistrationParser, at_least_one, keyed};
+use super::args::{DatasetArgs, FingerArg, RegistrationArgs, at_least_one, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::{MappingArgs, RuntimeArg, common, first_mask_model};
-use super::{Common, Output, ToolArgs, VerbResult};
+use super::{Common, Output, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
-use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::infer::bundle::{Bundle, Found, Origin, find_all};
 use touch2touch_pipeline::infer::features::Preparation;
 use touch2touch_pipeline::io::atomic;
@@ -41,9 +40,8 @@ pub(super) struct EvaluateArgs {
     prepare: Preparation,
     #[command(flatten)]
     mask: MaskArgs,
-    /// The registration that gives the angles.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    registration: Registration,
+    #[command(flatten)]
+    registration: RegistrationArgs,
     /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
@@ -95,8 +93,6 @@ pub(super) struct EvaluateArgs {
     #[arg(long)]
     pairs: bool,
     #[command(flatten)]
-    tool: ToolArgs,
-    #[command(flatten)]
     common: Common,
 }
 
@@ -105,7 +101,7 @@ fn batch(text: &str) -> Result<usize, String> {
 }
 
 pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
-    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let dataset = args.dataset.open()?;
     let setup = setup(args, &dataset)?;
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::recipe::kept() });
@@ -191,7 +187,7 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
         features: args.features.as_ref().map(|folder| (Origin::from(folder), args.prepare)),
-        recipe: common(shift, &args.mask, mask_model, args.registration, args.runtime),
+        recipe: common(shift, &args.mask, mask_model, args.registration.one()?, args.runtime),
         steps: args.steps,
         seed: args.seed,
         sampler: args.sampler,

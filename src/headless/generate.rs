@@ -7,7 +7,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::args::{DatasetArgs, FingerArg, LimitArgs};
+use super::args::{DatasetArgs, FingerArg, PairArgs};
 use super::guard::{Bug, guarded};
 use super::notes::Notes;
 use super::output::says;
@@ -45,11 +45,8 @@ pub(super) struct GenerateArgs {
     /// Finger whose GelSlim image is taken: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
     finger: FingerArg,
-    /// Only this pair, by its name or a part of it that no other has.
-    #[arg(long, conflicts_with = "limit")]
-    pair: Option<String>,
     #[command(flatten)]
-    limit: LimitArgs,
+    pairs: PairArgs,
     #[command(flatten)]
     model: ModelArgs,
     #[command(flatten)]
@@ -58,7 +55,7 @@ pub(super) struct GenerateArgs {
 
 pub(super) fn run(args: &GenerateArgs) -> VerbResult {
     let dataset = args.dataset.open()?;
-    let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
+    let ids = args.pairs.of(&dataset)?;
     let fingers = args.finger.fingers(&dataset.rig)?;
     let models = args.model.models();
     let recipe = args.model.recipe(ImprintSource::Predicted, &dataset.rig)?;

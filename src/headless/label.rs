@@ -20,7 +20,7 @@ pub(super) fn run(args: &LabelArgs) -> VerbResult {
             "--pose alone changes nothing: name the imprint that it is accepted of (--accept), or --propose cad_hand"
         );
     }
-    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let dataset = args.dataset.open()?;
     let labels = Labels::of(&dataset);
     let output = Output::new(args.common, "", 0);
     let folder = labels.folder()?.to_owned();
@@ -86,6 +86,6 @@ fn setup(args: &LabelArgs, dataset: &Dataset) -> anyhow::Result<LabelSetup> {
     if !setup.asks_recipe() {
         return Ok(setup);
     }
-    let recipe = args.model.posed(setup.farthest(), &dataset.rig, &args.mask, args.registration)?;
+    let recipe = args.model.posed(setup.farthest(), &dataset.rig, &args.mask, args.registration.one()?)?;
     Ok(LabelSetup { recipe, ..setup })
 }

@@ -12,7 +12,7 @@ use serde::Serialize;
 use super::args::{DatasetArgs, LimitArgs, keyed};
 use super::contact_mask::MaskArgs;
 use super::recipe::ModelArgs;
-use super::{Common, Output, ToolArgs, VerbResult};
+use super::{Common, Output, VerbResult};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::export::{
@@ -64,8 +64,6 @@ pub(super) struct ExportArgs {
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
-    tool: ToolArgs,
-    #[command(flatten)]
     model: ModelArgs,
     /// Decides which pair lands in which part.
     #[arg(long, default_value_t = 0)]
@@ -105,7 +103,7 @@ pub(super) fn run(verb: &MasksVerb) -> VerbResult {
         MasksVerb::Import(args) => return import::run(args),
         MasksVerb::Train(args) => return train::run(args),
     };
-    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+    let dataset = args.dataset.open()?;
     let ids = args.limit.spread(dataset.index.pairs.len());
     let output = Output::new(args.common, "exporting", ids.len());
     let setup = ExportSetup {

@@ -28,15 +28,15 @@ use touch2touch_pipeline::steps::recipe::{Recipe, Stage};
 use touch2touch_pipeline::steps::tool::load_tool;
 
 use args::Imprints;
-pub(super) use args::{PoseArgs, Registrations, parse_start, registrations};
+pub(super) use args::{PoseArgs, parse_start};
 use report::{Accepted, First, PoseRow, RankedTool, Report, summary, text};
 
 /// Word of `--tool` for trying all tools.
 const ANY: &str = "any";
 
 pub(super) fn run(args: &PoseArgs) -> VerbResult {
-    let dataset = args.dataset.open_with(args.tool.tool_scale)?;
-    let ids = args.limit.or_pair(&dataset, args.pair.as_deref())?;
+    let dataset = args.dataset.open()?;
+    let ids = args.pairs.of(&dataset)?;
     let imprints: &[ImprintSource] = match args.imprint {
         Imprints::Measured => &[ImprintSource::Measured],
         Imprints::Predicted => &[ImprintSource::Predicted],
@@ -129,7 +129,7 @@ pub(super) fn run(args: &PoseArgs) -> VerbResult {
     }
     complete &= !cases.is_empty();
     let notes = notes.into_list(&output);
-    let of = First { registration: args.registration.0[0].to_string(), imprint: imprints[0].key().to_owned() };
+    let of = First { registration: args.registration.all()[0].to_string(), imprint: imprints[0].key().to_owned() };
     let report = Report { summary: summary(&cases, of), cases, notes };
     output.finish(&report, || text(&report))?;
     Ok(complete)
@@ -195,5 +195,5 @@ fn pose_cases(args: &PoseArgs, asked: &PairInput<'_>, models: &Models) -> anyhow
             ambiguity: left_open.clone(),
         })
     };
-    args.registration.0.iter().map(one).collect()
+    args.registration.all().iter().map(one).collect()
 }

@@ -5,13 +5,12 @@ use std::path::PathBuf;
 use clap::Args;
 use serde::Serialize;
 
-use super::args::{DatasetArgs, RegistrationParser, keyed};
+use super::args::{DatasetArgs, RegistrationArgs, keyed};
 use super::contact_mask::{MaskArgs, labels_of};
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult};
 use crate::spatial;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::labels::{ImprintSource, Labels};
 use touch2touch_pipeline::still::space::{Ground, SpacePane, ViewAngles};
@@ -49,9 +48,8 @@ pub(super) struct StillArgs {
     /// Turn once around the pair in so many frames, which go into a folder as frame_0001.png and so on.
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
-    /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    registration: Registration,
+    #[command(flatten)]
+    registration: RegistrationArgs,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -96,7 +94,7 @@ pub(super) fn run(args: &StillArgs) -> VerbResult {
     let setup = StillSetup {
         pair,
         pane: args.imprint,
-        recipe: args.model.posed(imprint, &dataset.rig, &args.mask, args.registration)?,
+        recipe: args.model.posed(imprint, &dataset.rig, &args.mask, args.registration.one()?)?,
         labels: labels_of(&Labels::of(&dataset), &name, &output),
         ground: args.ground,
         angles: args.view,

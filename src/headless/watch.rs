@@ -11,11 +11,10 @@ use async_signal::{Signal, Signals};
 use clap::Args;
 use serde_json::json;
 
-use super::args::DatasetArgs;
+use super::args::{DatasetArgs, RegistrationArgs};
 use super::contact_mask::{MaskArgs, readable};
 use super::guard::{Bug, guarded};
 use super::output::says;
-use super::pose::Registrations;
 use super::recipe::ModelArgs;
 use super::{Common, Output, VerbResult, report};
 use files::Source;
@@ -43,9 +42,8 @@ pub(super) struct WatchArgs {
     tool: Option<String>,
     #[command(flatten)]
     mask: MaskArgs,
-    /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value = "joint", value_parser = super::pose::registrations())]
-    registration: Registrations,
+    #[command(flatten)]
+    registration: RegistrationArgs,
     /// Take up what lies there, unless it was done with the same recipe, and end.
     #[arg(long)]
     once: bool,

@@ -13,7 +13,7 @@ use strum::IntoEnumIterator as _;
 
 use self::kinds::{Kind, Set, kinds, near};
 use super::Machine;
-use touch2touch::headless::JsonArgs;
+use crate::json::JsonArgs;
 use touch2touch::headless::RuntimeArg;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_bench::known::{Case, CaseSet};

@@ -16,7 +16,7 @@ use self::timing::{First, Overhead};
 use super::Machine;
 use super::figures::quantile;
 use super::front::{self, FrontPoint};
-use touch2touch::headless::JsonArgs;
+use crate::json::JsonArgs;
 use touch2touch::headless::{Output, VerbResult};
 use touch2touch_core::diffusion::{GenerateConfig, Sampler, Spacing};
 use touch2touch_core::metrics::AngleSummary;

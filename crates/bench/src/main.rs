@@ -6,6 +6,7 @@ mod doctor;
 mod figures;
 mod front;
 mod generator;
+mod json;
 mod peers;
 mod registration;
 mod reliability;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 use clap::Parser;
 use glam::DVec3;
 use serde::Serialize;
-use touch2touch::headless::{JsonArgs, VerbResult, program};
+use touch2touch::headless::{VerbResult, program};
 use touch2touch_core::cloud::{CloudError, lift};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::sample::DepthCamera;
@@ -56,7 +57,7 @@ fn main() -> ExitCode {
     if std::env::args_os().nth(1).is_some_and(|word| word == "bundle") {
         return touch2touch::headless::main();
     }
-    program(|| run(&Benchmark::parse_from(JsonArgs::with_equals(std::env::args_os().collect()))))
+    program(|| run(&Benchmark::parse()))
 }
 
 fn run(benchmark: &Benchmark) -> VerbResult {

@@ -23,12 +23,13 @@ use clap::Args;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use crate::json::JsonArgs;
 use count::{After, Loop, Share, Tried, with_verdict};
 use hole::Hole;
 use insertion::passes;
 use outline::Outline;
 use stacking::stands;
-use touch2touch::headless::{JsonArgs, ModelArgs, Output, VerbResult, at_least_one};
+use touch2touch::headless::{ModelArgs, Output, VerbResult, at_least_one};
 use touch2touch_core::catalog::{ToolSpec, tools};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;

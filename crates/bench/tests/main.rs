@@ -33,7 +33,7 @@ fn every_engine_is_measured_on_fresh_cases_and_drawn() {
     assert!(error_text(&again).contains("already holds cases"), "{}", error_text(&again));
 
     // Without Python the peers are left out, and that is said.
-    let args = ["registration", "--cases", folder_text, "--json", out.to_str().unwrap(), "--limit", "3"];
+    let args = ["registration", "--cases", folder_text, &format!("--json={}", out.display()), "--limit", "3"];
     let done = run(&[&args[..], &["--python", "/no/such/python"]].concat());
     assert!(done.status.success(), "{}", error_text(&done));
     let table = String::from_utf8_lossy(&done.stdout).into_owned();

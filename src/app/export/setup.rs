@@ -3,8 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use strum::IntoEnumIterator as _;
-
 use super::super::keys::{CloudKey, ImprintSource, MaskKey, MaskVersion, Registration};
 use super::super::results;
 use super::super::state::State;
@@ -15,7 +13,7 @@ use touch2touch_core::contact::MaskBasis;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::export::pair_files::{PairFile, PairParts, write};
+use touch2touch_pipeline::export::pair_files::{PairParts, write};
 use touch2touch_pipeline::steps::estimate::Estimate;
 use touch2touch_pipeline::steps::mask::made_of;
 use touch2touch_pipeline::steps::pose::PoseResult;
@@ -44,8 +42,6 @@ impl PairExport {
     /// # Errors
     /// As [`write()`].
     pub fn write(&self, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
-        let files: Vec<PairFile> =
-            PairFile::iter().filter(|file| *file == PairFile::Cloud || self.pose.is_some()).collect();
         let parts = PairParts {
             name: &self.name,
             source: self.source,
@@ -58,7 +54,7 @@ impl PairExport {
             truth: self.truth,
             tool: self.tool.as_ref().map(|tool| (tool.name.as_str(), &tool.model)),
         };
-        write(&parts, &files, folder)
+        write(&parts, folder)
     }
 }
 

@@ -59,7 +59,7 @@ impl Setting {
                 anyhow::ensure!(known, "no pair is of the tool {tool:?}");
                 let set = set_unit(dataset, tool, *unit, units_of(dataset, tool)?.says.as_deref())?;
                 if let Some(why) = set.not_written {
-                    anyhow::bail!("cannot write unit.txt: {why}; --tool-scale {} says it to one verb", unit.key());
+                    anyhow::bail!("cannot write unit.txt: {why}");
                 }
                 Ok(Said { file: Some(set.file), word: set.word, because: Vec::new() })
             }

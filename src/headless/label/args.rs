@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::super::args::{DatasetArgs, FingerArg, RegistrationParser, keyed};
+use super::super::Common;
+use super::super::args::{DatasetArgs, FingerArg, RegistrationArgs, keyed};
 use super::super::contact_mask::MaskArgs;
 use super::super::pose::parse_start;
 use super::super::recipe::ModelArgs;
-use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::{CleanUp, Drawing};
-use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::labels::{ImprintSource, Review};
 use touch2touch_pipeline::masks::propose::ProposalSource;
 
@@ -75,13 +74,10 @@ pub(in super::super) struct LabelArgs {
     /// The imprint whose mask is changed. A prediction is the one that `--bundle`, `--seed` and the like name.
     #[arg(long, default_value = ImprintSource::Measured.key(), value_parser = keyed::<ImprintSource>())]
     pub(super) imprint: ImprintSource,
-    /// The registration.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    pub(super) registration: Registration,
+    #[command(flatten)]
+    pub(super) registration: RegistrationArgs,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
-    #[command(flatten)]
-    pub(super) tool: ToolArgs,
     #[command(flatten)]
     pub(super) model: ModelArgs,
     #[command(flatten)]

@@ -6,10 +6,9 @@ use std::time::Duration;
 
 use clap::Args;
 
-use super::super::args::{DatasetArgs, RegistrationParser, keyed, parse_minutes};
+use super::super::args::{DatasetArgs, RegistrationArgs, keyed, parse_minutes};
 use super::super::recipe::{RuntimeArg, kept};
 use super::super::{Common, Output, VerbResult};
-use touch2touch_core::pose::Registration;
 use touch2touch_core::units::counted;
 use touch2touch_pipeline::export::DrawnMasks;
 use touch2touch_pipeline::labels::Labels;
@@ -61,9 +60,8 @@ pub(in crate::headless) struct TrainArgs {
     dry_run: bool,
     #[command(flatten)]
     runtime: RuntimeArg,
-    /// The registration of the poses that tell what the model is worth, where true ones are known.
-    #[arg(long = "engine", value_name = "ENGINE", default_value_t = Registration::default(), value_parser = RegistrationParser)]
-    registration: Registration,
+    #[command(flatten)]
+    registration: RegistrationArgs,
     /// Neither keep a run that is stopped, nor look for one, nor for predictions that were made before.
     #[arg(long)]
     no_cache: bool,
@@ -117,7 +115,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
         start: found.take(BundleKind::Mask, args.start.as_deref(), &dataset.rig)?,
         generators: found.bundles.iter().filter(|bundle| bundle.kind == BundleKind::Generator).cloned().collect(),
         engine: args.runtime.choice(),
-        registration: args.registration,
+        registration: args.registration.one()?,
         choice,
         tuning,
         unfinished: if args.no_cache { None } else { unfinished_folder() },

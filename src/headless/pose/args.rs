@@ -1,17 +1,12 @@
 //! The arguments of `pose`.
 
-use std::str::FromStr;
-
-use clap::builder::PossibleValue;
 use clap::{Args, ValueEnum};
-use strum::IntoEnumIterator as _;
 
-use super::super::args::{DatasetArgs, LimitArgs, Listed, listed};
+use super::super::Common;
+use super::super::args::{DatasetArgs, PairArgs, RegistrationArgs};
 use super::super::contact_mask::MaskArgs;
 use super::super::recipe::ModelArgs;
-use super::super::{Common, ToolArgs};
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::pose::Registration;
 use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::steps::recipe::Recipe;
@@ -31,19 +26,13 @@ pub(in crate::headless) struct PoseArgs {
     #[arg(long = "tool", value_name = "NAME")]
     pub(super) which: Option<String>,
     #[command(flatten)]
-    pub(super) tool: ToolArgs,
-    /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which contacts are let go.
-    #[arg(long = "engine", value_name = "ENGINE", default_value = "joint", value_parser = registrations())]
-    pub(super) registration: Registrations,
+    pub(super) registration: RegistrationArgs,
     /// Start here instead of where the registration would: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
     /// `10,0,-2`. Repeat for several.
     #[arg(long = "start", value_name = "DEG,MM,MM", value_parser = parse_start, allow_hyphen_values = true)]
     pub(super) starts: Vec<PlanarPose>,
-    /// Only this pair, by its name or a part of it that no other has.
-    #[arg(long, conflicts_with = "limit")]
-    pub(super) pair: Option<String>,
     #[command(flatten)]
-    pub(super) limit: LimitArgs,
+    pub(super) pairs: PairArgs,
     /// Add the whole registration report to each case of the JSON: every start and iteration, and each point's
     /// residual, weight and fate.
     #[arg(long)]
@@ -59,36 +48,6 @@ pub(super) enum Imprints {
     Measured,
     Predicted,
     Both,
-}
-
-/// The registrations to run, in this order.
-#[derive(Debug, Clone)]
-pub(in crate::headless) struct Registrations(pub(in crate::headless) Vec<Registration>);
-
-impl FromStr for Registrations {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        Ok(Self(if text == "all" { Registration::iter().collect() } else { vec![text.parse()?] }))
-    }
-}
-
-impl Registrations {
-    /// The only one.
-    pub(in crate::headless) fn one(&self) -> anyhow::Result<Registration> {
-        match self.0.as_slice() {
-            [registration] => Ok(*registration),
-            _ => anyhow::bail!("--engine all is for `touch2touch pose`; one registration is needed here"),
-        }
-    }
-}
-
-/// Parser of them.
-pub(in crate::headless) fn registrations() -> Listed<Registrations> {
-    listed(|| {
-        let one = Registration::iter().map(|by| PossibleValue::new(by.key()).help(by.description()));
-        one.chain([PossibleValue::new("all").help("All of them, one after the other")]).collect()
-    })
 }
 
 /// Largest angle and shift of a pose that is named: whole turns and a meter say a unit is wrong.
@@ -114,6 +73,6 @@ impl PoseArgs {
             Imprints::Measured => ImprintSource::Measured,
             Imprints::Predicted | Imprints::Both => ImprintSource::Predicted,
         };
-        self.model.posed(imprint, rig, &self.mask, self.registration.0[0])
+        self.model.posed(imprint, rig, &self.mask, self.registration.all()[0])
     }
 }

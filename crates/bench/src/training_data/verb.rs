@@ -7,9 +7,7 @@ use clap::Args;
 use serde::Serialize;
 
 use super::{ShardSetup, TouchSource, WrittenShards, write_shards};
-use touch2touch::headless::{
-    Common, DatasetArgs, LimitArgs, Output, ToolArgs, VerbResult, at_least_one, condition, keyed,
-};
+use touch2touch::headless::{Common, DatasetArgs, LimitArgs, Output, VerbResult, at_least_one, condition, keyed};
 use touch2touch_bench::training_mix::Mix;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim::Condition;
@@ -49,8 +47,6 @@ pub(crate) struct TrainingDataArgs {
     #[command(flatten)]
     limit: LimitArgs,
     #[command(flatten)]
-    tool: ToolArgs,
-    #[command(flatten)]
     common: Common,
 }
 
@@ -77,7 +73,7 @@ pub(crate) fn run(args: &TrainingDataArgs) -> VerbResult {
         let source = TouchSource::Simulator { grasps, mix, condition, seed };
         (write_shards(source, setup, &args.out, &output.job())?, output)
     } else {
-        let dataset = args.dataset.open_with(args.tool.tool_scale)?;
+        let dataset = args.dataset.open()?;
         let ids = args.limit.spread(dataset.index.pairs.len());
         let pairs: Vec<PairId> = ids.into_iter().map(|id| PairId(id as u32)).collect();
         let output = Output::new(args.common, "writing", pairs.len());

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use glam::DAffine3;
 use serde::Serialize;
-use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
 use crate::io::names::{OUTPUT_MARK, output};
@@ -22,34 +21,6 @@ use touch2touch_core::units::{angle_error, mm};
 use touch2touch_core::verdict::Verdict;
 
 const WHAT: &str = "Export the pair";
-
-/// A file of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, EnumIter, EnumString, IntoStaticStr)]
-#[serde(rename_all = "snake_case")]
-#[strum(serialize_all = "snake_case")]
-pub enum PairFile {
-    /// The surface points, with contact, finger and distance to the model: PLY.
-    Cloud,
-    /// The pose of the tool in the hand: JSON.
-    Pose,
-    /// The CAD model at that pose: STL.
-    Mesh,
-}
-
-impl PairFile {
-    /// Name on the command line.
-    pub fn key(self) -> &'static str {
-        self.into()
-    }
-
-    fn ending(self) -> &'static str {
-        match self {
-            Self::Cloud => "cloud.ply",
-            Self::Pose => "pose.json",
-            Self::Mesh => "mesh.stl",
-        }
-    }
-}
 
 /// Parts that are written of a pair.
 #[derive(Clone, Copy, Debug)]
@@ -143,39 +114,26 @@ fn numbers(grasp_from_object: PlanarPose) -> Numbers {
     Numbers { theta_deg: pose.theta_rad.to_degrees(), y_mm: mm(pose.y_m), z_mm: mm(pose.z_m) }
 }
 
-/// Writes files of a pair into a folder, which is made if it is not there; returns them in order.
+/// Writes the surface points of a pair (PLY, with contact, finger and distance to the model) and, where there is one, its
+/// pose (JSON) and the CAD model at that pose (STL) into a folder, which is made if it is not there; returns the files.
 ///
 /// # Errors
-/// If a pose or mesh is asked for and there is none, or a file cannot be written.
-pub fn write(parts: &PairParts<'_>, files: &[PairFile], folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
+/// If a file cannot be written.
+pub fn write(parts: &PairParts<'_>, folder: &Path) -> Result<Vec<PathBuf>, TaskError> {
     let fail = |why: String, file: &Path| TaskError::new(WHAT, format!("{why} ({})", file.display()));
     std::fs::create_dir_all(folder).map_err(|err| fail(err.to_string(), folder))?;
-    let no_pose = || TaskError::new(WHAT, format!("{} has no pose of the {} imprint", parts.name, parts.source.key()));
-    let mut written = Vec::new();
-    for file in files {
-        let name = format!("{}{OUTPUT_MARK}{}.{}", output(parts.name), parts.source.key(), file.ending());
-        let path = folder.join(name);
-        match file {
-            PairFile::Cloud => {
-                ply::write(&path, &points(parts), &comments(parts)).map_err(|err| fail(err.to_string(), &path))?;
-            }
-            PairFile::Pose => {
-                let text =
-                    pose_json(parts, parts.pose.ok_or_else(no_pose)?).map_err(|err| fail(err.to_string(), &path))?;
-                atomic::write_bytes(&path, text.as_bytes()).map_err(|err| fail(err.to_string(), &path))?;
-            }
-            PairFile::Mesh => {
-                let pose = parts.pose.ok_or_else(no_pose)?;
-                let (_, tool) = parts.tool.ok_or_else(|| TaskError::new(WHAT, "the tool's CAD model is not there"))?;
-                let motion = pose.grasp_from_object.to_affine();
-                let vertices = tool.mesh.vertices.iter().map(|p| motion.transform_point3(*p)).collect();
-                let mesh = TriMesh { vertices, triangles: tool.mesh.triangles.clone() };
-                stl::write(&path, &mesh).map_err(|err| TaskError::from_error(WHAT, &err))?;
-            }
-        }
-        written.push(path);
-    }
-    Ok(written)
+    let stem = format!("{}{OUTPUT_MARK}{}", output(parts.name), parts.source.key());
+    let [cloud, json, mesh] =
+        ["cloud.ply", "pose.json", "mesh.stl"].map(|ending| folder.join(format!("{stem}.{ending}")));
+    ply::write(&cloud, &points(parts), &comments(parts)).map_err(|err| fail(err.to_string(), &cloud))?;
+    let Some((pose, (_, tool))) = parts.pose.zip(parts.tool) else { return Ok(vec![cloud]) };
+    let text = pose_json(parts, pose).map_err(|err| fail(err.to_string(), &json))?;
+    atomic::write_bytes(&json, text.as_bytes()).map_err(|err| fail(err.to_string(), &json))?;
+    let motion = pose.grasp_from_object.to_affine();
+    let vertices = tool.mesh.vertices.iter().map(|p| motion.transform_point3(*p)).collect();
+    let model = TriMesh { vertices, triangles: tool.mesh.triangles.clone() };
+    stl::write(&mesh, &model).map_err(|err| TaskError::from_error(WHAT, &err))?;
+    Ok(vec![cloud, json, mesh])
 }
 
 fn comments(parts: &PairParts<'_>) -> Vec<String> {
@@ -282,8 +240,7 @@ mod tests {
             truth,
             tool: Some(("tool", &tool)),
         };
-        use PairFile::{Cloud, Mesh, Pose};
-        let files = write(&parts, &[Cloud, Pose, Mesh], &folder.path().join("new")).unwrap();
+        let files = write(&parts, &folder.path().join("new")).unwrap();
         assert!(files[1].ends_with("new/a__b.t2t.measured.pose.json"), "{files:?}");
 
         let all = points(&parts);
@@ -315,12 +272,9 @@ mod tests {
                 assert!((found - by_rows(corner)).length() < 1e-7);
             }
         }
-        // Without a pose the cloud can still be had, and the rest is said to be missing.
+        // Without a pose the cloud can still be had.
         let lacking = PairParts { pose: None, ..parts };
-        write(&lacking, &[Cloud], folder.path()).unwrap();
+        assert_eq!(write(&lacking, folder.path()).unwrap().len(), 1);
         assert!(points(&lacking).iter().all(|p| p.distance.is_nan()));
-        for file in [Pose, Mesh] {
-            assert!(write(&lacking, &[file], folder.path()).unwrap_err().why.contains("no pose"));
-        }
     }
 }

@@ -113,12 +113,11 @@ impl MeshError {
             Self::NotStl { .. } => "export the part as STL from the CAD program",
             Self::Truncated { .. } => "copy or export the file again",
             Self::Unit { .. } => {
-                "accept the scale with --tool-scale auto on the command line, or for good with `touch2touch doctor --set` or the \
-                 button at the 3D view: a file unit.txt beside the model says auto, m, cm, mm, um, in or a factor"
+                "accept the scale with `touch2touch doctor --set` or the button at the 3D view: a file unit.txt beside the model \
+                 says auto, m, cm, mm, um, in or a factor"
             }
             Self::NotATool { .. } => {
-                "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model or with --tool-scale, or \
-                 export the model again"
+                "tools are 4 mm to 0.4 m long: name the right unit in unit.txt beside the model, or export the model again"
             }
             Self::UnitFile { .. } => "write m, cm, mm, um, in, auto or a factor to meters into the file",
             Self::NotFinite { .. } | Self::Empty { .. } => "repair the mesh in the CAD program and export it again",

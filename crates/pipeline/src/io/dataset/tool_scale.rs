@@ -257,7 +257,7 @@ mod tests {
             write(&path, unit);
             let error = read_in_meters(&path, None).unwrap_err();
             assert!(matches!(error, MeshError::Unit { offered, .. } if (offered - unit).abs() < 1e-12), "{error}");
-            assert!(error.to_string().contains("t.stl") && error.hint().contains("--tool-scale auto"));
+            assert!(error.to_string().contains("t.stl") && error.hint().contains("auto"));
             assert!((length(&read_in_meters(&path, Some(ToolScale::Auto)).unwrap()) - 0.04).abs() < 1e-8);
         }
         // Beside the models it holds for the studio as well; the caller's word counts more.
