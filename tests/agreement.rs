@@ -130,7 +130,7 @@ fn how(action: Action) -> How {
         A::PaintIn3d | A::PaintLayers => Verb(&["label", "demo", "--pair", "a", "--draw", IN_3D]),
         A::PanTool | A::LastTool | A::PaintIgnore | A::LetThrough | A::BrushSmaller | A::BrushLarger => Window,
         A::MaskVisible | A::MaskOutline | A::MaskFainter | A::MaskStronger => Window,
-        A::PoseTool | A::SixDof | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
+        A::PoseTool | A::RevertHand | A::MeasureDistance | A::MeasureAngle => Window,
         A::NudgeLeft | A::NudgeRight | A::NudgeUp | A::NudgeDown | A::TurnLeft | A::TurnRight => Window,
         A::LockRange | A::RangeOnce | A::ResetRange | A::Fit | A::BothClouds | A::LinkCameras | A::Footprint => Window,
         A::CompareMode | A::SwapCompared => {

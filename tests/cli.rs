@@ -6,7 +6,7 @@ use std::process::Output;
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch_core::frames::PlanarPose;
-use touch2touch_core::manual::{AcceptedPose, ManualPose};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::Registration;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::masks::{ByImprint, MaskStore, StoredReview};
@@ -99,8 +99,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     // What a person accepted in the studio stands beside what was registered.
     assert!(cases[0].get("accepted").is_none());
     let store = MaskStore::for_dataset(&Dataset::open(&set).unwrap()).unwrap();
-    let planar = PlanarPose { theta_rad: -0.1, y_m: 0.001, z_m: 0.002 };
-    let pose = ManualPose { pitch_rad: 0.05, ..planar.into() };
+    let pose = PlanarPose { theta_rad: -0.1, y_m: 0.001, z_m: 0.002 };
     let accepted = [Some(AcceptedPose { pose, by_hand: true }), None];
     let accepted = ByImprint { accepted, ..ByImprint::default() };
     let name = cases[0]["name"].as_str().unwrap();
@@ -111,7 +110,7 @@ fn a_simulated_dataset_is_sound_has_poses_and_exports_masks() {
     let found = &cases[0]["accepted"];
     assert_eq!((cases[0]["name"].as_str(), found["by_hand"].as_bool()), (Some(name), Some(true)));
     assert!((found["angle_deg"].as_f64().unwrap() - 0.1f64.to_degrees()).abs() < 1e-9, "{found}");
-    assert!(found["error_deg"].is_number() && found["grasp_from_object"]["pitch_rad"] == 0.05, "{found}");
+    assert!(found["error_deg"].is_number() && found["grasp_from_object"]["y_m"] == 0.001, "{found}");
 
     let masks = dir.path().join("masks");
     let nothing = run(&["masks", "export", set_text, "--out", masks.to_str().unwrap()], data_path);

@@ -205,8 +205,6 @@ macro_rules! actions {
             state => accept(state, ImprintSource::Predicted);
         PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain(K::Z)],
             state => toggle(state, SceneTool::Pose);
-        SixDof, Pose, "6-DoF", "Lets the pose tool leave the plane: x, pitch and yaw as well", [],
-            state => does(WorkbenchCommand::SetSixDof(!state.workbench.six_dof));
         NudgeLeft, Pose, "Nudge -y", "Moves the tool by 0.1 mm along -y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowLeft), shift(K::ArrowLeft), ctrl(K::ArrowLeft)],
             state => nudge(state, PoseAxis::Y, -1.0);
         NudgeRight, Pose, "Nudge +y", "Moves the tool by 0.1 mm along +y; with Shift 1 mm, with Ctrl 0.01 mm", [plain(K::ArrowRight), shift(K::ArrowRight), ctrl(K::ArrowRight)],

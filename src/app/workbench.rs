@@ -10,7 +10,8 @@ use super::keys::{ImprintSource, RunKey};
 use super::state::State;
 use super::state::results::Request;
 use super::{inspect, labels, results};
-use touch2touch_core::manual::{self, AcceptedPose, ManualCost, ManualPose, PoseAxis};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::{self, AcceptedPose, ManualCost, PoseAxis};
 use touch2touch_pipeline::error::TaskError;
 
 /// Width of the kernel that costs of poses by hand are counted with, meters: the narrowest of the registration.
@@ -27,14 +28,12 @@ pub enum WorkbenchCommand {
     SetBothClouds(bool),
     /// The effect of a click.
     SetTool(SceneTool),
-    /// True where the tool can leave the plane; closing it brings the tool back into the plane.
-    SetSixDof(bool),
     /// The side that the pointer is over.
     SetSide(ImprintSource),
     /// Moves the tool along one axis, meters or radians.
     Nudge(PoseAxis, f64),
     /// Puts the tool somewhere.
-    SetHandPose(ManualPose),
+    SetHandPose(PlanarPose),
     /// Registers from where the tool is.
     StartIcp,
     /// Takes the pose over into the document.
@@ -68,18 +67,10 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
                 bench.hand = None;
             }
         }
-        WorkbenchCommand::SetSixDof(on) => {
-            bench.six_dof = on;
-            // A tilt that can no longer be changed must not stay unseen.
-            if let Some(hand) = bench.hand.as_ref().filter(|hand| !on && !hand.pose.is_planar()) {
-                let flat = ManualPose::from(hand.pose.planar);
-                put(state, |_| flat);
-            }
-        }
         WorkbenchCommand::SetSide(side) => bench.side = side,
         WorkbenchCommand::Nudge(axis, by) => {
-            if bench.tool == SceneTool::Pose && (bench.six_dof || !axis.leaves_plane()) {
-                put(state, |pose| pose.moved(axis, by));
+            if bench.tool == SceneTool::Pose {
+                put(state, |pose| axis.moved(pose, by));
             }
         }
         WorkbenchCommand::SetHandPose(pose) => {
@@ -107,7 +98,7 @@ pub(super) fn step(state: &mut State, command: WorkbenchCommand, effects: &mut V
 }
 
 /// The cost of a pose with the contact points of an imprint; `None` while cloud or model are not there.
-fn cost_of(state: &State, source: ImprintSource, pose: ManualPose) -> Option<ManualCost> {
+fn cost_of(state: &State, source: ImprintSource, pose: PlanarPose) -> Option<ManualCost> {
     let clouds = results::cloud(state, source).ready()?;
     let tool = &results::tool(state).ready()?.model;
     Some(manual::cost(&clouds.contact_points(), &tool.field, &tool.distance, pose, KERNEL_M))
@@ -127,7 +118,7 @@ fn hold(state: &State) -> Option<ManualTry> {
 }
 
 /// Puts the tool where `to` says, from where it is. A pose that is not finite changes nothing.
-fn put(state: &mut State, to: impl FnOnce(ManualPose) -> ManualPose) {
+fn put(state: &mut State, to: impl FnOnce(PlanarPose) -> PlanarPose) {
     let Some(mut hand) = hold(state) else { return };
     let pose = to(hand.pose);
     if !pose.is_finite() {
@@ -160,7 +151,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
     let Ok(Some(pose)) = results::pose_key(state, hand.source) else {
         return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
     };
-    let (source, start) = (hand.source, hand.pose.planar);
+    let (source, start) = (hand.source, hand.pose);
     let key = RunKey { pose, start: Some(start.into()) };
     // Asked for by a person: what failed before is tried again.
     state.tasks.failed.remove(&Request::Run(key.clone()));
@@ -180,7 +171,7 @@ fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
 pub(super) fn run_arrived(state: &mut State, key: &RunKey) {
     let Some(hand) = state.workbench.hand.as_ref().filter(|hand| hand.icp.as_ref() == Some(key)) else { return };
     let source = hand.source;
-    let Some(pose) = state.results.runs.get(key).map(|run| ManualPose::from(run.grasp_from_object)) else { return };
+    let Some(pose) = state.results.runs.get(key).map(|run| run.grasp_from_object) else { return };
     let cost = cost_of(state, source, pose);
     if let Some(hand) = &mut state.workbench.hand {
         hand.pose = pose;

@@ -9,7 +9,7 @@ use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Mask;
 use touch2touch_core::label::{self, CleanKind, CleanUp, Marks, Provenance};
-use touch2touch_core::manual::{AcceptedPose, ManualPose};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::io::dataset::Dataset;
@@ -126,15 +126,17 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
     store.save_review("plain", &read).unwrap();
     assert!(text("plain").contains("\"version\":1") && !text("plain").contains("by_hand"));
 
-    let tilted = ManualPose { pitch_rad: 0.05, x_m: 1e-3, ..planar.into() };
-    for pose in [ManualPose::from(planar), tilted] {
-        let by_hand = Some(AcceptedPose { pose, by_hand: true });
-        let accepted = ByImprint { accepted: [None, by_hand], ..ByImprint::default() };
-        let review = StoredReview { review: "todo".into(), accepted, ..StoredReview::default() };
-        store.save_review("hand", &review).unwrap();
-        assert!(text("hand").contains("\"version\":2"));
-        assert_eq!(store.load_review("hand").unwrap(), Some(review));
-    }
+    let by_hand = Some(AcceptedPose { pose: planar, by_hand: true });
+    let accepted = ByImprint { accepted: [None, by_hand], ..ByImprint::default() };
+    let review = StoredReview { review: "todo".into(), accepted, ..StoredReview::default() };
+    store.save_review("hand", &review).unwrap();
+    assert!(text("hand").contains("\"version\":2"));
+    assert_eq!(store.load_review("hand").unwrap(), Some(review.clone()));
+    // Of a pose that left the plane its part in the plane is read.
+    let tilted = text("hand").replace("\"by_hand\":", "\"pitch_rad\":0.05,\"x_m\":0.001,\"by_hand\":");
+    std::fs::write(dir.path().join("hand.review.json"), &tilted).unwrap();
+    assert!(tilted.contains("pitch_rad"));
+    assert_eq!(store.load_review("hand").unwrap(), Some(review));
     let noted = StoredReview { review: "todo".into(), note: "shallow".into(), ..StoredReview::default() };
     store.save_review("noted", &noted).unwrap();
     assert!(text("noted").contains("\"version\":3"), "an older program would lose the note");
@@ -145,7 +147,7 @@ fn poses_by_hand_are_a_newer_version_and_old_files_are_read() {
     store.save_review("predicted", &predicted).unwrap();
     assert!(text("predicted").contains("\"version\":4"), "an older program would lose of which prediction it is");
     assert_eq!(store.load_review("predicted").unwrap(), Some(predicted));
-    for bad in [text("hand").replace("\"version\":2", "\"version\":9"), text("hand").replace("0.05", "1e999")] {
+    for bad in [text("hand").replace("\"version\":2", "\"version\":9"), text("hand").replace("0.002", "1e999")] {
         std::fs::write(dir.path().join("hand.review.json"), &bad).unwrap();
         assert!(store.load_review("hand").is_err(), "{bad}");
     }

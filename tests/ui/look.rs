@@ -80,9 +80,8 @@ fn pictures_for_the_docs() {
         rig.shoot(&format!("{name}-demo-align-both"));
         rig.send(Command::Workbench(WorkbenchCommand::SetBothClouds(false)));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Pose)));
-        rig.send(Command::Workbench(WorkbenchCommand::SetSixDof(true)));
         rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::Y, 0.002)));
-        rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::Pitch, 0.1)));
+        rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::Theta, 0.1)));
         rig.shoot(&format!("{name}-demo-align-hand"));
         rig.send(Command::Workbench(WorkbenchCommand::SetTool(SceneTool::Look)));
         rig.send(prefer(|s| s.workspace = Workspace::Label));

@@ -2,8 +2,7 @@
 
 use eframe::egui::{Key, Modifiers, Pos2, Vec2, vec2};
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::action::Action;
-use touch2touch::app::command::{CameraPreset, Command, TasksCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{CameraPreset, TasksCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
@@ -117,8 +116,8 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     ] {
         let before = rig.model().workbench.hand(MEASURED).map_or(began, |hand| hand.pose);
         rig.press(modifiers, key);
-        let (now, want) = (rig.hand().pose, before.moved(axis, by));
-        let off = PoseDifference::between(now.planar, want.planar);
+        let (now, want) = (rig.hand().pose, axis.moved(before, by));
+        let off = PoseDifference::between(now, want);
         assert!(off.angle_rad < 1e-12 && off.position_m < 1e-12, "{modifiers:?} {key:?}: {now:?} for {want:?}");
     }
     let hand = rig.hand();
@@ -158,32 +157,23 @@ fn handles_move_and_turn_the_tool_and_not_the_view() {
     let Some(mut rig) = Rig::aligned() else { return };
     rig.press(Modifiers::NONE, Key::Z);
     let began = results::manual_begins(rig.model(), MEASURED);
-    let origin = rig.harness.state().on_screen(MEASURED, [began.x_m, began.planar.y_m, began.planar.z_m]).unwrap();
+    let origin = rig.harness.state().on_screen(MEASURED, [0.0, began.y_m, began.z_m]).unwrap();
     rig.drag(origin, vec2(30.0, 18.0));
     let moved = rig.hand().pose;
-    assert!(moved.planar.y_m != began.planar.y_m && moved.planar.z_m > began.planar.z_m, "down is +z: {moved:?}");
-    assert_eq!(moved.planar.theta_rad, began.planar.theta_rad);
-    let at = rig.harness.state().on_screen(MEASURED, [moved.x_m, moved.planar.y_m, moved.planar.z_m]).unwrap();
+    assert!(moved.y_m != began.y_m && moved.z_m > began.z_m, "down is +z: {moved:?}");
+    assert_eq!(moved.theta_rad, began.theta_rad);
+    let at = rig.harness.state().on_screen(MEASURED, [0.0, moved.y_m, moved.z_m]).unwrap();
     assert!((at - origin - vec2(30.0, 18.0)).length() < 1.0, "the disc stays under the pointer: {at} from {origin}");
     // The ring: 62 points around the middle.
     rig.drag(at + vec2(62.0, 0.0), vec2(0.0, 25.0));
     let turned = rig.hand().pose;
-    let by = (turned.planar.theta_rad - moved.planar.theta_rad).abs();
+    let by = (turned.theta_rad - moved.theta_rad).abs();
     assert!((by - (25.0f64 / 62.0).atan()).abs() < 0.06, "{} degrees", by.to_degrees());
-    assert!((turned.planar.y_m - moved.planar.y_m).abs() < 1e-12 && turned.is_planar());
+    assert!((turned.y_m - moved.y_m).abs() < 1e-12);
     // Beside the handles the same drag turns the view.
     let corner = rig.in_view([0.2, 0.62]);
     rig.drag(corner, vec2(40.0, 0.0));
     assert_eq!(rig.hand().pose, turned);
-    // Out of the plane only when asked for, and back again.
-    rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::X, 1e-3)));
-    assert!(rig.hand().pose.is_planar());
-    rig.send(Action::SixDof.command(rig.model()).unwrap());
-    rig.send(Command::Workbench(WorkbenchCommand::Nudge(PoseAxis::X, 1e-3)));
-    assert_eq!(rig.hand().pose.x_m, 1e-3);
-    rig.shoot("test-six-dof");
-    rig.send(Action::SixDof.command(rig.model()).unwrap());
-    assert!(rig.hand().pose.is_planar());
 }
 
 #[test]
@@ -198,14 +188,12 @@ fn icp_starts_where_the_hand_left_the_tool() {
     rig.press(Modifiers::SHIFT, Key::Z);
     let hand = rig.hand();
     let run = hand.from_icp.expect("it came from a registration");
-    assert_eq!(run.start.map(|s| s.get()), Some(from.planar));
+    assert_eq!(run.start.map(|s| s.get()), Some(from));
     let report = &rig.model().results.runs.get(&run).unwrap().report;
-    assert_eq!((report.start, report.runs.len()), (from.planar, 1), "one start: this one");
+    assert_eq!((report.start, report.runs.len()), (from, 1), "one start: this one");
     // It comes back to where the registration had been by itself.
-    let off = PoseDifference::between(
-        hand.pose.planar,
-        results::pose(rig.model(), MEASURED).ready().unwrap().grasp_from_object,
-    );
+    let off =
+        PoseDifference::between(hand.pose, results::pose(rig.model(), MEASURED).ready().unwrap().grasp_from_object);
     assert!(off.angle_rad.to_degrees() < 1.0 && off.position_m < 1e-3, "{off:?}");
     assert!(hand.cost.unwrap().cost_m2 <= hand.began_cost.unwrap().cost_m2 * 1.05);
 }

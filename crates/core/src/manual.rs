@@ -1,6 +1,6 @@
-//! Poses set by hand: the planar pose with what a planar pose leaves out, small steps, and what a pose costs.
+//! Poses set by hand: small steps, and what a pose costs.
 
-use glam::{DAffine3, DQuat, DVec2, DVec3};
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 use super::field::DistanceField;
@@ -14,31 +14,7 @@ pub const STEP_M: f64 = 1e-4;
 /// Step of a turn by key, radians (half a degree).
 pub const STEP_RAD: f64 = 0.5 / 180.0 * std::f64::consts::PI;
 
-/// The tool's pose in the hand with all six numbers: `grasp_from_object`.
-///
-/// The planar part is what registration answers; the other three are zero unless a person set them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct ManualPose {
-    /// Angle about x, shift along y and z.
-    #[serde(flatten)]
-    pub planar: PlanarPose,
-    /// Shift along the closing axis, meters.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub x_m: f64,
-    /// Angle about y, radians, applied after `yaw_rad` and before the planar angle.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub pitch_rad: f64,
-    /// Angle about z, radians, applied first.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub yaw_rad: f64,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
-fn is_zero(v: &f64) -> bool {
-    *v == 0.0
-}
-
-/// One of the six ways to move a tool by hand.
+/// One of the ways to move a tool by hand.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter)]
 pub enum PoseAxis {
     /// Lateral shift.
@@ -47,68 +23,23 @@ pub enum PoseAxis {
     Z,
     /// Turn about the closing axis.
     Theta,
-    /// Shift along the closing axis.
-    X,
-    /// Turn about y.
-    Pitch,
-    /// Turn about z.
-    Yaw,
 }
 
 impl PoseAxis {
     /// Size of one step, meters or radians.
     pub fn step(self) -> f64 {
-        if self.is_turn() { STEP_RAD } else { STEP_M }
+        if self == Self::Theta { STEP_RAD } else { STEP_M }
     }
 
-    /// True for a turn.
-    pub(crate) fn is_turn(self) -> bool {
-        matches!(self, Self::Theta | Self::Pitch | Self::Yaw)
-    }
-
-    /// True where it leaves the plane of the registration.
-    pub fn leaves_plane(self) -> bool {
-        matches!(self, Self::X | Self::Pitch | Self::Yaw)
-    }
-}
-
-impl From<PlanarPose> for ManualPose {
-    fn from(planar: PlanarPose) -> Self {
-        Self { planar, ..Self::default() }
-    }
-}
-
-impl ManualPose {
-    /// The motion in space: from the object frame to the grasp frame.
-    pub fn to_affine(self) -> DAffine3 {
-        let turn = DQuat::from_rotation_x(self.planar.theta_rad)
-            * DQuat::from_rotation_y(self.pitch_rad)
-            * DQuat::from_rotation_z(self.yaw_rad);
-        DAffine3::from_rotation_translation(turn, DVec3::new(self.x_m, self.planar.y_m, self.planar.z_m))
-    }
-
-    /// True where every number is finite.
-    pub fn is_finite(self) -> bool {
-        self.planar.is_finite() && self.x_m.is_finite() && self.pitch_rad.is_finite() && self.yaw_rad.is_finite()
-    }
-
-    /// True where it lies in the plane of the registration.
-    pub fn is_planar(self) -> bool {
-        self.x_m == 0.0 && self.pitch_rad == 0.0 && self.yaw_rad == 0.0
-    }
-
-    /// The pose moved along one axis of the grasp frame, in meters or radians. Turns are about the object's origin.
+    /// The pose moved along it in the grasp frame, in meters or radians. Turns are about the object's origin.
     #[must_use]
-    pub fn moved(mut self, axis: PoseAxis, by: f64) -> Self {
-        match axis {
-            PoseAxis::Y => self.planar.y_m += by,
-            PoseAxis::Z => self.planar.z_m += by,
-            PoseAxis::Theta => self.planar.theta_rad += by,
-            PoseAxis::X => self.x_m += by,
-            PoseAxis::Pitch => self.pitch_rad += by,
-            PoseAxis::Yaw => self.yaw_rad += by,
+    pub fn moved(self, mut pose: PlanarPose, by: f64) -> PlanarPose {
+        match self {
+            Self::Y => pose.y_m += by,
+            Self::Z => pose.z_m += by,
+            Self::Theta => pose.theta_rad += by,
         }
-        self
+        pose
     }
 }
 
@@ -117,7 +48,7 @@ impl ManualPose {
 pub struct AcceptedPose {
     /// `grasp_from_object`.
     #[serde(flatten)]
-    pub pose: ManualPose,
+    pub pose: PlanarPose,
     /// True where a person set it, rather than took over what a registration answered.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_hand: bool,
@@ -126,14 +57,7 @@ pub struct AcceptedPose {
 impl From<PlanarPose> for AcceptedPose {
     /// A registration's answer, taken over as it is.
     fn from(planar: PlanarPose) -> Self {
-        Self { pose: planar.into(), by_hand: false }
-    }
-}
-
-impl AcceptedPose {
-    /// True where an older reader, which knows planar poses only, understands all of it.
-    pub fn is_plain(self) -> bool {
-        !self.by_hand && self.pose.is_planar()
+        Self { pose: planar, by_hand: false }
     }
 }
 
@@ -178,7 +102,7 @@ pub fn cost(
     points: &[DVec3],
     field: &DistanceField,
     surface: &MeshDistance,
-    pose: ManualPose,
+    pose: PlanarPose,
     kernel_m: f64,
 ) -> ManualCost {
     let object_from_grasp = pose.to_affine().inverse();
@@ -213,35 +137,27 @@ mod tests {
     use strum::IntoEnumIterator as _;
 
     #[test]
-    fn a_planar_hand_pose_is_the_planar_pose() {
-        let planar = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: -0.002 };
-        let hand = ManualPose::from(planar);
-        assert!(hand.is_planar() && hand.to_affine().abs_diff_eq(planar.to_affine(), 1e-15));
-        // Old labels hold the planar pose alone: they are read, and a planar hand pose is written as before.
-        let old = serde_json::to_string(&planar).unwrap();
-        assert_eq!(serde_json::from_str::<ManualPose>(&old).unwrap(), hand);
-        assert_eq!(serde_json::to_string(&hand).unwrap(), old);
-        let tilted = hand.moved(PoseAxis::Pitch, 0.1).moved(PoseAxis::X, 1e-3);
-        let json = serde_json::to_string(&tilted).unwrap();
-        assert_eq!(serde_json::from_str::<ManualPose>(&json).unwrap(), tilted);
+    fn a_pose_that_left_the_plane_is_read_as_its_part_in_it() {
+        let pose = PlanarPose { theta_rad: 0.3, y_m: 0.004, z_m: -0.002 };
+        let stored =
+            r#"{"theta_rad": 0.3, "y_m": 0.004, "z_m": -0.002, "x_m": 0.001, "pitch_rad": 0.1, "by_hand": true}"#;
+        assert_eq!(serde_json::from_str::<AcceptedPose>(stored).unwrap(), AcceptedPose { pose, by_hand: true });
+        let plain = serde_json::to_string(&AcceptedPose::from(pose)).unwrap();
+        assert_eq!(plain, serde_json::to_string(&pose).unwrap());
     }
 
     #[test]
     fn each_axis_moves_the_tool_as_its_name_says() {
-        let start = ManualPose::default();
+        let start = PlanarPose::default();
         let tip = DVec3::new(0.0, 0.0, 0.02);
         for axis in PoseAxis::iter() {
-            let moved = start.moved(axis, axis.step());
-            assert_eq!(moved.is_planar(), !axis.leaves_plane(), "{axis:?}");
+            let moved = axis.moved(start, axis.step());
             let by = moved.to_affine().transform_point3(tip) - tip;
             let want = match axis {
-                PoseAxis::X => DVec3::X * STEP_M,
                 PoseAxis::Y => DVec3::Y * STEP_M,
                 PoseAxis::Z => DVec3::Z * STEP_M,
-                // y turns towards z about x, z towards x about y; about its own axis the tip stays.
+                // y turns towards z about x.
                 PoseAxis::Theta => DVec3::Y * (-0.02 * STEP_RAD.sin()),
-                PoseAxis::Pitch => DVec3::X * (0.02 * STEP_RAD.sin()),
-                PoseAxis::Yaw => DVec3::ZERO,
             };
             assert!((by - want).length() < 1e-6, "{axis:?}: {by}");
         }
@@ -255,18 +171,16 @@ mod tests {
         let mut points: Vec<DVec3> =
             cross_contacts(3000, truth, 1e-4, 3).iter().map(|p| DVec3::new(0.003, p.x, p.y)).collect();
         points.push(DVec3::NAN);
-        let cost_of = |pose: ManualPose| cost(&points, &field, &surface, pose, 1e-3);
-        let best = cost_of(truth.into());
+        let cost_of = |pose: PlanarPose| cost(&points, &field, &surface, pose, 1e-3);
+        let best = cost_of(truth);
         assert!(best.inlier_share > 0.99 && best.outline_rms_m < 2e-4 && best.surface_rms_m < 2e-4, "{best:?}");
         for axis in PoseAxis::iter() {
-            let by = if axis.is_turn() { 0.15 } else { 0.003 };
-            let moved = cost_of(ManualPose::from(truth).moved(axis, by));
+            let by = if axis == PoseAxis::Theta { 0.15 } else { 0.003 };
+            let moved = cost_of(axis.moved(truth, by));
             assert!(moved.surface_rms_m > best.surface_rms_m, "{axis:?}: {moved:?}");
-            if !axis.leaves_plane() {
-                assert!(moved.cost_m2 > 2.0 * best.cost_m2, "{axis:?}: {moved:?}");
-            }
+            assert!(moved.cost_m2 > 2.0 * best.cost_m2, "{axis:?}: {moved:?}");
         }
-        let none = cost(&[], &field, &surface, truth.into(), 1e-3);
+        let none = cost(&[], &field, &surface, truth, 1e-3);
         assert!(none.cost_m2.is_nan() && none.points == 0);
         let gap = PoseDifference::between(truth, PlanarPose { theta_rad: 0.1 - std::f64::consts::TAU, ..truth });
         assert!(gap.angle_rad < 1e-12 && gap.position_m == 0.0);

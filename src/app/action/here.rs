@@ -62,7 +62,7 @@ impl Action {
             || matches!(self, A::WindowOnly | A::MembraneSurface | A::EyeDome | A::Parallel | A::CopyCamera)
             || matches!(self, A::LinkCameras | A::NextLayer | A::BothClouds);
         look || self.is_nudge()
-            || matches!(self, A::PoseTool | A::SixDof | A::IcpFromHere | A::Accept | A::RevertHand)
+            || matches!(self, A::PoseTool | A::IcpFromHere | A::Accept | A::RevertHand)
             || matches!(self, A::MeasureDistance | A::MeasureAngle | A::PlaySteps | A::PaintIn3d | A::PaintLayers)
     }
 

@@ -1,9 +1,9 @@
 //! Keys of proposals.
 
 use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, PoseKey, Revision};
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CadPose;
-use touch2touch_core::manual::ManualPose;
 use touch2touch_pipeline::masks::propose::Proposal;
 
 /// The place where the CAD model lies.
@@ -13,15 +13,14 @@ pub enum CadPlace {
     Truth,
     /// At a registered one.
     Registered(Box<PoseKey>),
-    /// The place where a hand holds it: the bits of its six numbers.
-    Hand([u64; 6]),
+    /// The place where a hand holds it: the bits of its numbers.
+    Hand([u64; 3]),
 }
 
 impl CadPlace {
     /// The place where a hand holds it.
-    pub(crate) fn hand(pose: ManualPose) -> Self {
-        let ManualPose { planar, x_m, pitch_rad, yaw_rad } = pose;
-        Self::Hand([planar.theta_rad, planar.y_m, planar.z_m, x_m, pitch_rad, yaw_rad].map(f64::to_bits))
+    pub(crate) fn hand(pose: PlanarPose) -> Self {
+        Self::Hand([pose.theta_rad, pose.y_m, pose.z_m].map(f64::to_bits))
     }
 }
 

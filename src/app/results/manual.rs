@@ -3,7 +3,8 @@
 use super::super::keys::ImprintSource;
 use super::super::results;
 use super::super::state::State;
-use touch2touch_core::manual::{AcceptedPose, ManualPose, PoseDifference};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::{AcceptedPose, PoseDifference};
 use touch2touch_pipeline::labels::ImprintOf;
 use touch2touch_pipeline::masks::propose::hand_pose;
 
@@ -29,21 +30,20 @@ pub fn accepted_elsewhere(state: &State) -> Vec<&ImprintOf> {
 }
 
 /// The pose that a person set and accepted.
-pub fn by_hand(state: &State, source: ImprintSource) -> Option<ManualPose> {
+pub fn by_hand(state: &State, source: ImprintSource) -> Option<PlanarPose> {
     hand_pose(None, accepted(state, source))
 }
 
 /// The pose at which the tool is shown: where a hand holds it, else where a person put it, else where it was registered.
-pub fn shown_pose(state: &State, source: ImprintSource) -> Option<ManualPose> {
+pub fn shown_pose(state: &State, source: ImprintSource) -> Option<PlanarPose> {
     let held = state.workbench.hand(source).map(|hand| hand.pose);
-    held.or_else(|| by_hand(state, source))
-        .or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object.into()))
+    held.or_else(|| by_hand(state, source)).or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object))
 }
 
 /// The pose at which setting one by hand begins.
-pub fn manual_begins(state: &State, source: ImprintSource) -> ManualPose {
+pub fn manual_begins(state: &State, source: ImprintSource) -> PlanarPose {
     let accepted = accepted(state, source).map(|a| a.pose);
-    accepted.or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object.into())).unwrap_or_default()
+    accepted.or_else(|| Some(results::pose(state, source).shown()?.grasp_from_object)).unwrap_or_default()
 }
 
 /// The difference between the registered poses of measurement and prediction, where both are there.

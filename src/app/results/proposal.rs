@@ -11,8 +11,8 @@ use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::bits::Bits;
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::label::CadPose;
-use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::masks::propose::{self, CadAt, Proposal, Takes, hand_pose};
@@ -21,17 +21,16 @@ use touch2touch_pipeline::steps::on_pad::OnPad;
 const WHAT: &str = "Propose a mask";
 
 /// The pose of the CAD model at a place, `grasp_from_object`; `None` if it is not there.
-fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, ManualPose)> {
+fn cad_pose(state: &State, place: &CadPlace, pair: PairKey) -> Option<(CadPose, PlanarPose)> {
     Some(match place {
-        CadPlace::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?.into()),
+        CadPlace::Truth => (CadPose::Truth, state.results.samples.get(&pair)?.grasp_from_object?),
         CadPlace::Registered(key) => {
             let pose = state.results.poses.get(key)?.grasp_from_object;
-            (CadPose::Registered(pose), pose.into())
+            (CadPose::Registered(pose), pose)
         }
         CadPlace::Hand(bits) => {
-            let [theta_rad, y_m, z_m, x_m, pitch_rad, yaw_rad] = bits.map(f64::from_bits);
-            let planar = touch2touch_core::frames::PlanarPose { theta_rad, y_m, z_m };
-            let pose = ManualPose { planar, x_m, pitch_rad, yaw_rad };
+            let [theta_rad, y_m, z_m] = bits.map(f64::from_bits);
+            let pose = PlanarPose { theta_rad, y_m, z_m };
             (CadPose::Nudged(pose), pose)
         }
     })

@@ -418,7 +418,7 @@ mod tests {
     use touch2touch_core::frames::PlanarPose;
     use touch2touch_core::grid::Mask;
     use touch2touch_core::label::Provenance;
-    use touch2touch_core::manual::{AcceptedPose, ManualPose};
+    use touch2touch_core::manual::AcceptedPose;
     use touch2touch_core::postprocess::ShiftMode;
     use touch2touch_core::rig::lab;
     use touch2touch_pipeline::compare::subject::Subject;
@@ -449,7 +449,7 @@ mod tests {
                 (ImprintOf::Measured, PlanarPose { theta_rad: 0.1, y_m: 0.002, z_m: -0.001 }.into()),
                 (
                     ImprintOf::predicted("b0", &GenerateConfig::default(), ShiftMode::Raw),
-                    AcceptedPose { pose: ManualPose { x_m: 1e-3, ..ManualPose::default() }, by_hand: true },
+                    AcceptedPose { pose: PlanarPose { y_m: 1e-3, ..PlanarPose::default() }, by_hand: true },
                 ),
             ]
             .into(),

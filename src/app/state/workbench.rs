@@ -6,7 +6,8 @@ use glam::DVec3;
 use strum::EnumIter;
 
 use super::super::keys::{ImprintSource, PairKey, RunKey};
-use touch2touch_core::manual::{ManualCost, ManualPose};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::ManualCost;
 use touch2touch_core::rig::PadId;
 
 /// The coloring of the contact points in 3D.
@@ -97,9 +98,9 @@ pub struct ManualTry {
     /// The imprint it is set for.
     pub source: ImprintSource,
     /// The pose, `grasp_from_object`.
-    pub pose: ManualPose,
+    pub pose: PlanarPose,
     /// The pose where it began.
-    pub began: ManualPose,
+    pub began: PlanarPose,
     /// The cost; `None` while cloud or model are not there.
     pub cost: Option<ManualCost>,
     /// The cost where it began.
@@ -121,8 +122,6 @@ pub struct Workbench {
     pub both_clouds: bool,
     /// The effect of a click.
     pub tool: SceneTool,
-    /// True where the tool can leave the plane.
-    pub six_dof: bool,
     /// The side that the pointer was over last: what the panes beside the 3D views are about.
     pub side: ImprintSource,
     /// The pose being set.
@@ -140,7 +139,6 @@ impl Default for Workbench {
             tools_tried: None,
             both_clouds: false,
             tool: SceneTool::Look,
-            six_dof: false,
             side: ImprintSource::Measured,
             hand: None,
             picked: None,

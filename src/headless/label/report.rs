@@ -52,7 +52,7 @@ impl Stored {
         let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
         let mut text = format!("{}: {}; {masks}", self.name, self.review);
         for Accepted { what, pose, .. } in &self.accepted {
-            let place = pose.pose.planar.inverse();
+            let place = pose.pose.inverse();
             let by = if pose.by_hand { ", by hand" } else { "" };
             text += &format!("; pose {:.1}° accepted of {what}{by}", place.theta_rad.to_degrees());
         }

@@ -7,7 +7,8 @@ use serde::Serialize;
 use touch2touch_core::align::{AlignReport, Evidence};
 use touch2touch_core::ambiguity::Ambiguity;
 use touch2touch_core::findings::Finding;
-use touch2touch_core::manual::{AcceptedPose, ManualPose};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::metrics::AngleSummary;
 use touch2touch_core::rig::PerPad;
 use touch2touch_core::units::angle_error;
@@ -83,13 +84,13 @@ pub(super) struct Accepted {
     pub(super) error_deg: Option<f64>,
     pub(super) y_m: f64,
     pub(super) z_m: f64,
-    /// All six numbers as they are stored.
-    pub(super) grasp_from_object: ManualPose,
+    /// The pose as it is stored.
+    pub(super) grasp_from_object: PlanarPose,
 }
 
 impl Accepted {
     pub(super) fn new(accepted: AcceptedPose, truth_rad: Option<f64>) -> Self {
-        let found = accepted.pose.planar.inverse();
+        let found = accepted.pose.inverse();
         Self {
             by_hand: accepted.by_hand,
             angle_deg: found.theta_rad.to_degrees(),

@@ -158,8 +158,8 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
         ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
     }
     let Some(hand) = results::by_hand(cx.state, source) else { return };
-    let angle = units::text_deg(hand.planar.inverse().theta_rad);
-    let error = results::truth(cx.state).map(|truth| PoseDifference::between(hand.planar, truth).angle_rad);
+    let angle = units::text_deg(hand.inverse().theta_rad);
+    let error = results::truth(cx.state).map(|truth| PoseDifference::between(hand, truth).angle_rad);
     let error = error.map_or(String::new(), |error| format!(" (error {})", units::text_deg(error)));
     ui.horizontal(|ui| {
         ui.label(RichText::new(format!("Accepted by hand: {angle}{error}")).size(SMALL).color(cx.p.good));

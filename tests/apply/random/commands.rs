@@ -41,7 +41,7 @@ use touch2touch_core::evaluation::Metric;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::{CleanKind, CleanUp, Layers, Paint, Sight};
-use touch2touch_core::manual::{ManualPose, PoseAxis};
+use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::pose::Gate;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::compare::subject::Subject;
@@ -461,10 +461,9 @@ draws! {
         1 TryTools(any::<bool>()),
         1 SetBothClouds(any::<bool>()),
         3 SetTool(any_of::<SceneTool>()),
-        1 SetSixDof(any::<bool>()),
         1 SetSide(source()),
         1 Nudge(any_of::<PoseAxis>(), number().prop_map(f64::from)),
-        1 SetHandPose(planar().prop_map(ManualPose::from)),
+        1 SetHandPose(planar()),
         1 StartIcp,
         1 AcceptHand,
         1 RevertHand,

@@ -6,7 +6,6 @@ use serde_json::Value;
 
 use super::clean_up::CleanUp;
 use crate::frames::PlanarPose;
-use crate::manual::ManualPose;
 use crate::units::{text_deg, text_mm};
 
 /// Pose of the tool that a CAD distance was measured at. Poses are `grasp_from_object`.
@@ -18,7 +17,7 @@ pub enum CadPose {
     /// The one that a registration answered.
     Registered(PlanarPose),
     /// One that a person moved there.
-    Nudged(ManualPose),
+    Nudged(PlanarPose),
 }
 
 impl CadPose {
@@ -31,7 +30,7 @@ impl CadPose {
         match self {
             Self::Truth => "the true pose".into(),
             Self::Registered(planar) => format!("the registered pose ({})", pose(planar)),
-            Self::Nudged(manual) => format!("a pose moved by hand ({})", pose(manual.planar)),
+            Self::Nudged(planar) => format!("a pose moved by hand ({})", pose(planar)),
         }
     }
 }

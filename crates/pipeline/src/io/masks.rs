@@ -34,7 +34,7 @@ const REVIEW_FORMAT: &str = "touch2touch-review";
 const VERSION: u32 = 1;
 /// Masks, which say where each pixel comes from.
 const MASK_VERSION: u32 = 2;
-/// Reviews whose accepted poses were set by hand or leave the plane; others are written as version 1.
+/// Reviews whose accepted poses were set by hand; others are written as version 1.
 const HAND_VERSION: u32 = 2;
 /// Reviews with a note: an older program would write them back without it.
 const NOTE_VERSION: u32 = 3;
@@ -158,7 +158,7 @@ impl StoredReview {
         match self {
             Self { accepted, .. } if !accepted.accepted_predicted.is_empty() => PREDICTED_VERSION,
             Self { note, .. } if !note.is_empty() => NOTE_VERSION,
-            Self { accepted, .. } if !accepted.values().all(|a| a.is_plain()) => HAND_VERSION,
+            Self { accepted, .. } if accepted.values().any(|a| a.by_hand) => HAND_VERSION,
             _ => VERSION,
         }
     }

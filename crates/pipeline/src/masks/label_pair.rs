@@ -140,7 +140,7 @@ fn change(
     }
     if let Some(imprint) = setup.accept {
         let pose = match (setup.pose, &maker) {
-            (Some(planar), _) => AcceptedPose { pose: planar.into(), by_hand: true },
+            (Some(planar), _) => AcceptedPose { pose: planar, by_hand: true },
             (None, Some(maker)) => maker.pose(imprint, &labels.now)?.into(),
             (None, None) => load()?.pose(imprint, &labels.now)?.into(),
         };
@@ -291,7 +291,7 @@ impl<'a> Maker<'a> {
         let mut out = PerPad::default();
         let Begin::Proposed { source, .. } = self.setup.begin else { return Ok(out) };
         let recipe = self.recipe(self.setup.imprint);
-        let setup = ProposeSetup { source, recipe, pose: self.setup.pose.map(Into::into) };
+        let setup = ProposeSetup { source, recipe, pose: self.setup.pose };
         for (pad, made) in propose(self.touch(labels), estimate, pads, &setup, self.models)? {
             out[pad] = Some(made?);
         }

@@ -17,9 +17,10 @@ use crate::steps::mask::MaskRecipe;
 use crate::steps::on_pad::OnPad;
 use touch2touch_core::cloud::CloudError;
 use touch2touch_core::contact::{ContactMask, signed_distances, without_grain};
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
 use touch2touch_core::label::{CadPose, Provenance, grow_from};
-use touch2touch_core::manual::{AcceptedPose, ManualPose};
+use touch2touch_core::manual::AcceptedPose;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_core::rig::{PadId, Rig};
 use touch2touch_core::sample::{DepthCamera, PadTouch, Sample};
@@ -136,7 +137,7 @@ pub enum CadAt {
 }
 
 /// The pose by hand of an imprint: the one that is held, else the accepted one, if a person set that.
-pub fn hand_pose(held: Option<ManualPose>, accepted: Option<AcceptedPose>) -> Option<ManualPose> {
+pub fn hand_pose(held: Option<PlanarPose>, accepted: Option<AcceptedPose>) -> Option<PlanarPose> {
     held.or(accepted.filter(|accepted| accepted.by_hand).map(|accepted| accepted.pose))
 }
 
@@ -197,7 +198,7 @@ pub fn cad_distances(
     of: ImprintSource,
     OnPad { sample, pad }: OnPad<'_>,
     tool: &ToolModel,
-    grasp_from_object: ManualPose,
+    grasp_from_object: PlanarPose,
 ) -> Result<Grid<f64>, TaskError> {
     let (imprint, camera) = (smooth_imprint(imprint, of, &sample.rig), camera_of(sample, pad)?);
     let object_from_grasp = grasp_from_object.to_affine().inverse();

@@ -9,11 +9,12 @@ use crate::app::state::State;
 use crate::app::workbench::{ManualTry, SceneTool};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption};
-use touch2touch_core::manual::{ManualCost, ManualPose, PoseDifference};
+use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::manual::{ManualCost, PoseDifference};
 use touch2touch_core::units;
 
 /// The pose that a hand holds on a side, or would hold.
-fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {
+fn held(state: &State, source: ImprintSource) -> Option<PlanarPose> {
     let bench = &state.workbench;
     if bench.tool != SceneTool::Pose || bench.hand.as_ref().is_some_and(|hand| hand.source != source) {
         return None;
@@ -23,8 +24,7 @@ fn held(state: &State, source: ImprintSource) -> Option<ManualPose> {
 
 /// Height of the strip of the pose in hand, points; 0 where there is none.
 pub(super) fn strip_height(state: &State, source: ImprintSource) -> f32 {
-    let lines = |pose: ManualPose| if pose.is_planar() { 4.0 } else { 5.0 };
-    held(state, source).map_or(0.0, |pose| 25.0 + 14.0 * lines(pose))
+    held(state, source).map_or(0.0, |_| 25.0 + 14.0 * 4.0)
 }
 
 /// The pose in hand: where it is, what it costs, and what can be done with it.
@@ -45,9 +45,6 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 text += &format!("   ({angle}, {position} off truth)");
             }
             ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
-            if !pose.is_planar() {
-                ui.label(RichText::new(tilt_text(pose)).size(SMALL).color(cx.p.strong));
-            }
             let (text, color) = cost_text(cx, hand.as_ref());
             ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(
                 "Outline: distance of the contact points to the tool's outline in the plane, inside counted as zero. \
@@ -59,10 +56,8 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
                 for (action, text) in
                     [(Action::IcpFromHere, icp), (Action::Accept, "Accept"), (Action::RevertHand, "Revert")]
                 {
-                    small_button(cx, ui, action, text, source, false);
+                    small_button(cx, ui, action, text, source);
                 }
-                let six_dof = cx.state.workbench.six_dof;
-                small_button(cx, ui, Action::SixDof, "6-DoF", source, six_dof);
             });
             let keys = "[[nudge_left]], [[nudge_right]], [[nudge_up]], [[nudge_down]] 0.1 mm · [[turn_left]], [[turn_right]] 0.5° · \
                         Shift ×10 · Ctrl ÷10";
@@ -71,24 +66,17 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
     });
 }
 
-fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource, on: bool) {
-    let button = Button::selectable(on, RichText::new(text).size(SMALL)).frame_when_inactive(true);
+fn small_button(cx: &mut Cx<'_>, ui: &mut Ui, action: Action, text: &str, source: ImprintSource) {
+    let button = Button::selectable(false, RichText::new(text).size(SMALL)).frame_when_inactive(true);
     let name = format!("{}, {}", action.name(), source.name().to_lowercase());
     cx.acting(ui, action, button.min_size(vec2(0.0, 20.0)), name);
 }
 
-/// The three numbers out of the plane.
-fn tilt_text(pose: ManualPose) -> String {
-    let (pitch, yaw) = (pose.pitch_rad.to_degrees(), pose.yaw_rad.to_degrees());
-    format!("x {:+.2} mm   pitch {pitch:+.1}°   yaw {yaw:+.1}°", units::mm(pose.x_m))
-}
-
-/// The three numbers in the plane.
-pub(super) fn place_text(pose: ManualPose) -> String {
-    let planar = pose.planar;
+/// The three numbers of a pose.
+pub(super) fn place_text(pose: PlanarPose) -> String {
     // The angle as everywhere on screen: of the tool's inverse motion, as the lab reports it.
-    let angle = planar.inverse().theta_rad;
-    format!("y {:+.2}  z {:+.2} mm   angle {:+.1}°", units::mm(planar.y_m), units::mm(planar.z_m), angle.to_degrees())
+    let angle = pose.inverse().theta_rad;
+    format!("y {:+.2}  z {:+.2} mm   angle {:+.1}°", units::mm(pose.y_m), units::mm(pose.z_m), angle.to_degrees())
 }
 
 /// Cost of the pose, against where it began.
@@ -114,7 +102,7 @@ fn costs(now: ManualCost, before: ManualCost) -> String {
     )
 }
 
-/// Difference of the planar part of a pose from the truth.
-pub(super) fn off_truth(state: &State, pose: ManualPose) -> Option<PoseDifference> {
-    Some(PoseDifference::between(pose.planar, results::truth(state)?))
+/// Difference of a pose from the truth.
+pub(super) fn off_truth(state: &State, pose: PlanarPose) -> Option<PoseDifference> {
+    Some(PoseDifference::between(pose, results::truth(state)?))
 }

@@ -8,9 +8,9 @@ use crate::steps::estimate::{Estimate, Touch};
 use crate::steps::models::Models;
 use crate::steps::on_pad::OnPad;
 use crate::steps::recipe::{Recipe, Stage};
+use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::label::CadPose;
-use touch2touch_core::manual::ManualPose;
 use touch2touch_core::rig::PadId;
 
 /// Source of proposals, with its numbers.
@@ -22,7 +22,7 @@ pub struct ProposeSetup {
     /// what registers the pose of [`ProposalSource::CadRegistered`].
     pub recipe: Recipe,
     /// The pose of [`ProposalSource::CadHand`]; `None` takes the one accepted for the pair, if a person set it.
-    pub pose: Option<ManualPose>,
+    pub pose: Option<PlanarPose>,
 }
 
 /// Proposals for some pads, or reasons why there are none.
@@ -49,7 +49,7 @@ pub fn propose(
         };
         Ok(pads.iter().copied().map(one).collect())
     };
-    let near = |at: CadPose, pose: ManualPose| {
+    let near = |at: CadPose, pose: PlanarPose| {
         let tool = touch.tool.map_err(Clone::clone)?;
         each(&|pad, imprint| {
             let distances = cad_distances(imprint, setup.recipe.imprint, OnPad { sample, pad }, tool, pose)?;
@@ -67,12 +67,12 @@ pub fn propose(
         }
         Takes::CadModel(CadAt::Truth) => {
             let truth = sample.grasp_from_object.ok_or_else(|| lacks("the true pose of this pair is not known"))?;
-            near(CadPose::Truth, truth.into())
+            near(CadPose::Truth, truth)
         }
         Takes::CadModel(CadAt::Registered) => {
             let estimate = reach(&setup.recipe, Stage::Pose)?;
             let found = estimate.pose().map_err(Clone::clone)?.grasp_from_object;
-            near(CadPose::Registered(found), found.into())
+            near(CadPose::Registered(found), found)
         }
         Takes::CadModel(CadAt::Hand) => {
             let pose = hand_pose(setup.pose, labels.accepted(&of)).ok_or_else(|| {
