@@ -18,7 +18,6 @@
 
 pub mod act;
 pub mod action;
-pub mod adapt;
 pub mod answers;
 pub mod apply;
 pub mod command;
@@ -32,6 +31,7 @@ pub mod inspect;
 pub mod jobs;
 pub mod keys;
 pub mod labels;
+pub mod learn;
 pub mod library;
 pub mod pane;
 pub mod predict;
@@ -44,6 +44,5 @@ pub mod settings;
 pub mod source;
 pub mod state;
 pub mod tasks;
-pub mod train;
 pub mod view;
 pub mod workbench;

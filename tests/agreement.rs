@@ -19,13 +19,13 @@ use std::time::{Duration, Instant};
 use serde_json::Value;
 use strum::IntoEnumIterator as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::adapt::AdaptPairs;
 use touch2touch::app::command::{
-    AdaptCommand, Command, DoctorCommand, ExportCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand,
+    Command, DoctorCommand, ExportCommand, LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand,
     ViewCommand,
 };
 use touch2touch::app::export::Output;
 use touch2touch::app::keys::ImprintSource;
+use touch2touch::app::learn::{AdaptPairs, LearnForm};
 use touch2touch::app::library::Place;
 use touch2touch::app::runtime::Runtime;
 use touch2touch::app::services::Services as _;
@@ -533,11 +533,11 @@ fn commands_of_tables_and_fits_say_what_decides_them() {
     let names: Vec<String> =
         studio.state.library.open.as_ref().unwrap().source.index().pairs.iter().map(|pair| pair.name.clone()).collect();
     studio.send(LibraryCommand::SetFilter(names[1].clone()).into());
-    studio.send(AdaptCommand::Choose(AdaptPairs::Listed).into());
+    studio.send(LearnCommand::SetForm(LearnForm { pairs: AdaptPairs::Listed, ..LearnForm::default() }).into());
     let listed: Vec<String> = studio.state.library.order.iter().map(|id| names[id.0 as usize].clone()).collect();
     assert!(!listed.is_empty() && listed.len() < names.len());
     assert_eq!(said(&studio, Pane::Adapt, "--pairs"), Some(listed.join(",")));
     // Nothing is marked done: there is nothing to fit, and no command for it.
-    studio.send(AdaptCommand::Choose(AdaptPairs::Done).into());
+    studio.send(LearnCommand::SetForm(LearnForm { pairs: AdaptPairs::Done, ..LearnForm::default() }).into());
     assert_eq!(export::equivalent_words(&studio.state, Pane::Adapt), None);
 }

@@ -4,11 +4,12 @@ use strum::IntoEnumIterator;
 
 use super::action::{Action, actions};
 use super::command::{
-    AdaptCommand, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand,
-    LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand, UiRequest,
-    ViewCommand, WorkbenchCommand,
+    CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, InspectCommand, LabelsCommand,
+    LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
+    WorkbenchCommand,
 };
 use super::keys::{ImprintSource, ShiftMode};
+use super::learn::{self, Network};
 use super::pane::Workspace;
 use super::settings::prefer;
 use super::state::export::Output;
@@ -20,7 +21,7 @@ use super::state::settings::{ColorRange, MaskTool};
 use super::state::tasks::TaskKind;
 use super::state::workbench::{Layer, SceneTool};
 use super::state::{Absent, State};
-use super::{adapt, export, results, train};
+use super::{export, results};
 use touch2touch_core::label::{CleanKind, Paint};
 use touch2touch_core::manual::PoseAxis;
 
@@ -179,6 +180,11 @@ fn accept_shown(state: &State) -> Option<Command> {
         return editable(state, LabelsCommand::AcceptProposal);
     }
     editable(state, WorkbenchCommand::AcceptHand).filter(|_| state.workbench.hand.is_some())
+}
+
+/// Takes what a network learned into use.
+fn can_use(state: &State, network: Network) -> Option<Command> {
+    when(learn::made(state, network).is_some() && !learn::in_use(state, network), LearnCommand::Use(network))
 }
 
 /// True where the measured imprints of all pairs can be scored now.

@@ -104,9 +104,9 @@ macro_rules! actions {
         LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)],
             _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
-            state => when(adapt::can_adapt(state) && state.tasks.of_kind(TaskKind::Fit).is_none(), AdaptCommand::Start);
+            state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
         UseFit, Generate, "Use the fitted model", "Predicts with the model that was fitted to these pairs", [],
-            state => when(adapt::fitted(state).is_some() && !adapt::uses_fit(state), AdaptCommand::Use);
+            state => can_use(state, Network::Generator);
         EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [],
             state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
@@ -173,11 +173,11 @@ macro_rules! actions {
         Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)],
             state => when(state.history.next_redo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Redo);
         TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [],
-            _ => ui(UiRequest::ShowPane(Pane::Train));
+            _ => does(LearnCommand::Show(Network::Masks));
         StartTraining, Mask, "Start training", "Trains the mask model on the masks of pairs marked done; the new model makes the automatic masks when it is ready", [],
-            state => when(train::setup(state).is_some() && state.tasks.of_kind(TaskKind::Train).is_none(), TrainCommand::Start);
+            state => when(learn::can_start(state, Network::Masks), LearnCommand::Start(Network::Masks));
         UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
-            state => when(train::trained(state).is_some() && !train::uses_trained(state), TrainCommand::Use);
+            state => can_use(state, Network::Masks);
         MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)],
             _ => does(prefer(|s| s.mask_visible ^= true));
         MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)],

@@ -9,6 +9,7 @@ use super::keys::{DatasetSeq, Preview, Revision};
 use super::source::Followed;
 use super::state::State;
 use super::state::labels::Merged;
+use super::state::learn::Network;
 use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
@@ -165,10 +166,10 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
         // Before anything was said nothing was done; what was left then is left no more.
         let far = task.progress.text.split(", about").next().unwrap_or_default();
         let kept = Some(far.to_owned()).filter(|far| !far.is_empty());
-        match task.kind {
-            TaskKind::Train => state.train.stopped = kept,
-            TaskKind::Fit if state.adapt.tune => state.adapt.stopped = kept,
-            _ => {}
+        // A fit in closed form has nothing to go on from.
+        let network = state.learn.started;
+        if task.kind == TaskKind::Learn && (network == Network::Masks || state.learn.form.tune) {
+            state.learn.stopped[network as usize] = kept;
         }
     }
     state.log.error(err);

@@ -1,6 +1,5 @@
 //! [`Command`]: everything that can happen to the state, as data, by room.
 
-pub use super::adapt::AdaptCommand;
 pub use super::answers::Answer;
 pub use super::doctor::DoctorCommand;
 pub use super::evaluate::EvaluateCommand;
@@ -8,6 +7,7 @@ pub use super::export::ExportCommand;
 pub use super::follow::FollowCommand;
 pub use super::inspect::InspectCommand;
 pub use super::labels::{LabelsCommand, UnsavedCommand};
+pub use super::learn::LearnCommand;
 pub use super::library::LibraryCommand;
 pub use super::pane::Pane;
 pub use super::predict::PredictCommand;
@@ -15,7 +15,6 @@ pub use super::services::Opened;
 pub use super::settings::SettingsCommand;
 pub use super::state::view::{CameraPreset, Hover, UiRequest};
 pub use super::tasks::TasksCommand;
-pub use super::train::TrainCommand;
 pub use super::view::ViewCommand;
 pub use super::workbench::WorkbenchCommand;
 
@@ -43,10 +42,8 @@ macro_rules! rooms {
             Export(ExportCommand) in export,
             /// To the panel about the open data set.
             Doctor(DoctorCommand) in doctor,
-            /// The fit to one's own pairs.
-            Adapt(AdaptCommand) in adapt,
-            /// The training of the mask model.
-            Train(TrainCommand) in train,
+            /// To networks that learn from the open pairs.
+            Learn(LearnCommand) in learn,
             /// To the preferences.
             Settings(SettingsCommand) in settings,
             /// To running jobs and the log.

@@ -3,17 +3,14 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::adapt::{self, AdaptCommand, AdaptPairs};
 use super::effect::{Access, Effect, Errand};
 use super::keys::{DatasetSeq, ImprintSource};
+use super::learn::{self, AdaptPairs, LearnCommand, Network};
 use super::library::{self, LibraryCommand};
-use super::pane::Pane;
 use super::settings::{self, ColorRange, prefer};
 use super::source::DataSource;
 use super::state::State;
 use super::state::tasks::TaskKind;
-use super::state::view::UiRequest;
-use super::train::{self, TrainCommand};
 use super::{recipe, tasks};
 use touch2touch_core::read_as::parse_list;
 use touch2touch_pipeline::doctor::{self, Cure, Examined, Worth};
@@ -60,8 +57,8 @@ pub(crate) fn can(state: &State, cure: &Cure) -> bool {
         && match cure {
             Cure::FitRange { min_m, max_m } => !is_fitted(state.settings.range, [*min_m, *max_m]),
             Cure::ReadTool { .. } | Cure::ReadAs { .. } => true,
-            Cure::Fit { .. } => adapt::can_adapt(state) && free(TaskKind::Fit),
-            Cure::TrainFromCad { .. } => train::setup(state).is_some() && free(TaskKind::Train),
+            Cure::Fit { .. } => learn::can_start(state, Network::Generator),
+            Cure::TrainFromCad { .. } => learn::can_start(state, Network::Masks),
             Cure::Examine { .. } => free(TaskKind::Examine),
         }
 }
@@ -88,18 +85,12 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
             tasks::start(state, TaskKind::ReadOtherwise.name(), ReadOtherwise { seq, source, list }, effects);
         }
         Cure::Fit { .. } => {
-            stop_trying(state, effects);
-            adapt::step(state, AdaptCommand::Choose(AdaptPairs::All), effects);
-            adapt::step(state, AdaptCommand::Start, effects);
-            effects.push(Effect::Ui(UiRequest::ShowPane(Pane::Adapt)));
-            state.doctor.shown = false;
+            state.learn.form.pairs = AdaptPairs::All;
+            start_learning(state, Network::Generator, effects);
         }
         Cure::TrainFromCad { .. } => {
-            stop_trying(state, effects);
-            state.train.form.choice.from = MasksFrom::Cad;
-            train::step(state, TrainCommand::Start, effects);
-            effects.push(Effect::Ui(UiRequest::ShowPane(Pane::Train)));
-            state.doctor.shown = false;
+            state.learn.form.choice.from = MasksFrom::Cad;
+            start_learning(state, Network::Masks, effects);
         }
         Cure::Examine { .. } => {
             let Some(source) = state.library.open.as_ref().map(|open| open.source.clone()) else { return };
@@ -107,6 +98,14 @@ fn carry_out(state: &mut State, cure: Cure, effects: &mut Vec<Effect>) {
             tasks::start(state, TaskKind::Examine.name(), errand, effects);
         }
     }
+}
+
+/// Has a network learn, where it can be seen.
+fn start_learning(state: &mut State, network: Network, effects: &mut Vec<Effect>) {
+    stop_trying(state, effects);
+    learn::step(state, LearnCommand::Start(network), effects);
+    learn::step(state, LearnCommand::Show(network), effects);
+    state.doctor.shown = false;
 }
 
 /// Ends the trial of the models: something else takes its place and must not wait for it.
@@ -118,7 +117,7 @@ fn stop_trying(state: &mut State, effects: &mut Vec<Effect>) {
 
 /// The models that are tried: a generator as it was before it was fitted to anything.
 fn tried_recipe(state: &State) -> Recipe {
-    let generator = adapt::to_be_fitted(state).cloned();
+    let generator = learn::to_be_fitted(state).cloned();
     Recipe {
         generator: generator.map(|bundle| (bundle.clone().into(), state.settings.generate.config(&bundle))),
         ..recipe::in_force(state, ImprintSource::Predicted)

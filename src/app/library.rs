@@ -6,7 +6,6 @@ pub use super::state::library::{Follow, Library, Place, Sort, short_name};
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::adapt::AdaptState;
 use super::effect::{Access, Effect, Errand};
 use super::keys::DatasetSeq;
 use super::services::Opened;
@@ -18,7 +17,6 @@ use super::state::labels::{Document, Review};
 use super::state::results::{Request, Results};
 use super::state::settings::MAX_RECENT;
 use super::state::tasks::{Level, TaskKind};
-use super::train::TrainState;
 use super::{inspect, labels, settings, tasks};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::PadId;
@@ -328,12 +326,11 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     state.table.result = None;
     state.table.looked_up = None;
     state.table.scores = Arc::default();
-    state.adapt = AdaptState { pairs: state.adapt.pairs, tune: state.adapt.tune, ..AdaptState::default() };
+    state.learn = state.learn.emptied();
     // Somebody's own folder is said what it is, unless it was open when the window was closed.
     let own = opened.source.root().is_some() && !resumed;
     let shown = if same_place { state.doctor.shown } else { own && state.settings.about_own_data };
     state.doctor = DoctorState { shown, ..DoctorState::default() };
-    state.train = TrainState { form: state.train.form, ..TrainState::default() };
     state.history.clear();
     state.tasks.failed.clear();
     state.document = Document {

@@ -145,16 +145,13 @@ macro_rules! panes {
             masks {
                 Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
-            train { Train {
-                "Train the mask model" as "Train", "The mask model trained on corrected masks, and what that is worth",
-                Form, needs [Training], at [Adapt Top(2)]
-            } }
             results { Results {
                 "Results", "The paper's results table of the open data set", Form, needs [],
                 at [Evaluate Top(1)]
             } }
             adapt { Adapt {
-                "Fit to my pairs" as "Fit", "The generator fitted to the open pairs, and what that is worth", Form, needs [],
+                "Adapt", "The generator fitted to the open pairs, or the mask model trained on their masks, and what that is worth",
+                Form, needs [Training],
                 at [Adapt Top(1)]
             } }
             table {

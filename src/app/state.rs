@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-pub mod adapt;
 pub mod cache;
 pub mod doctor;
 pub mod evaluate;
@@ -10,24 +9,24 @@ pub mod export;
 pub mod history;
 pub mod inspect;
 pub mod labels;
+pub mod learn;
 pub mod library;
 pub mod results;
 pub mod settings;
 pub mod shown;
 pub mod tasks;
-pub mod train;
 pub mod view;
 pub mod workbench;
 
 use super::keys::{ImprintSource, PairKey, TouchKey};
 use super::pane::{Demand, Pane, Workspace};
-use adapt::AdaptState;
 use doctor::DoctorState;
 use evaluate::TableState;
 use export::ExportState;
 use history::History;
 use inspect::Inspect;
 use labels::Document;
+use learn::LearnState;
 use library::Library;
 use results::{Cached, Request, Results};
 use settings::Settings;
@@ -35,7 +34,6 @@ use tasks::{Log, Tasks};
 use touch2touch_core::dataset::PairEntry;
 use touch2touch_core::rig::{PadId, Rig, Text};
 use touch2touch_pipeline::error::TaskError;
-use train::TrainState;
 use view::Selection;
 use workbench::Workbench;
 
@@ -60,10 +58,8 @@ pub struct State {
     pub export: ExportState,
     /// The panel about the open data set.
     pub doctor: DoctorState,
-    /// The fit to the open pairs.
-    pub adapt: AdaptState,
-    /// The training of the mask model.
-    pub train: TrainState,
+    /// What is fitted and trained.
+    pub learn: LearnState,
     /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,
     /// The preferences.

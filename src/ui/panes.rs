@@ -12,5 +12,4 @@ pub(crate) mod scene;
 pub(crate) mod settings_pane;
 pub(crate) mod table;
 pub(crate) mod timemachine;
-pub(crate) mod train;
 pub(crate) mod versus;

@@ -1,12 +1,13 @@
 //! The fit to one's own pairs in the studio, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{AdaptCommand, Pane, UiRequest, ViewCommand};
+use touch2touch::app::command::{LearnCommand, Pane, UiRequest, ViewCommand};
+use touch2touch::app::learn::{LearnForm, Network};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::tasks::TaskKind;
-use touch2touch::app::{adapt, recipe};
+use touch2touch::app::{learn, recipe};
 use touch2touch_pipeline::steps::bundles::BundleKind;
 
 use super::rig::{Rig, write_dataset};
@@ -22,12 +23,12 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
     rig.shoot("fit-before");
     let shipped = recipe::bundle(rig.harness.state().state(), BundleKind::Generator).unwrap().clone();
-    assert!(!shipped.is_fitted() && adapt::fitted(rig.harness.state().state()).is_none());
+    assert!(!shipped.is_fitted() && learn::made(rig.harness.state().state(), Network::Generator).is_none());
 
     rig.harness.get_all_by_label("Fit to my pairs").next().unwrap().click();
     rig.harness.step();
     rig.settle();
-    let found = rig.harness.state().state().adapt.result.clone().expect("the fit is there");
+    let found = rig.harness.state().state().learn.adapted.clone().expect("the fit is there");
     assert_eq!((found.pairs, found.touches, found.pads.len()), (6, 12, 2), "{found:?}");
     let closed = found.closed_form.as_ref().unwrap();
     assert!(closed.angle.is_some() && closed.psnr_db.unwrap() > 20.0, "{found:?}");
@@ -36,7 +37,7 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     // What was simulated lies near where the model expects it.
     assert!(found.pads.iter().all(|pad| pad.offset_px.iter().all(|off| off.abs() < 6.0)), "{:?}", found.pads);
     // A touch that was left out, before and after.
-    let held = adapt::held_back(rig.harness.state().state()).cloned().unwrap();
+    let held = learn::held_back(rig.harness.state().state()).cloned().unwrap();
     assert!(held.before.size() == held.measured.size() && held.before != held.after, "{}", held.name);
     rig.harness.get_by_label("Fitted to the others");
     rig.shoot("fit-after");
@@ -50,11 +51,11 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     assert!(
         now.is_fitted()
             && now.name.contains("fitted to")
-            && Some(now.id.as_ref()) == adapt::fitted(state).map(|f| &*f.id)
+            && Some(now.id.as_ref()) == learn::made(state, Network::Generator).map(|f| &*f.id)
     );
     rig.shoot("fit-used");
     // It is made again from what it was made from.
-    let setup = adapt::setup(rig.harness.state().state()).unwrap();
+    let setup = learn::adapt_setup(rig.harness.state().state()).unwrap();
     assert_eq!((setup.recipe.generating().unwrap().bundle.id.clone(), setup.pairs.len()), (shipped.id, 6));
 }
 
@@ -70,10 +71,9 @@ fn pictures_of_tuning() {
         rig.send(prefer(|s| s.hint_dismissed = true));
         rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
         rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
-        rig.send(AdaptCommand::Tune(true));
-        rig.send(AdaptCommand::Steps(30));
-        rig.send(AdaptCommand::Start);
-        while rig.harness.state().state().tasks.of_kind(TaskKind::Fit).is_some() {
+        rig.send(LearnCommand::SetForm(LearnForm { tune: true, tuning_steps: 30, ..LearnForm::default() }));
+        rig.send(LearnCommand::Start(Network::Generator));
+        while rig.harness.state().state().tasks.of_kind(TaskKind::Learn).is_some() {
             std::thread::sleep(std::time::Duration::from_millis(100));
             rig.harness.step();
         }

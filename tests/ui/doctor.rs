@@ -3,11 +3,11 @@
 use eframe::egui::Key;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{Pane, TrainCommand, ViewCommand};
+use touch2touch::app::command::{LearnCommand, Pane, ViewCommand};
+use touch2touch::app::learn;
+use touch2touch::app::learn::{LearnForm, Network};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::{Theme, prefer};
-use touch2touch::app::train::TrainForm;
-use touch2touch::app::{adapt, train};
 use touch2touch_core::read_as::ReadAs;
 use touch2touch_pipeline::io::dataset::{READ_AS_FILE, write_read_as};
 use touch2touch_pipeline::io::masks::FOLDER;
@@ -98,7 +98,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     // The fit is on screen, before and after, and the panel out of its way.
     let state = rig.harness.state().state();
     assert!(!state.doctor.shown && state.selection.panes.contains(&Pane::Adapt));
-    let found = state.adapt.result.clone().unwrap();
+    let found = state.learn.adapted.clone().unwrap();
     let [before, after] = [&found.before, found.closed_form.as_ref().unwrap()].map(|scored| scored.psnr_db.unwrap());
     assert!(found.pairs == 36 && after > before + 5.0, "{before} {after}");
     // In the table and over the pictures of a touch that was left out.
@@ -110,7 +110,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     rig.harness.step();
     rig.settle();
     let state = rig.harness.state().state();
-    let fitted = adapt::fitted(state).unwrap().id.clone();
+    let fitted = learn::made(state, Network::Generator).unwrap().id.clone();
     let made: Vec<_> = state.results.predictions.iter().map(|(key, _)| key.clone()).collect();
     assert!(!made.is_empty() && made.iter().all(|key| *key.bundle == *fitted), "{made:?}");
     assert!(made.iter().all(|key| Some(key.touch.pair) == state.pair_key()));
@@ -141,16 +141,16 @@ fn masks_from_cad_are_trained_on_by_one_click_to_the_verbs_bundle() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 3);
     let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data.clone()), true) else { return };
-    rig.send(TrainCommand::SetForm(TrainForm { by_steps: true, steps: 2, ..TrainForm::default() }));
+    rig.send(LearnCommand::SetForm(LearnForm { by_steps: true, steps: 2, ..LearnForm::default() }));
     rig.harness.get_all_by_label("Masks from CAD, and train").next().unwrap().click();
     rig.harness.step();
     rig.settle();
     let state = rig.harness.state().state();
-    let found = state.train.result.clone().expect("the training is there");
+    let found = state.learn.trained.clone().expect("the training is there");
     assert_eq!((found.masks, found.pairs, found.held_out.len(), found.persons.len()), (10, 5, 2, 0), "{found:?}");
     let [before, after] = found.poses.expect("true poses are known");
     assert!(before.grasps == 1 && after.grasps == 1 && before.iou > 0.5 && after.iou > 0.5, "{before:?} {after:?}");
-    assert!(train::trained(state).unwrap().name.contains("10 CAD masks"), "{}", found.name);
+    assert!(learn::made(state, Network::Masks).unwrap().name.contains("10 CAD masks"), "{}", found.name);
     rig.harness.get_by_label_contains("before: IoU ");
     rig.shoot("train-from-cad");
     assert!(!data.join(FOLDER).exists(), "no label was written");

@@ -3,14 +3,14 @@
 use std::path::Path;
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LibraryCommand, Pane, TrainCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{LabelsCommand, LearnCommand, LibraryCommand, Pane};
+use touch2touch::app::learn::{LearnForm, Network};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::State;
 use touch2touch::app::tasks::TaskKind;
-use touch2touch::app::train::TrainForm;
-use touch2touch::app::{recipe, train};
+use touch2touch::app::{learn, recipe};
 use touch2touch_core::catalog;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::sim;
@@ -32,9 +32,9 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
     let Some(mut rig) = Rig::live([1280.0, 800.0], Place::Path(data.clone())) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
+    rig.send(LearnCommand::Show(Network::Masks));
     let choice = TrainChoice { held_out_percent: 34, ..TrainChoice::default() };
-    rig.send(TrainCommand::SetForm(TrainForm { choice, by_steps: true, steps: 12, ..TrainForm::default() }));
+    rig.send(LearnCommand::SetForm(LearnForm { choice, by_steps: true, steps: 12, ..LearnForm::default() }));
     rig.settle();
     // What it would learn from is said first.
     rig.harness.get_by_label_contains("to learn from: 8 masks of 4 pairs");
@@ -45,16 +45,16 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
 
     rig.harness.get_by_label("Start training").click();
     rig.harness.step();
-    while rig.harness.state().state().tasks.of_kind(TaskKind::Train).is_some() {
+    while rig.harness.state().state().tasks.of_kind(TaskKind::Learn).is_some() {
         std::thread::sleep(std::time::Duration::from_millis(50));
         rig.harness.step();
     }
     rig.settle();
     let state = rig.harness.state().state();
-    let found = state.train.result.clone().expect("the training is there");
+    let found = state.learn.trained.clone().expect("the training is there");
     assert_eq!((found.masks, found.pairs, found.steps, found.held_out.len()), (8, 4, 12, 4), "{found:?}");
     assert!(found.curves.iter().any(|curve| curve.unit == "Dice") && found.before.is_some());
-    let trained = train::trained(state).expect("its bundle is among the others").clone();
+    let trained = learn::made(state, Network::Masks).expect("its bundle is among the others").clone();
     assert!(trained.trained && trained.id != shipped.id && trained.name == found.name);
     // In use at once, unless it is worse on what was left out.
     let now = recipe::bundle(state, BundleKind::Mask).unwrap().id.clone();
@@ -67,7 +67,7 @@ fn the_mask_model_is_trained_by_a_click_to_the_verbs_bundle_and_taken_into_use()
         rig.harness.step();
         rig.settle();
     }
-    assert!(train::uses_trained(rig.harness.state().state()));
+    assert!(learn::in_use(rig.harness.state().state(), Network::Masks));
     rig.harness.get_by_label("in use");
 
     // The verb makes the same bundle to the last bit.
@@ -89,7 +89,7 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
     rig.send(prefer(|s| s.hint_dismissed = true));
     rig.send(prefer(|s| s.workspace = Workspace::Label));
     // Nobody looked at anything: masks can come from CAD all the same.
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
+    rig.send(LearnCommand::Show(Network::Masks));
     rig.harness.get_by_label_contains("no mask was corrected or accepted");
     rig.harness.get_by_label("Take masks from CAD");
     rig.shoot("train-nothing");
@@ -107,14 +107,14 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
         assert_eq!((stored.review, stored.masks.len()), (Review::Done, 2), "{name}");
         assert!(stored.masks.values().all(|mask| mask.base().starts_with("Accepted")), "{name}");
     }
-    rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
+    rig.send(LearnCommand::Show(Network::Masks));
     rig.harness.get_by_label_contains(
         "all pairs with masks to learn from are kept for tests by the data set (2 pairs, 4 masks)",
     );
     rig.harness.get_by_label("Train on pairs kept for tests").click();
     rig.harness.step();
     rig.settle();
-    assert!(rig.harness.state().state().train.form.choice.test_in_train);
+    assert!(rig.harness.state().state().learn.form.choice.test_in_train);
     rig.harness.get_by_label_contains("to learn from: 2 masks of 1 pair");
     rig.shoot("train-cured");
     // One undo takes mark and masks back, where they are looked at.
@@ -148,33 +148,33 @@ fn a_training_that_is_stopped_is_kept_and_goes_on() {
     corrected(&data, 2);
     let Some(mut rig) = Rig::at_work([1280.0, 800.0], &data) else { return };
     rig.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
-    rig.harness.state_mut().push(ViewCommand::Ui(UiRequest::ShowPane(Pane::Train)));
-    let form = TrainForm { by_steps: true, steps: 60, ..TrainForm::default() };
-    rig.harness.state_mut().push(TrainCommand::SetForm(form));
+    rig.harness.state_mut().push(LearnCommand::Show(Network::Masks));
+    let form = LearnForm { by_steps: true, steps: 60, ..LearnForm::default() };
+    rig.harness.state_mut().push(LearnCommand::SetForm(form));
     rig.harness.step();
     let step = |state: &State| {
-        let text = state.tasks.of_kind(TaskKind::Train).map(|(_, task)| task.progress.text.clone())?;
+        let text = state.tasks.of_kind(TaskKind::Learn).map(|(_, task)| task.progress.text.clone())?;
         text.split_once("step ")?.1.split(' ').next()?.parse::<u32>().ok()
     };
-    rig.until("the button", |state| state.selection.panes.contains(&Pane::Train));
+    rig.until("the button", |state| state.selection.panes.contains(&Pane::Adapt));
     rig.harness.get_by_label("Start training").click();
     rig.harness.step();
     rig.until("a few steps", |state| step(state) >= Some(4));
     rig.harness.get_by_label_contains("Cancel: ").click();
-    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
-    assert!(rig.harness.state().state().train.stopped.is_some());
+    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Learn).is_none());
+    assert!(rig.harness.state().state().learn.stopped[Network::Masks as usize].is_some());
     rig.harness.get_by_label_contains("it is kept");
     rig.shoot("train-stopped");
     rig.harness.get_by_label("Start training").click();
     rig.until("the first step after", |state| step(state).is_some());
     assert!(step(rig.harness.state().state()) >= Some(4), "it goes on from where it was");
     rig.harness.get_by_label_contains("Cancel: ").click();
-    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Train).is_none());
+    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Learn).is_none());
     // What is kept is of what was asked for: another choice begins anew.
-    let other = TrainForm { steps: 61, ..form };
-    rig.harness.state_mut().push(TrainCommand::SetForm(other));
+    let other = LearnForm { steps: 61, ..form };
+    rig.harness.state_mut().push(LearnCommand::SetForm(other));
     rig.harness.step();
-    assert!(rig.harness.state().state().train.stopped.is_none());
+    assert!(rig.harness.state().state().learn.stopped[Network::Masks as usize].is_none());
 }
 
 /// Simulated grasps of one tool in the folder that the lab keeps for tests; nobody labeled them.

@@ -3,9 +3,9 @@
 use super::super::keys::{ImprintSource, ShiftMode};
 use super::super::pane::{Kind, Pane};
 use super::super::state::State;
-use super::super::state::adapt::AdaptPairs;
+use super::super::state::learn::{AdaptPairs, Network};
 use super::super::state::library::Place;
-use super::super::{adapt, recipe, results};
+use super::super::{learn, recipe, results};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::pose::Registration;
@@ -81,25 +81,25 @@ pub fn equivalent_words(state: &State, pane: Pane) -> Option<Vec<String>> {
                 .word_if(state.table.published, "--paper")
                 .then(recipe.words(Stage::Pose))
         }
-        (Pane::Adapt, _) => {
-            let setup = adapt::setup(state)?;
+        (Pane::Adapt, _) if state.learn.shown == Network::Generator => {
+            let (setup, form) = (learn::adapt_setup(state)?, state.learn.form);
             let words = verb("adapt").option("--out", "fitted");
-            let words = words.option_if("--tune", state.adapt.tune.then_some(state.adapt.steps));
-            let words = match state.adapt.pairs {
+            let words = words.option_if("--tune", form.tune.then_some(form.tuning_steps));
+            let words = match form.pairs {
                 AdaptPairs::All => words,
                 AdaptPairs::Done | AdaptPairs::Listed => words.option("--pairs", names(state, setup.pairs)?),
             };
             // The fit is of what the exact inverse gives, and of no hand.
             words.then(Recipe { shift: ShiftMode::default(), ..setup.recipe.clone() }.words(Stage::Pose))
         }
-        (Pane::Train, _) => train_words(state, command("masks").word("train").word(&path)),
+        (Pane::Adapt, _) => train_words(state, command("masks").word("train").word(&path)),
         _ => return None,
     };
     Some(words.list())
 }
 
 fn train_words(state: &State, words: Words) -> Words {
-    let (form, by) = (state.train.form, state.settings.registration);
+    let (form, by) = (state.learn.form, state.settings.registration);
     let words = words
         .option_if("--steps", form.by_steps.then_some(form.steps))
         .option_if("--minutes", (!form.by_steps).then_some(form.minutes))

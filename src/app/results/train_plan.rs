@@ -6,6 +6,7 @@ use super::super::pane::Demand;
 use super::super::results::{Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::State;
+use super::super::state::learn::Network;
 use super::super::state::tasks::TaskKind;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::export::DrawnMasks;
@@ -32,14 +33,15 @@ impl Computes for TrainPlanKey {
 pub(crate) fn train_plan_key(state: &State) -> Option<TrainPlanKey> {
     let open = state.library.open.as_ref()?;
     let revision = Revision(state.document.last_revision);
-    Some(TrainPlanKey { dataset: open.seq, choice: state.train.form.choice, revision })
+    Some(TrainPlanKey { dataset: open.seq, choice: state.learn.form.choice, revision })
 }
 
 pub(crate) fn want_train_plan(wants: &mut Demands<'_>) {
     let state = wants.state;
     if !state.needs(Demand::Training)
+        || state.learn.shown != Network::Masks
         || state.document.stroke.is_some()
-        || state.tasks.of_kind(TaskKind::Train).is_some()
+        || state.tasks.of_kind(TaskKind::Learn).is_some()
     {
         return;
     }

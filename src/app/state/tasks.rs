@@ -70,12 +70,9 @@ kinds! {
     /// Every pair of a data set is examined.
     Examine, "Examine the pairs", Batch,
         "Stop; pairs that were not examined are not told of";
-    /// A generator is fitted to pairs.
-    Fit, "Fit the model", Batch,
-        "Stop; the same fit goes on from here when it is asked for again";
-    /// A mask model is trained.
-    Train, "Train the mask model", Batch,
-        "Stop; the same training goes on from here when it is asked for again";
+    /// A generator is fitted to pairs, or a mask model trained.
+    Learn, "Adapt a model", Batch,
+        "Stop; the same goes on from here when it is asked for again";
 }
 
 /// A job that a person started.

@@ -1,276 +1,102 @@
-//! The generator fitted to the open pairs: which pairs, how far it is, and what the fit is worth.
+//! Networks that learn from the open pairs, a tab for each: what is asked for, how it goes, and what it is worth on pairs
+//! that were left out.
 
-use eframe::egui::{self, Align2, FontId, Rect, RichText, Role, ScrollArea, Sense, Ui, WidgetInfo, vec2};
+mod generator;
+mod masks;
+
+use eframe::egui::{RichText, ScrollArea, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
-use super::images::{map_of, range_of};
 use crate::app::action::Action;
-use crate::app::adapt;
-use crate::app::adapt::{AdaptPairs, TUNING_STEPS};
-use crate::app::command::{AdaptCommand, Pane};
+use crate::app::command::{LearnCommand, Pane};
+use crate::app::learn::{self, Network};
 use crate::app::tasks::TaskKind;
 use crate::ui::parts::cx::Cx;
-use crate::ui::parts::theme::{SMALL, caption, section};
-use crate::ui::parts::thumbnail;
-use crate::ui::parts::widget::{curves, empty};
-use touch2touch_core::units::{fixed, mm};
-use touch2touch_pipeline::learn::adapt::{Adapted, ENOUGH_PAIRS, Remark, Scored};
-
-/// Between pictures, points.
-const GAP: f32 = 6.0;
-/// Height of a caption over a picture, points.
-const CAPTION: f32 = 16.0;
+use crate::ui::parts::theme::SMALL;
+use crate::ui::parts::widget::curves;
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
 
 /// The pane.
 pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
+    let shown = cx.state.learn.shown;
     crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
         ui.set_min_size(ui.available_size());
-        choices(cx, ui);
-        ui.separator();
-        let adapted = cx.state.adapt.result.clone();
-        if adapted.is_none() && adapt::tuning_curves(cx.state).is_empty() {
-            return nothing_yet(cx, ui);
-        }
-        ScrollArea::vertical().auto_shrink(false).id_salt("fit").show(ui, |ui| {
-            if let Some(adapted) = &adapted {
-                refusal(cx, ui, adapted);
-                scores(cx, ui, adapted);
+        ui.horizontal_wrapped(|ui| {
+            for network in Network::iter() {
+                if ui.selectable_label(network == shown, network.name()).clicked() {
+                    cx.push(LearnCommand::Show(network));
+                }
             }
-            tuning(cx, ui);
-            before_and_after(cx, ui);
-            if let Some(adapted) = &adapted {
-                pads(cx, ui, adapted);
-                remarks(cx, ui, adapted);
+        });
+        if shown == Network::Generator && cx.state.learn.adapted.is_none() && learn::curves(cx.state, shown).is_empty()
+        {
+            generator::choices(cx, ui);
+            start(cx, ui, shown);
+            return generator::nothing_yet(cx, ui);
+        }
+        ScrollArea::vertical().auto_shrink(false).id_salt(("adapt", shown as usize)).show(ui, |ui| {
+            match shown {
+                Network::Generator => generator::choices(cx, ui),
+                Network::Masks => masks::choices(cx, ui),
+            }
+            start(cx, ui, shown);
+            how_it_goes(cx, ui, shown);
+            match (shown, cx.state.learn.trained.clone()) {
+                (Network::Generator, _) => generator::worth(cx, ui),
+                (Network::Masks, Some(trained)) => masks::worth(cx, ui, &trained),
+                (Network::Masks, None) => {}
             }
         });
     });
 }
 
-fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let (what, why) = match cx.state.tasks.of_kind(TaskKind::Fit) {
-        Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
-        None => (
-            "The model is as it was trained, on simulated touches",
-            "Some pairs of your own sensors tell where their windows lie, their scale and their pattern: the model is \
-             fitted to them in seconds, and scored on pairs that were left out",
-        ),
+/// The buttons, or the progress of what is under way.
+fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
+    let (action, start, go_on) = match network {
+        Network::Generator => (Action::FitPairs, "Fit to my pairs", "Go on with the fit"),
+        Network::Masks => (Action::StartTraining, "Start training", "Go on with the training"),
     };
-    let action = Action::FitPairs.command(cx.state).map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
-    if empty::show(ui, what, why, action) {
-        cx.act(Action::FitPairs);
-    }
-}
-
-/// Objections to the fit, and a way to keep it all the same.
-fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
-    let refused = adapted.unwritten.is_some();
-    if !refused && adapted.objections.is_empty() {
-        return;
-    }
-    let heading = if refused { "The fit was not kept" } else { "Kept, though this speaks against the fit" };
-    ui.label(RichText::new(heading).strong().color(cx.p.wrong));
-    for reason in adapted.objections.iter().chain(&adapted.in_place_of) {
-        ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
-    }
-    if refused && cx.state.tasks.of_kind(TaskKind::Fit).is_none() {
-        let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
-        if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
-            cx.push(AdaptCommand::Keep);
+    let (take_up, tip) = match network {
+        Network::Generator => ((Action::UseFit, "Use the fitted model"), "The fitted model predicts now"),
+        Network::Masks => {
+            ((Action::UseTrained, "Use the trained model"), "The trained model makes the automatic masks now")
         }
-    }
-    ui.add_space(8.0);
-}
-
-/// Curves of the tuning, while it runs and afterwards.
-fn tuning(cx: &Cx<'_>, ui: &mut Ui) {
-    let curves = adapt::tuning_curves(cx.state);
-    if curves.is_empty() {
-        return;
-    }
-    ui.add_space(8.0);
-    ui.label(section("Tuning", cx.p));
-    let of = |unit: &str| curves.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
-    let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(120.0, 420.0), 110.0);
-    ui.horizontal(|ui| {
-        curves::show(ui, size, "Loss (the strong line: the run under way, or the last)", &of("loss"));
-        curves::show(ui, size, "Raw dB on touches that were left out", &of("dB"));
-    });
-}
-
-/// A touch that was left out: what was felt, and what the model draws before and after.
-fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let state = cx.state;
-    let Some(held) = adapt::held_back(state) else { return };
-    ui.add_space(8.0);
-    ui.label(section("A touch that was left out", cx.p));
-    // A fit that was made again has other pictures.
-    let fit = state.adapt.result.as_ref().map(|adapted| adapted.seconds.to_bits());
-    let (map, range) = (map_of(state), range_of(state));
-    let scale = held.measured.height() as f32 / held.measured.width().max(1) as f32;
-    let width = ((ui.available_width() - 2.0 * GAP) / 3.0).clamp(40.0, 260.0);
-    let (area, _) = ui.allocate_exact_size(vec2(3.0 * width + 2.0 * GAP, CAPTION + width * scale), Sense::hover());
-    let all = [("Felt", &held.measured), ("As it was trained", &held.before), ("Fitted to the others", &held.after)];
-    for (i, (name, picture)) in all.into_iter().enumerate() {
-        let corner = area.min + vec2(i as f32 * (width + GAP), 0.0);
-        ui.painter().text(corner, Align2::LEFT_TOP, name, FontId::proportional(SMALL), cx.p.weak);
-        let rect = Rect::from_min_size(corner + vec2(0.0, CAPTION), vec2(width, width * scale));
-        let response = ui.interact(rect, ui.scope_id().with(("held back", i)), Sense::hover());
-        response.widget_info(|| WidgetInfo::labeled(Role::Image, true, name));
-        let recipe = (held.pair, held.pad, fit);
-        thumbnail::depth(cx, ui.painter(), rect, ("held back", i), recipe, (picture, map, range));
-        thumbnail::readout(cx, &response, name, picture);
-    }
-    let pad = state.rig().pad_key(held.pad).into_owned();
-    let text = format!("{} {pad}, in the colors of the imprints; choose a pair in the list to see its own", held.name);
-    ui.label(caption(text, cx.p));
-}
-
-/// Choice of the pairs, and the buttons.
-fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
+    };
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        ui.label(caption("Fit to", cx.p));
-        let now = cx.state.adapt.pairs;
-        let combo = egui::ComboBox::from_id_salt("fitted pairs").width(130.0).selected_text(now.label());
-        let response = combo.show_ui(ui, |ui| {
-            for pairs in AdaptPairs::iter() {
-                if ui.selectable_label(pairs == now, pairs.label()).clicked() {
-                    cx.push(AdaptCommand::Choose(pairs));
-                }
-            }
-        });
-        response.response.accessible_name("Pairs to fit to").on_hover_text("Which pairs the model is fitted to");
-        let count = adapt::pairs(cx.state).count();
-        let text = RichText::new(format!("{count} pairs")).size(SMALL);
-        let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
-        ui.label(text).on_hover_text(format!(
-            "From {ENOUGH_PAIRS} pairs on a fit is sound; about a tenth of a second each, the first time"
-        ));
-        let mut tune = cx.state.adapt.tune;
-        let tip = "After the closed form, tune the networks themselves: four runs, because the score is of pairs that \
-                   were left out; a run that was cancelled goes on when the same is asked for again";
-        if ui.checkbox(&mut tune, "tune the networks").on_hover_text(tip).changed() {
-            cx.push(AdaptCommand::Tune(tune));
+        if let Some((_, task)) = cx.state.tasks.of_kind(TaskKind::Learn) {
+            return cx.under_way(ui, task, &task.progress.text);
         }
-        if tune {
-            let mut steps = cx.state.adapt.steps;
-            let drag = egui::DragValue::new(&mut steps).speed(1.0).range(TUNING_STEPS).suffix(" steps");
-            let drag = ui.add(drag).accessible_name("Steps of tuning");
-            if drag.on_hover_text("50 take about a minute on two free cores, for each of the four runs").changed() {
-                cx.push(AdaptCommand::Steps(steps));
-            }
+        if let Some(at) = cx.state.learn.stopped[network as usize].clone() {
+            cx.action_button(ui, action, go_on);
+            ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
+        } else {
+            cx.action_button(ui, action, start);
         }
-        match cx.state.tasks.of_kind(TaskKind::Fit) {
-            Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
-            None => {
-                if let Some(at) = cx.state.adapt.stopped.clone() {
-                    cx.action_button(ui, Action::FitPairs, "Go on with the fit");
-                    ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
-                } else {
-                    cx.action_button(ui, Action::FitPairs, "Fit to my pairs");
-                }
-                cx.action_button(ui, Action::UseFit, "Use the fitted model");
-                if adapt::uses_fit(cx.state) {
-                    let tip = "The fitted model predicts now; another can be chosen in the Generate pane";
-                    ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
-                }
-            }
+        if learn::in_use(cx.state, network) {
+            ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
+        } else if learn::made(cx.state, network).is_some() {
+            cx.action_button(ui, take_up.0, take_up.1);
         }
     });
 }
 
-/// A column of figures: heading, tooltip, value.
-type FitColumn = (&'static str, &'static str, fn(&Scored) -> Option<String>);
-
-const FIGURES: [FitColumn; 7] = [
-    (
-        "PSNR dB",
-        "Pictures whose scale was lost are both stretched to 0..1, where noise decides; else peak 22.5 mm",
-        |s| Some(format!("{:.1} ± {:.1}", s.psnr_db?, s.psnr_spread_db?)),
-    ),
-    ("SSIM", "Structural similarity, as PSNR", |s| Some(format!("{:.2}", s.ssim?))),
-    ("raw dB", "PSNR of the pictures as they are, not stretched", |s| Some(format!("{:.1}", s.psnr_raw_db?))),
-    ("line dB", "PSNR after the straight line that fits best: the worth of the shape alone", |s| {
-        Some(format!("{:.1}", s.psnr_line_db?))
-    }),
-    ("seen dB", "PSNR inside the GelSlim's window", |s| Some(format!("{:.1}", s.seen?.psnr_db?))),
-    ("invented dB", "PSNR outside the GelSlim's window", |s| Some(format!("{:.1}", s.invented?.psnr_db?))),
-    ("angle °", "Mean error of the in-hand angle, degrees; of pictures from the measured imprint's", |s| {
-        Some(format!("{:.1}", s.angle.as_ref()?.mean_deg?))
-    }),
-];
-
-/// Before and after, on pairs that were left out.
-fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
-    ui.label(section("On pairs that were left out", cx.p));
-    let rows = [
-        ("As it was trained", Some(&adapted.before)),
-        ("Fitted (closed form)", adapted.closed_form.as_ref()),
-        ("Tuned", adapted.after.as_ref()),
-    ];
-    egui::Grid::new("fit scores").num_columns(FIGURES.len() + 1).spacing(vec2(18.0, 4.0)).show(ui, |ui| {
-        ui.label("");
-        for (heading, tip, _) in FIGURES {
-            ui.label(caption(heading, cx.p)).on_hover_text(tip);
-        }
-        ui.end_row();
-        for (name, scored) in rows {
-            let Some(scored) = scored else { continue };
-            ui.label(name);
-            for (_, tip, value) in FIGURES {
-                ui.label(value(scored).unwrap_or_else(|| "-".into())).on_hover_text(tip);
-            }
-            ui.end_row();
-        }
-    });
-    let text = format!(
-        "{} pairs, {} touches; {:.1} s, {:.2} s of it for the fit",
-        adapted.pairs, adapted.touches, adapted.seconds, adapted.fit_seconds
-    );
-    ui.label(caption(text, cx.p));
-    for warning in &adapted.warnings {
-        ui.add(egui::Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
+/// The curves of the run, while it goes on and afterwards.
+fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui, network: Network) {
+    let all = learn::curves(cx.state, network);
+    if all.is_empty() {
+        return;
     }
-}
-
-/// Correction of each pad.
-fn pads(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
-    ui.add_space(8.0);
-    ui.label(section("What was found", cx.p));
-    for pad in &adapted.pads {
-        let text = format!(
-            "{} ({} touches): moved {:+.1} px right and {:+.1} px down in the decoder's picture; {} · d {} mm",
-            pad.pad,
-            pad.touches,
-            pad.offset_px[0],
-            pad.offset_px[1],
-            fixed(pad.gain, 3),
-            signed(pad.offset_m)
-        );
-        ui.add(egui::Label::new(text).wrap());
-    }
-    ui.label(caption("Generate has a switch for each part", cx.p));
-}
-
-fn signed(offset_m: f64) -> String {
-    format!("{} {}", if offset_m < 0.0 { "-" } else { "+" }, fixed(mm(offset_m.abs()), 2))
-}
-
-/// Pairs to look at.
-fn remarks(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
-    let mut list = |heading: &str, remarks: &[Remark]| {
-        if remarks.is_empty() {
-            return;
-        }
-        ui.add_space(8.0);
-        ui.label(section(heading, cx.p));
-        for remark in remarks {
-            ui.add(egui::Label::new(format!("{}: {}", remark.name, remark.why)).wrap());
-        }
+    let (unit, name) = match network {
+        Network::Generator => ("dB", "Raw dB on touches that were left out"),
+        Network::Masks => ("Dice", "Dice on pairs left out"),
     };
-    list("Pairs that contradict the others", &adapted.doubtful);
-    list("Pairs that could not be used", &adapted.left_out);
+    let of = |unit: &str| all.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
+    let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(110.0, 420.0), 100.0);
+    ui.horizontal_wrapped(|ui| {
+        curves::show(ui, size, "Loss (the strong line: the run under way, or the last)", &of("loss"));
+        curves::show(ui, size, name, &of(unit));
+    });
 }

@@ -5,6 +5,7 @@ use eframe::egui::{self, Color32, Label, RichText, ScrollArea, Ui, vec2};
 
 use crate::app::command::DoctorCommand;
 use crate::app::doctor;
+use crate::app::learn::Network;
 use crate::app::results;
 use crate::app::settings::prefer;
 use crate::app::state::Lookup;
@@ -138,8 +139,10 @@ fn named(cx: &mut Cx<'_>, ui: &mut Ui, name: &str, add: impl FnOnce(&mut Cx<'_>,
 fn cure(cx: &mut Cx<'_>, ui: &mut Ui, cure: &Cure) {
     let running = match cure {
         Cure::Examine { .. } => cx.state.tasks.of_kind(TaskKind::Examine),
-        Cure::Fit { .. } => cx.state.tasks.of_kind(TaskKind::Fit),
-        Cure::TrainFromCad { .. } => cx.state.tasks.of_kind(TaskKind::Train),
+        Cure::Fit { .. } if cx.state.learn.started == Network::Generator => cx.state.tasks.of_kind(TaskKind::Learn),
+        Cure::TrainFromCad { .. } if cx.state.learn.started == Network::Masks => {
+            cx.state.tasks.of_kind(TaskKind::Learn)
+        }
         _ => None,
     };
     if let Some((_, task)) = running {

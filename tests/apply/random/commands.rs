@@ -8,11 +8,10 @@ use proptest::prelude::*;
 use proptest::sample::select;
 use proptest::strategy::Union;
 use strum::IntoEnumIterator;
-use touch2touch::app::adapt::{AdaptPairs, Fit};
 use touch2touch::app::command::{
-    AdaptCommand, Answer, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover,
-    InspectCommand, LabelsCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, TrainCommand,
-    UiRequest, UnsavedCommand, ViewCommand, WorkbenchCommand,
+    Answer, CameraPreset, Command, DoctorCommand, EvaluateCommand, ExportCommand, FollowCommand, Hover, InspectCommand,
+    LabelsCommand, LearnCommand, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest,
+    UnsavedCommand, ViewCommand, WorkbenchCommand,
 };
 use touch2touch::app::doctor::{Examine, ReadOtherwise, TryModels};
 use touch2touch::app::effect::{Ended, LabelsToSave, NotSaved};
@@ -23,6 +22,7 @@ use touch2touch::app::keys::{
     DatasetSeq, ImprintSource, PairKey, PredictionKey, Registration, Revision, ShiftMode, TouchKey,
 };
 use touch2touch::app::labels::{ImportMasks, PairLabels, Review, StrokeIn3d};
+use touch2touch::app::learn::{AdaptPairs, Learn, LearnForm, Learned, Network};
 use touch2touch::app::library::{Open, Place, ReadTool, Sort};
 use touch2touch::app::predict::{Generate, Refit};
 use touch2touch::app::services::{Followed, Services as _};
@@ -33,7 +33,6 @@ use touch2touch::app::settings::{
 };
 use touch2touch::app::state::results::{Computed, Request};
 use touch2touch::app::tasks::{TaskKind, Ticket, Write};
-use touch2touch::app::train::{Train, TrainForm};
 use touch2touch::app::workbench::{Layer, Picked, SceneTool};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
@@ -327,13 +326,13 @@ fn ended() -> impl Strategy<Value = Ended> {
                 Ended::of::<ImportMasks>(Import { new: 1, changed: vec![name.to_owned()], ..Import::default() })
             }
             TaskKind::Evaluate => Ended::of::<Score>(Arc::new(evaluation())),
-            TaskKind::Fit => Ended::of::<Fit>((Arc::new(adapted()), None)),
             TaskKind::TryModels => Ended::of::<TryModels>(Some(Arc::new(Worth::default()))),
             TaskKind::Examine => Ended::of::<Examine>(Arc::new(Examined::default())),
             TaskKind::ReadOtherwise => Ended::of::<ReadOtherwise>((seq, "read-as.txt".into(), "swap-fingers".into())),
-            TaskKind::Train => {
+            TaskKind::Learn if seq.0 % 2 == 0 => Ended::of::<Learn>(Learned::Generator(Arc::new(adapted()), None)),
+            TaskKind::Learn => {
                 let bundle = Double::new(false, true).find_bundles(&[]).0.remove(1);
-                Ended::of::<Train>((Arc::new(trained()), bundle))
+                Ended::of::<Learn>(Learned::Masks(Arc::new(trained()), bundle))
             }
         },
     )
@@ -495,20 +494,16 @@ draws! {
         1 Try,
         3 Cure(cure()),
     }
-    adapt: AdaptCommand {
-        1 Choose(any_of::<AdaptPairs>()),
-        1 Tune(any::<bool>()),
-        1 Steps(any::<u32>()),
-        1 Start,
-        1 Keep,
-        1 Use,
-    }
-    train: TrainCommand {
-        1 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>()).prop_map(|(by_steps, n, held_out_percent, seed)| {
-            TrainForm { choice: TrainChoice { from: if by_steps { MasksFrom::Cad } else { MasksFrom::Drawn }, held_out_percent, seed, test_in_train: by_steps }, by_steps, minutes: n, steps: n }
+    learn: LearnCommand {
+        1 Show(any_of::<Network>()),
+        2 SetForm((any::<bool>(), any::<u32>(), any::<u8>(), any::<u64>(), any_of::<AdaptPairs>()).prop_map(|(by_steps, n, held_out_percent, seed, pairs)| {
+            let from = if by_steps { MasksFrom::Cad } else { MasksFrom::Drawn };
+            let choice = TrainChoice { from, held_out_percent, seed, test_in_train: by_steps };
+            LearnForm { pairs, tune: n % 2 == 0, tuning_steps: n, choice, by_steps, minutes: n, steps: n }
         })),
-        1 Start,
-        1 Use,
+        2 Start(any_of::<Network>()),
+        1 Keep,
+        2 Use(any_of::<Network>()),
     }
     settings: SettingsCommand {
         24 Change(change()),
@@ -564,8 +559,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
         (2, evaluate().boxed()),
         (1, export().boxed()),
         (1, about().boxed()),
-        (1, adapt().boxed()),
-        (1, train().boxed()),
+        (2, learn().boxed()),
         (8, settings().boxed()),
         (2, tasks().boxed()),
         (3, answers().boxed()),
@@ -580,8 +574,7 @@ pub(super) fn command() -> impl Strategy<Value = Command> {
             | Command::Evaluate(_)
             | Command::Export(_)
             | Command::Doctor(_)
-            | Command::Adapt(_)
-            | Command::Train(_) => {}
+            | Command::Learn(_) => {}
             Command::Settings(_) | Command::Tasks(_) | Command::Answer(_) => {}
         }
         command

@@ -1,47 +1,31 @@
-//! The training of the mask model: what it would learn from, how it goes, and what it is worth on pairs that it did not
-//! see.
+//! The mask model in the pane Adapt: what it would learn from, and what it is worth on pairs that it did not see.
 
-use eframe::egui::{self, DragValue, Label, RichText, ScrollArea, Ui, vec2};
+use eframe::egui::{self, DragValue, Label, RichText, Ui, vec2};
 use strum::IntoEnumIterator as _;
 
-use crate::app::action::Action;
-use crate::app::command::{LibraryCommand, Pane, TrainCommand};
+use crate::app::command::{LearnCommand, LibraryCommand};
+use crate::app::learn::{LearnForm, MINUTES, MOST_HELD_OUT, STEPS};
 use crate::app::state::Lookup;
 use crate::app::tasks::TaskKind;
-use crate::app::train::{MINUTES, MOST_HELD_OUT, STEPS, TrainForm};
-use crate::app::{recipe, results, train};
+use crate::app::{recipe, results};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section};
-use crate::ui::parts::widget::curves;
 use touch2touch_core::units::counted;
 use touch2touch_pipeline::labels::ImprintSource;
 use touch2touch_pipeline::learn::train::{MaskScore, MasksFrom, Trained};
 use touch2touch_pipeline::steps::bundles::BundleKind;
 
-/// Nothing is kept between frames.
-pub(crate) type Memory = ();
-
 /// Masks that are listed, the worst first.
 const LISTED: usize = 200;
 
-/// The pane.
-pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
-    crate::ui::parts::theme::pane_frame(cx.p).show(ui, |ui| {
-        ui.set_min_size(ui.available_size());
-        ScrollArea::vertical().auto_shrink(false).id_salt("train").show(ui, |ui| {
-            choices(cx, ui);
-            plan(cx, ui);
-            start(cx, ui);
-            how_it_goes(cx, ui);
-            if let Some(trained) = cx.state.train.result.clone() {
-                worth(cx, ui, &trained);
-            }
-        });
-    });
+/// What is asked for, and what it would learn from.
+pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
+    form(cx, ui);
+    plan(cx, ui);
 }
 
-fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
-    let before = cx.state.train.form;
+fn form(cx: &mut Cx<'_>, ui: &mut Ui) {
+    let before = cx.state.learn.form;
     let mut form = before;
     let begins = match recipe::bundle(cx.state, BundleKind::Mask) {
         Ok(bundle) => format!("begins from {}", bundle.name),
@@ -77,12 +61,12 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                trained on";
     ui.checkbox(&mut form.choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
     if form != before {
-        cx.push(TrainCommand::SetForm(form));
+        cx.push(LearnCommand::SetForm(form));
     }
 }
 
 /// For how long.
-fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
+fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut LearnForm) {
     ui.label(caption("Train for", cx.p));
     let tip = "A few steps are timed first; the rates fall toward the end of the time";
     if ui.radio(!form.by_steps, "minutes").on_hover_text(tip).clicked() {
@@ -101,7 +85,7 @@ fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut TrainForm) {
 
 /// Plan of the training.
 fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
-    if cx.state.tasks.of_kind(TaskKind::Train).is_some() {
+    if cx.state.tasks.of_kind(TaskKind::Learn).is_some() {
         return;
     }
     let Some(key) = results::train_plan_key(cx.state) else { return };
@@ -121,8 +105,8 @@ fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
                 if let Some(cure) = nothing.cure
                     && ui.button(cure.name()).on_hover_text("Changes the choice above; nothing starts yet").clicked()
                 {
-                    let form = cx.state.train.form;
-                    cx.push(TrainCommand::SetForm(TrainForm { choice: cure.applied(form.choice), ..form }));
+                    let form = cx.state.learn.form;
+                    cx.push(LearnCommand::SetForm(LearnForm { choice: cure.applied(form.choice), ..form }));
                 }
             }
         }
@@ -135,44 +119,8 @@ fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
 }
 
-fn start(cx: &mut Cx<'_>, ui: &mut Ui) {
-    ui.horizontal_wrapped(|ui| {
-        ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        match cx.state.tasks.of_kind(TaskKind::Train) {
-            Some((_, task)) => cx.under_way(ui, task, &task.progress.text),
-            None => {
-                if let Some(at) = cx.state.train.stopped.clone() {
-                    cx.action_button(ui, Action::StartTraining, "Go on with the training");
-                    ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
-                } else {
-                    cx.action_button(ui, Action::StartTraining, "Start training");
-                }
-                if train::uses_trained(cx.state) {
-                    let tip = "The trained model makes the automatic masks now";
-                    ui.label(RichText::new("in use").color(cx.p.good)).on_hover_text(tip);
-                } else if train::trained(cx.state).is_some() {
-                    cx.action_button(ui, Action::UseTrained, "Use the trained model");
-                }
-            }
-        }
-    });
-}
-
-fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui) {
-    let all = train::curves(cx.state);
-    if all.is_empty() {
-        return;
-    }
-    let of = |unit: &str| all.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
-    let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(110.0, 300.0), 90.0);
-    ui.horizontal_wrapped(|ui| {
-        curves::show(ui, size, "Loss", &of("loss"));
-        curves::show(ui, size, "Dice on pairs left out", &of("Dice"));
-    });
-}
-
 /// Scores of the new model on masks that were not trained on.
-fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
+pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     ui.add_space(6.0);
     ui.label(section("On pairs that were left out", cx.p));
     let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
