@@ -201,9 +201,9 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();
     assert_eq!((straight.steps, straight.curves.len()), (2, 5), "{:?}", straight.curves);
     assert!(straight.warnings.iter().any(|w| w.contains("2 steps of tuning are few")), "{:?}", straight.warnings);
-    // Stopped in the first part, in the second, and in the run on all.
+    // Stopped in the first part and in the run on all.
     let kept = dir.path().join("unfinished");
-    for stop_at in [1, 3, 5] {
+    for stop_at in [1, 5] {
         let cancel = Cancel::default();
         let told = cancel.clone();
         let watch = move |progress: Progress| {

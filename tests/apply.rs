@@ -15,9 +15,7 @@ use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{
-    Answer, Command, LibraryCommand, Pane, PredictCommand, SettingsCommand, TasksCommand, UiRequest, ViewCommand,
-};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, PredictCommand, TasksCommand, ViewCommand};
 use touch2touch::app::jobs::Lane;
 use touch2touch::app::keys::{ImprintSource, ShiftMode};
 use touch2touch::app::library::{Place, Sort};
@@ -163,23 +161,6 @@ fn jobs_stop_when_told() {
 }
 
 #[test]
-fn progress_is_the_latest() {
-    let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Predicted]));
-    bench.settle();
-    bench.send(PredictCommand::Generate);
-    let (ticket, _) = bench.state.tasks.running.iter().next().unwrap();
-    let ticket = *ticket;
-    bench.send(Answer::Progressed(
-        ticket,
-        touch2touch_pipeline::job::Progress { done: 3, total: 4, ..Default::default() },
-    ));
-    assert_eq!(bench.state.tasks.running[&ticket].progress.fraction(), Some(0.75));
-    bench.settle();
-    assert!(bench.state.tasks.running.is_empty());
-}
-
-#[test]
 fn a_failure_is_said_once_and_not_tried_again_by_itself() {
     let mut bench = Bench::open();
     bench.services.source.fail(1);
@@ -291,30 +272,4 @@ fn preferences_are_kept_in_range_and_saved() {
     assert_eq!(bench.state.settings.range, range);
     bench.settle();
     assert_eq!(bench.services.settings_saved(), saved + 1, "changes that wait for the disk become one");
-}
-
-#[test]
-fn the_color_range_stays_until_it_is_told_otherwise() {
-    let mut bench = Bench::open();
-    bench.send(panes(&[Pane::Measured]));
-    bench.settle();
-    let range = bench.state.settings.range;
-    bench.send(LibraryCommand::Step(3));
-    bench.settle();
-    assert_eq!(bench.state.settings.range, range);
-    bench.send(SettingsCommand::RangeFromShown);
-    assert_ne!(bench.state.settings.range, range);
-    let fitted = bench.state.settings.range;
-    bench.send(prefer(move |s| s.range = touch2touch::app::settings::ColorRange { locked: false, ..fitted }));
-    bench.send(LibraryCommand::Step(1));
-    bench.settle();
-    assert_ne!(bench.state.settings.range.max_m, fitted.max_m, "unlocked, it follows the pair");
-}
-
-#[test]
-fn what_only_the_window_can_do_is_handed_out_once() {
-    let mut bench = Bench::open();
-    let mut out = bench.runtime.tick(&mut bench.state, vec![Command::View(ViewCommand::Ui(UiRequest::Fit))]);
-    assert_eq!(out.pop(), Some(UiRequest::Fit));
-    assert!(bench.runtime.tick(&mut bench.state, Vec::new()).is_empty());
 }

@@ -20,8 +20,6 @@ use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_pipeline::job::{Cancel, JobCx, Progress};
 use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
 
-use crate::support::run;
-
 /// A data set of four grasps whose masks Anna painted, each with some ignored pixels and one without contact; the last pair
 /// is in progress, the others are done.
 fn painted(root: &Path) -> Dataset {
@@ -130,37 +128,6 @@ fn every_form_comes_back_the_same_into_an_empty_folder_of_labels() {
         let found = import(&dataset, &from(&part));
         assert!(found.same > 0 && found.same < 8 && found.complete, "{format:?}: {found:?}");
     }
-}
-
-/// Rule 12 of those distilled from complaints. The rules are those of the lab's loader, spelled out here once more: every file
-/// of `imgs` has exactly one of its stem in `masks`, `stem.*` finds no second one, both are 8-bit gray and of one size, masks
-/// have at most the values 0 and 255, and no part that the trainer opens is empty.
-#[test]
-fn rule_12_an_exported_training_folder_passes_the_loaders_rules_with_no_edits() {
-    let dir = tempfile::tempdir().unwrap();
-    let dataset = painted(&dir.path().join("set"));
-    let folder = dir.path().join("unet");
-    export(&dataset, &folder, Format::Unet);
-    let names = |folder: PathBuf| -> Vec<String> {
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
-    };
-    let mut pictures = 0;
-    for part in PARTS {
-        let (imgs, masks) = (names(folder.join(part).join("imgs")), names(folder.join(part).join("masks")));
-        assert!(imgs.len() == masks.len() && !imgs.is_empty(), "{part}: {imgs:?} {masks:?}");
-        for name in imgs {
-            let (stem, ending) = name.rsplit_once('.').unwrap();
-            assert!(ending == "png" && !stem.contains(['.', '*', '?', '[', ']']), "{name}");
-            let of_stem: Vec<&String> = masks.iter().filter(|m| m.starts_with(&format!("{stem}."))).collect();
-            assert_eq!(of_stem.len(), 1, "{name}");
-            let read = |kind: &str, name: &str| images::read_gray8(&folder.join(part).join(kind).join(name)).unwrap();
-            let (image, mask) = (read("imgs", &name), read("masks", of_stem[0]));
-            assert_eq!((image.size(), mask.size()), ([175, 140], [175, 140]));
-            assert!(mask.as_slice().iter().all(|v| [0, 255].contains(v)), "{name}");
-            pictures += 1;
-        }
-    }
-    assert_eq!(pictures, 8);
 }
 
 #[test]
@@ -287,32 +254,4 @@ fn an_import_stops_between_pairs_and_keeps_what_was_done() {
     // Before the first it is an error.
     let cx = JobCx::new(cancel, Arc::new(|_| {}));
     assert!(import_masks(&dataset, &from(&folder), &cx).unwrap_err().is_cancelled());
-}
-
-#[test]
-fn the_verb_says_what_it_would_do_and_does_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    let dataset = painted(&set);
-    let folder = dir.path().join("png");
-    let [set, out] = [&set, &folder].map(|path| path.to_str().unwrap());
-    let verb = |args: &[&str]| {
-        let done = run(args, dir.path());
-        let (said, error) = (String::from_utf8(done.stdout).unwrap(), String::from_utf8(done.stderr).unwrap());
-        (done.status.code(), said, error)
-    };
-    let export = ["masks", "export", set, "--out", out, "--format", "png", "--pairs", "begun", "--json"];
-    let (code, said, error) = verb(&export);
-    assert!(code == Some(0) && said.contains("\"format\":\"png\""), "{said} {error}");
-    let before = all(&dataset);
-    forget(&dataset);
-    let (code, said, error) = verb(&["masks", "import", set, "--from", out, "--dry-run"]);
-    assert!(code == Some(0) && said.contains("8 masks new") && said.contains("--dry-run"), "{said} {error}");
-    assert!(all(&dataset).is_empty());
-    let (code, said, error) = verb(&["masks", "import", set, "--from", out, "--person", "Ben"]);
-    assert!(code == Some(0) && said.contains("8 masks new") && error.contains("8 masks new"), "{said} {error}");
-    let after = all(&dataset);
-    assert!(before.iter().all(|(of, hand)| hand.mask == after[of].mask));
-    let (code, _, error) = verb(&["masks", "import", set, "--from", out, "--format", "unet"]);
-    assert!(code != Some(0) && error.contains("no masks in the form"), "{error}");
 }

@@ -4,7 +4,7 @@
 //! the file. The work is done by a child (this test binary again) under a memory limit, so that what would end a process
 //! ends that one; the input it was at is kept under `target/tmp`.
 //!
-//! * `FUZZ_SECONDS`: how long (30 if unset). Hours are fine.
+//! * `FUZZ_SECONDS`: how long (10 if unset). Hours are fine.
 //! * `FUZZ_SEED`: another sequence of mutations (1 if unset).
 //! * `FUZZ_ONLY`: the name of one reader.
 #![allow(clippy::print_stdout, reason = "what was tried belongs in the log of the tests")]
@@ -73,7 +73,7 @@ fn parent() {
         .stdout(std::fs::File::create(folder.join("stdout")).unwrap())
         .spawn();
     let mut child = child.unwrap();
-    let deadline = Instant::now() + Duration::from_secs(number("FUZZ_SECONDS").unwrap_or(30)) + 10 * LONGEST;
+    let deadline = Instant::now() + Duration::from_secs(number("FUZZ_SECONDS").unwrap_or(10)) + 10 * LONGEST;
     let status = loop {
         match child.try_wait().unwrap() {
             Some(status) => break Some(status),
@@ -126,7 +126,7 @@ fn child(folder: &Path) {
             }
         }
     }
-    let end = Instant::now() + Duration::from_secs(asked.unwrap_or(30));
+    let end = Instant::now() + Duration::from_secs(asked.unwrap_or(10));
     'all: for round in 0..if asked.is_some() { u64::MAX } else { MOST } {
         for (number, (target, tally)) in targets.iter().zip(&mut tallies).enumerate() {
             if Instant::now() > end {

@@ -12,14 +12,13 @@ use touch2touch::gpu::context::COLOR_FORMAT;
 use touch2touch::gpu::edges::EdgeStyle;
 use touch2touch::gpu::lines::{LinesItem, LinesStyle, Segment};
 use touch2touch::gpu::mesh::{self, Look, MeshItem, MeshStyle, Shading};
-use touch2touch::gpu::pick;
 use touch2touch::gpu::pipelines::Pipelines;
 use touch2touch::gpu::points::{CloudItem, CloudStyle, PointColors, PointSize};
 use touch2touch::gpu::scene::{SceneData, SceneRenderer};
 use touch2touch::gpu::sheet::TriangleSheet;
 use touch2touch::gpu::target::{Picture, Target};
 use touch2touch::gpu::view::{Camera, Plane, Preset};
-use touch2touch::gpu::{Gpu, GpuError, guides, shaders, wgpu};
+use touch2touch::gpu::{Gpu, GpuError, guides, wgpu};
 use touch2touch_core::colormap::{ColorMap, Range};
 use touch2touch_core::mesh::TriMesh;
 
@@ -135,51 +134,6 @@ fn a_point_appears_at_its_pixel_in_its_color_and_size() {
 }
 
 #[test]
-fn one_sample_per_pixel_shows_the_same_point() {
-    let Some(mut gpu) = support::gpu() else { return };
-    gpu.samples = 1;
-    let mut view = View::on(gpu);
-    let p = DVec3::new(0.004, 0.003, 0.002);
-    let picture =
-        view.picture(&SceneData { clouds: vec![cloud(&[p], &[[10, 200, 90]], PointSize::Px(9.0))], ..scene() });
-    let [x, y] = view.pixel(p);
-    assert_eq!(picture.rgb(x, y), Some([10, 200, 90]));
-    // Nothing but the two colors: 63.6 px of disc, 28 px of rim that may fall to either side.
-    let ink = inked(&picture);
-    assert!(ink.iter().all(|[x, y]| picture.rgb(*x, *y) == Some([10, 200, 90])));
-    assert!((52..=76).contains(&ink.len()), "{}", ink.len());
-}
-
-#[test]
-fn size_in_meters_shrinks_with_distance() {
-    let Some(mut view) = View::new() else { return };
-    let scene = SceneData { clouds: vec![cloud(&[DVec3::ZERO], &[[255; 3]], PointSize::Meters(0.01))], ..scene() };
-    for distance in [0.1, 0.2] {
-        view.camera.distance = distance;
-        let diameter = 0.01 * view.camera.px_per_m(SIZE);
-        let want = std::f64::consts::FRAC_PI_4 * diameter * diameter;
-        let got = inked(&view.picture(&scene)).len() as f64;
-        // Half a pixel of rim all around.
-        assert!((got - want).abs() < 2.0 * diameter + 4.0, "{got} for {want}");
-    }
-}
-
-#[test]
-fn the_near_disc_hides_the_far_one_in_either_order() {
-    let Some(mut view) = View::new() else { return };
-    let back = view.camera.axes()[2];
-    let (near, far) = (back * 0.01, back * -0.01);
-    for (revision, order) in [[near, far], [far, near]].into_iter().enumerate() {
-        let colors = order.map(|p| if p == near { [0, 255, 0] } else { [255, 0, 0] });
-        let mut item = cloud(&order, &colors, PointSize::Px(11.0));
-        item.revision = revision as u64;
-        let picture = view.picture(&SceneData { clouds: vec![item], ..scene() });
-        let [x, y] = view.pixel(near);
-        assert_eq!(picture.rgb(x, y), Some([0, 255, 0]));
-    }
-}
-
-#[test]
 fn a_solid_mesh_hides_what_is_behind_and_an_xray_does_not() {
     let Some(mut view) = View::new() else { return };
     let back = view.camera.axes()[2];
@@ -204,23 +158,6 @@ fn a_solid_mesh_hides_what_is_behind_and_an_xray_does_not() {
     // Moved away by its pose alone.
     let moved = MeshStyle { world_from_mesh: DAffine3::from_translation(back * -0.05), ..style };
     assert_eq!(look(&mut view, &behind, 5, MeshItem { style: moved, ..wall }), [255, 0, 0]);
-}
-
-#[test]
-fn faces_that_turn_away_are_darker() {
-    let Some(mut view) = View::new() else { return };
-    let [right, _, back] = view.camera.axes();
-    let mut bright = |normal: DVec3, revision| {
-        let style = MeshStyle { color: [0.8; 3], ..MeshStyle::default() };
-        let item = MeshItem { revision, ..mesh_item(square(DVec3::ZERO, normal, 0.02), style) };
-        let [x, y] = view.pixel(DVec3::ZERO);
-        view.picture(&SceneData { meshes: vec![item], ..scene() }).rgb(x, y).unwrap()[0]
-    };
-    let facing = bright(back, 1);
-    let away = bright(-back, 2);
-    let oblique = bright((back + right * 1.5).normalize(), 3);
-    assert_eq!(facing, away, "both sides are lit alike");
-    assert!(facing > oblique + 20, "{facing} {oblique}");
 }
 
 #[test]
@@ -271,28 +208,6 @@ fn grid_axes_and_scale_bar_are_where_they_belong() {
     scene.lines[1].style.overlay = true;
     view.renderer.render(&view.gpu, &scene, &view.camera, &view.target).unwrap();
     assert_eq!(at(&view.target.read(&view.gpu).unwrap(), x_axis), [226, 88, 80]);
-}
-
-#[test]
-fn a_line_that_passes_the_eye_is_cut_not_lost() {
-    let Some(mut view) = View::new() else { return };
-    let [_, up, back] = view.camera.axes();
-    // From the middle of the picture past the eye, a little below it.
-    let ends = [DVec3::ZERO, back * 0.5 - up * 0.02];
-    let item = LinesItem {
-        name: "line".into(),
-        revision: 0,
-        segments: vec![
-            Segment { ends, rgba: [255, 255, 0, 255] },
-            Segment { ends: [DVec3::NAN, DVec3::ZERO], rgba: [255; 4] },
-        ]
-        .into(),
-        style: LinesStyle { width_px: 3.0, ..LinesStyle::default() },
-    };
-    let picture = view.picture(&SceneData { lines: vec![item], ..scene() });
-    let column: Vec<bool> = (0..SIZE[1]).map(|y| picture.rgb(SIZE[0] / 2, y) != Some(BACKGROUND)).collect();
-    assert!(column[122..].iter().all(|on| *on), "from the middle to the lower edge");
-    assert!(!column[..117].iter().any(|on| *on), "nothing above the middle");
 }
 
 #[test]
@@ -383,50 +298,6 @@ fn an_unchanged_scene_costs_nothing_and_each_change_costs_what_it_must() {
 }
 
 #[test]
-fn moving_thins_the_points_and_standing_shows_all() {
-    let Some(mut view) = View::new() else { return };
-    view.camera.look_from(Preset::Front);
-    view.renderer.moving_points = 100;
-    let points: Vec<DVec3> =
-        (0..400).map(|i| DVec3::new(f64::from(i % 20 - 10), 0.0, f64::from(i / 20 - 10)) * 0.003).collect();
-    let item = cloud(&points, &vec![[255; 3]; 400], PointSize::Px(3.0));
-    let mut data = SceneData { clouds: vec![item], moving: true, ..scene() };
-    let shown = |view: &mut View, data: &SceneData| -> Vec<usize> {
-        let picture = view.picture(data);
-        let on = |p: DVec3| {
-            let [x, y] = view.pixel(p);
-            picture.rgb(x, y) == Some([255; 3])
-        };
-        (0..400).filter(|i| on(points[*i])).collect()
-    };
-    assert_eq!(shown(&mut view, &data), (0..400).step_by(4).collect::<Vec<_>>());
-    data.moving = false;
-    assert_eq!(shown(&mut view, &data).len(), 400);
-    assert_eq!(view.renderer.counters().uploads, 1);
-}
-
-#[test]
-fn the_selected_point_is_marked_even_when_thinned_away() {
-    let Some(mut view) = View::new() else { return };
-    view.camera.look_from(Preset::Front);
-    view.renderer.moving_points = 1;
-    let points = [DVec3::new(0.0, 0.0, -0.01), DVec3::new(0.0, 0.0, 0.01)];
-    let mut item = cloud(&points, &[[255, 0, 0]; 2], PointSize::Px(5.0));
-    item.style.selected = Some(1);
-    item.style.highlight = [0.0, 1.0, 0.0];
-    let mut data = SceneData { clouds: vec![item], moving: true, ..scene() };
-    let picture = view.picture(&data);
-    let [x, y] = view.pixel(points[1]);
-    assert_eq!(picture.rgb(x, y), Some([0, 255, 0]));
-    let (px, _) = view.camera.project(points[1], SIZE).unwrap();
-    let hit = pick::nearest_point(&points, &DAffine3::IDENTITY, &view.camera, SIZE, px + 1.0, 5.0).unwrap();
-    assert_eq!(hit.index, 1);
-    data.clouds[0].style.selected = Some(99);
-    let picture = view.picture(&data);
-    assert_eq!(picture.rgb(x, y), Some(BACKGROUND), "an index that does not exist marks nothing");
-}
-
-#[test]
 fn empty_and_impossible_input_is_a_picture_or_an_error_not_a_panic() {
     let Some(mut view) = View::new() else { return };
     let nothing = cloud(&[], &[], PointSize::Px(f32::NAN));
@@ -458,23 +329,6 @@ fn a_device_without_storage_buffers_paints_the_window_and_says_what_the_3d_views
     let why = Pipelines::new(&gpu).unwrap_err();
     assert!(matches!(&why, GpuError::NoStorage { .. }), "{why}");
     assert!(why.to_string().contains("mesa-vulkan-drivers"), "{why}");
-}
-
-#[test]
-fn a_refused_call_is_a_value() {
-    let Some(gpu) = support::gpu() else { return };
-    let result = gpu.guarded("making a buffer that cannot be", || {
-        Ok(gpu.device.create_buffer(&touch2touch::gpu::wgpu::BufferDescriptor {
-            label: Some("test"),
-            size: 3,
-            usage: touch2touch::gpu::wgpu::BufferUsages::empty(),
-            mapped_at_creation: true,
-        }))
-    });
-    let error = result.unwrap_err();
-    assert!(matches!(&error, GpuError::Device { what, .. } if what.contains("cannot be")), "{error}");
-    let error = shaders::compile(&gpu, "nowhere.wgsl").unwrap_err();
-    assert_eq!(error.to_string(), "shader nowhere.wgsl is not there");
 }
 
 /// A sphere around the origin; its corners are shared.
@@ -538,54 +392,6 @@ fn a_sphere_is_shaded_as_the_light_says() {
             }
         }
         assert!(brightest.1 < 0.0, "the key light comes from the left");
-    }
-}
-
-#[test]
-fn depth_shading_darkens_below_a_step_and_nothing_else() {
-    let Some(mut view) = View::new() else { return };
-    for orthographic in [true, false] {
-        view.camera = Camera { orthographic, ..Camera::default() };
-        let [right, _, back] = view.camera.axes();
-        let style = MeshStyle { color: [0.8; 3], ..MeshStyle::default() };
-        // A wall, and a smaller plate 4 mm in front of it.
-        let wall = MeshItem { name: "wall".into(), ..mesh_item(square(DVec3::ZERO, back, 0.03), style) };
-        let plate = MeshItem { name: "plate".into(), ..mesh_item(square(back * 0.004, back, 0.01), style) };
-        let mut picture = |eye_dome: bool| {
-            view.picture(&SceneData { meshes: vec![wall.clone(), plate.clone()], eye_dome, ..scene() })
-        };
-        let (plain, shaded) = (picture(false), picture(true));
-        let (_, u) = back.any_orthonormal_pair();
-        // Away from the plate's corner along its own edge.
-        let (v, _) = back.any_orthonormal_pair();
-        let edge = back * 0.004 + v * 0.01;
-        let [x, y] = view.pixel(edge);
-        let outward = {
-            let (a, _) = view.camera.project(edge, SIZE).unwrap();
-            let (b, _) = view.camera.project(edge + v * 0.001, SIZE).unwrap();
-            (b - a).normalize()
-        };
-        let beside =
-            |by: f64| [(f64::from(x) + 0.5 + outward.x * by) as u32, (f64::from(y) + 0.5 + outward.y * by) as u32];
-        let value = |picture: &Picture, [x, y]: [u32; 2]| i32::from(picture.rgb(x, y).unwrap()[0]);
-        // The first pixels of the wall beyond the plate's edge; which they are depends on where the edge falls.
-        let darker = [0.5, 1.0, 1.5, 2.0].map(|by| value(&plain, beside(by)) - value(&shaded, beside(by)));
-        assert!(darker.iter().any(|by| *by > 25), "{darker:?}");
-        let far = beside(36.0);
-        assert_eq!(value(&shaded, far), value(&plain, far), "the wall away from the step");
-        // Between the two it is a hollow, which is darker, and not looked for while the camera moves.
-        let hollow = beside(8.0);
-        assert!(value(&shaded, hollow) < value(&plain, hollow) - 4, "{hollow:?}");
-        let moving = view.picture(&SceneData {
-            meshes: vec![wall.clone(), plate.clone()],
-            eye_dome: true,
-            moving: true,
-            ..scene()
-        });
-        assert_eq!(value(&moving, hollow), value(&plain, hollow));
-        let middle = view.pixel(back * 0.004 + (right + u) * 0.001);
-        assert_eq!(value(&shaded, middle), value(&plain, middle), "the plate");
-        assert_eq!(shaded.rgb(1, 1), Some(BACKGROUND));
     }
 }
 

@@ -56,7 +56,7 @@ use touch2touch_pipeline::steps::prediction::Prediction;
 /// What the child plays: `FOLDER` and the script's seed.
 const ROLE: &str = "TOUCH2TOUCH_KILL_TEST";
 /// Kills of one run of the test; the next number of rounds in one folder.
-const KILLS: usize = 200;
+const KILLS: usize = 80;
 const ROUNDS: usize = 10;
 const PAIRS: u32 = 3;
 /// Acts of a script: more than fit in before the latest kill.

@@ -4,7 +4,6 @@ use std::path::Path;
 use std::process::Output;
 
 use serde_json::Value;
-use touch2touch_pipeline::infer::engine::{EngineChoice, EngineKind};
 
 use crate::support::{self, command};
 
@@ -90,19 +89,4 @@ fn where_a_provider_computes_otherwise_the_processor_goes_on_and_says_so() {
     assert_eq!(json(&checked)["engines"], serde_json::json!(["rten", "ort", "openvino"]));
     let refused = run(&["bundle", "check", &rounding, "--json"], &library, home.path());
     assert_eq!(json(&refused)["engines"], serde_json::json!(["rten", "ort"]));
-}
-
-#[test]
-fn an_engine_has_one_name_in_files_words_and_reports() {
-    for choice in EngineChoice::all() {
-        assert_eq!(serde_json::to_value(choice).unwrap(), choice.key());
-        assert_eq!(serde_json::from_value::<EngineChoice>(choice.key().into()).unwrap(), choice);
-        assert_eq!(choice.key().parse(), Ok(choice));
-        if let Ok(kind) = serde_json::from_value::<EngineKind>(choice.key().into()) {
-            assert_eq!((EngineChoice::from(kind), serde_json::to_value(kind).unwrap()), (choice, choice.key().into()));
-        } else {
-            assert_eq!(choice, EngineChoice::Auto, "all else is an engine");
-        }
-    }
-    assert!("gpu".parse::<EngineChoice>().unwrap_err().contains("openvino"));
 }

@@ -1,4 +1,4 @@
-//! The rules that people's complaints about other tools taught: where each is tried, and the trials that fit nowhere else.
+//! Labels by whatever way their data set is opened.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -11,63 +11,6 @@ use touch2touch_core::sim;
 use touch2touch_pipeline::io::dataset::Dataset;
 use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 use touch2touch_pipeline::labels::{DrawnMask, Labels, MaskPlace, Operation, PairLabels, Review};
-
-use super::support::rust_files;
-
-/// Each rule with the tests that try it.
-const RULES: [(u32, &str, &[&str]); 7] = [
-    (
-        1,
-        "A process killed at any moment of a stroke loses at most that stroke, and every file parses",
-        &["a_kill_in_mid_stroke_loses_at_most_that_stroke", "no_confirmed_stroke_is_lost_to_a_kill"],
-    ),
-    (
-        2,
-        "A label file that cannot be read blocks its pair and is never replaced",
-        &["a_damaged_file_blocks_its_pair_and_is_kept", "labels_that_cannot_be_read_are_never_written"],
-    ),
-    (
-        3,
-        "Undo changes the file too, and touches nothing that is not on screen",
-        &["what_is_saved_is_loaded_and_undo_changes_the_file", "undo_and_redo_follow_what_is_on_screen"],
-    ),
-    (
-        4,
-        "Opening in any order, twice, from another folder drops and doubles no label",
-        &["labels_are_the_same_by_whatever_way_the_data_set_is_opened"],
-    ),
-    (
-        5,
-        "Paging shows no blank frame and keeps its budget; what a stroke costs is in the benchmarks",
-        &["paging_shows_no_blank_frame_and_keeps_its_budget"],
-    ),
-    (6, "Colors do not change from pair to pair unless a person changes the range", &["colors_stay_from_pair_to_pair"]),
-    (
-        12,
-        "An exported folder is what the loader takes, without a change by hand",
-        &[
-            "rule_12_an_exported_training_folder_passes_the_loaders_rules_with_no_edits",
-            "the_folder_is_what_the_loader_accepts",
-            "the_check_finds_what_the_loader_would_trip_over",
-        ],
-    ),
-];
-
-#[test]
-fn each_rule_has_its_tests() {
-    let mut files = Vec::new();
-    for folder in ["src", "crates", "tests"] {
-        rust_files(&Path::new(env!("CARGO_MANIFEST_DIR")).join(folder), &mut files);
-    }
-    let sources: Vec<String> = files.iter().map(|file| std::fs::read_to_string(file).unwrap()).collect();
-    for (number, rule, tests) in RULES {
-        assert!(!tests.is_empty());
-        for test in tests {
-            let found = sources.iter().any(|text| text.contains(&format!("#[test]\nfn {test}()")));
-            assert!(found, "rule {number} ({rule}) names the test {test}, which is not there");
-        }
-    }
-}
 
 fn mask(at: usize) -> Mask {
     Mask::from_fn(175, 140, |u, v| (u + 3 * at) % 11 < 4 && v > 20 + at)

@@ -9,7 +9,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::mesh::distance::MeshDistance;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_core::sample::{ColorTouch, DepthTouch, Sample};
-use touch2touch_core::sim::{self, Grasp, Sensors, SimConfig};
+use touch2touch_core::sim::{self, Grasp, SimConfig};
 
 use crate::support::shared;
 
@@ -79,38 +79,6 @@ fn the_same_seed_gives_the_same_sample_in_any_thread() {
     assert!(!same_bits(&here, &make(6)));
     assert_eq!(SimConfig::randomised(3), SimConfig::randomised(3));
     assert_ne!(SimConfig::randomised(3), SimConfig::randomised(4));
-}
-
-#[test]
-fn other_gelslims_differ_in_color_and_dots_and_in_nothing_else() {
-    let (nominal, drawn) = (SimConfig::default(), Sensors::Drawn(5).config());
-    assert_eq!((Sensors::Nominal.config(), &drawn), (nominal.clone(), &SimConfig::randomised(5)));
-    let other = Sensors::OtherGelslims(5).config();
-    assert_eq!(other.bubble, nominal.bubble);
-    let (of, by) = (&other.gelslim, &drawn.gelslim);
-    assert_eq!(
-        (of.indentation_m, of.noise, of.decay_m),
-        (nominal.gelslim.indentation_m, nominal.gelslim.noise, nominal.gelslim.decay_m)
-    );
-    for c in 0..3 {
-        let (base, far) = (nominal.gelslim.base[c], by.base[c]);
-        assert!((of.base[c] - base - 2.0 * (far - base)).abs() < 1e-9 && of.base[c] != base);
-    }
-    assert!((1..200).all(|seed| {
-        let gel = Sensors::OtherGelslims(seed).config().gelslim;
-        gel.base.iter().chain(&gel.led_gain).all(|v| *v > 0.0) && 2.0 * gel.marker_radius_m < gel.marker_pitch_m
-    }));
-    // The same grasp: what the bubble feels stays to the last bit.
-    let estimate = |sensors: Sensors| sim::simulate(&catalog::tools()[4], sim::grid_grasp(7), 3, &sensors.config());
-    let (a, b) = (estimate(Sensors::Nominal), estimate(Sensors::OtherGelslims(5)));
-    let pads = |s: &Sample| {
-        (
-            s.pad(lab::RIGHT).unwrap().depth().unwrap().imprint.clone(),
-            s.pad(lab::RIGHT).unwrap().color().unwrap().difference.clone(),
-        )
-    };
-    assert_eq!(pads(&a).0, pads(&b).0);
-    assert_ne!(pads(&a).1, pads(&b).1);
 }
 
 /// The catalog's tools and the lab's published CAD models are the same solids.
@@ -220,38 +188,6 @@ fn gelslim_yz(finger: PadId, column: usize, row: usize) -> DVec2 {
     sim::gelslim_yz(finger, lens.flat(DVec2::new(column as f64, row as f64)))
 }
 
-/// The color streaks appear where the beads are, in both fingers' pictures.
-#[test]
-fn gelslim_streaks_frame_the_beads() {
-    for (tool, sample) in a_few().iter().take(12) {
-        let solid = tool.solid();
-        let object_from_grasp = sample.grasp_from_object.unwrap().inverse();
-        for finger in lab::PADS {
-            let difference = &gelslim_of(sample, finger).difference;
-            let (mut near, mut far) = (Vec::new(), Vec::new());
-            for row in 0..lab::GELSLIM.height {
-                for column in 0..lab::GELSLIM.width {
-                    let yz = gelslim_yz(finger, column, row);
-                    let height = solid.height(object_from_grasp.transform_yz(yz));
-                    let below = height.map_or(f64::INFINITY, |height| tool.half_thickness_m - height);
-                    let [r, g, b] = difference[(column, row)];
-                    let color = (r - g).abs() + (g - b).abs();
-                    // Towards the tip the gel leans away from the tool.
-                    if (4e-4..1e-3).contains(&below) && yz.y < 2e-3 {
-                        near.push(f64::from(color));
-                    } else if below > 3e-3 && yz.y > -2e-3 {
-                        far.push(f64::from(color));
-                    }
-                }
-            }
-            let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
-            if near.len() > 500 && far.len() > 500 {
-                assert!(mean(&near) > 2.5 * mean(&far), "{} {}", tool.name, finger.index());
-            }
-        }
-    }
-}
-
 /// A tool that its half turn about z maps to itself feels the same to both fingers: the images are mirrored
 /// (bubble: about the row direction, apart from the cameras' different offsets).
 #[test]
@@ -288,22 +224,6 @@ fn mirrored() -> SimConfig {
     let mut config = SimConfig::default();
     config.bubble.rim_centers_m = [[0.0, -0.028]; 2];
     config
-}
-
-/// Turning the grasp the other way is mirroring the tool: the simulator prefers no direction.
-#[test]
-fn opposite_angles_are_mirror_images() {
-    let rod = &catalog::tools()[5];
-    let at = |theta: f64| {
-        let grasp = Grasp { theta_rad: theta, x_m: 0.0, y_m: 0.0 };
-        sim::Membrane::press(&mirrored().bubble, rod, grasp.object_from_grasp(), lab::LEFT)
-    };
-    let (plus, minus) = (at(0.3), at(-0.3));
-    for i in 0..400 {
-        let yz = DVec2::new(f64::from(i % 20) - 10.0, f64::from(i / 20) - 10.0) * 0.0025;
-        let (a, b) = (plus.height(yz), minus.height(DVec2::new(-yz.x, yz.y)));
-        assert!((a - b).abs() < 1e-4, "{yz}: {a} {b}");
-    }
 }
 
 struct Moments {

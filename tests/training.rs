@@ -181,7 +181,7 @@ fn a_run_that_is_stopped_leaves_no_bundle_and_goes_on_to_the_same_last_bit() {
 /// costs a label.
 #[test]
 fn a_killed_training_leaves_no_bundle_that_cannot_be_opened() {
-    const KILLS: u32 = 4;
+    const KILLS: u32 = 2;
     let dir = tempfile::tempdir().unwrap();
     let set = dir.path().join("set");
     corrected(&set, 1);

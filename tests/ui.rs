@@ -26,7 +26,6 @@ mod palette;
 mod queue;
 mod results;
 mod scene;
-mod shortcuts;
 mod train;
 mod unit;
 mod unsaved;

@@ -3,7 +3,7 @@
 use touch2touch::app::action::Action;
 use touch2touch::app::command::{Command, LibraryCommand, Pane};
 use touch2touch::app::inspect::InspectCommand;
-use touch2touch::app::keys::{ImprintSource, Registration};
+use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::settings::MaskSource;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::state::Lookup;
@@ -133,35 +133,4 @@ fn a_start_is_a_run_of_its_own_and_the_pair_resets_it() {
     bench.settle();
     assert_eq!(bench.state.inspect.start, None);
     assert!(results::inspected(&bench.state).is_none(), "this pair has no camera");
-}
-
-#[test]
-fn pins_keep_two_steps_also_of_different_registrations() {
-    let mut bench = bench(&[Pane::TimeMachine]);
-    send(&mut bench, InspectCommand::Begin);
-    send(&mut bench, InspectCommand::Pin);
-    bench.send(prefer(|s| s.registration = Registration::LabIcp));
-    bench.settle();
-    assert_eq!(results::inspection(&bench.state).ready().unwrap().num_runs(), 1);
-    send(&mut bench, InspectCommand::End);
-    send(&mut bench, InspectCommand::Pin);
-    let [Some(a), Some(b)] = bench.state.inspect.pins_of(bench.state.pair_key()) else {
-        panic!("{:?}", bench.state.inspect.pins_of(bench.state.pair_key()))
-    };
-    assert_eq!((a.registration, b.registration), (Registration::default(), Registration::LabIcp));
-    assert_ne!(a.grasp_from_object, b.grasp_from_object);
-    // A third takes the place of the older one.
-    send(&mut bench, InspectCommand::Begin);
-    send(&mut bench, InspectCommand::Pin);
-    assert_eq!(bench.state.inspect.pins_of(bench.state.pair_key())[0], Some(b));
-    send(&mut bench, InspectCommand::Unpin(0));
-    send(&mut bench, InspectCommand::Unpin(7));
-    assert!(
-        bench.state.inspect.pins_of(bench.state.pair_key())[0].is_none()
-            && bench.state.inspect.pins_of(bench.state.pair_key())[1].is_some()
-    );
-    bench.send(LibraryCommand::Select(PairId(0)));
-    assert_eq!(bench.state.inspect.pins_of(bench.state.pair_key()), [None, None], "they belong to their pair");
-    bench.send(LibraryCommand::Select(SIMULATED));
-    assert!(bench.state.inspect.pins_of(bench.state.pair_key())[1].is_some());
 }

@@ -106,18 +106,6 @@ fn a_stroke_that_touches_nothing_leaves_nothing() {
 }
 
 #[test]
-fn escape_gives_a_stroke_up() {
-    let mut bench = bench();
-    let before = mask(&bench, lab::RIGHT);
-    begin(&mut bench, lab::RIGHT, [12.0, 2.0]);
-    assert_ne!(mask(&bench, lab::RIGHT), before);
-    let cancel = Action::CancelJobs.command(&bench.state).unwrap();
-    bench.send(cancel);
-    assert_eq!(mask(&bench, lab::RIGHT), before);
-    assert!(bench.state.document.stroke.is_none());
-}
-
-#[test]
 fn a_note_typed_during_a_stroke_is_written_without_the_stroke() {
     let mut bench = bench();
     let name = "tool_a/data_0".to_owned();
@@ -294,17 +282,6 @@ fn done_goes_to_the_next_unfinished_and_survives_reopening() {
 }
 
 #[test]
-fn opening_again_brings_the_masks_back() {
-    let mut bench = bench();
-    stroke(&mut bench, lab::RIGHT, [20.0, 1.0], [21.0, 1.0]);
-    let drawn = mask(&bench, lab::RIGHT);
-    bench.send(LibraryCommand::Reload);
-    bench.settle();
-    assert_eq!(mask(&bench, lab::RIGHT), drawn);
-    assert!(Action::Undo.command(&bench.state).is_none(), "what was undone before is not on the list any more");
-}
-
-#[test]
 fn a_mask_belongs_to_one_imprint() {
     let mut bench = Bench::open();
     bench.send(panes(&[Pane::Measured, Pane::Predicted, Pane::Masks]));
@@ -423,23 +400,4 @@ fn a_polygon_counts_once_it_is_closed() {
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
     assert_eq!((saved.review, saved.masks.values().any(|hand| *hand.mask == drawn)), (Review::Done, true));
-}
-
-#[test]
-fn a_change_of_labels_says_itself_where_no_mask_tool_is_on_screen() {
-    let mut bench = bench();
-    bench.send(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
-    bench.settle();
-    let said = |bench: &Bench| bench.state.log.entries.iter().filter(|e| e.changed.is_some()).count();
-    bench.send(LabelsCommand::AdoptAutomatic);
-    assert_eq!(said(&bench), 0, "the mask is there to be seen");
-    bench.send(panes(&[Pane::Measured]));
-    bench.send(LabelsCommand::SetNote("tool_a/data_0".into(), "typed".into()));
-    assert_eq!(said(&bench), 0, "so is what is typed");
-    bench.send(LabelsCommand::SetReview(Review::Flagged));
-    let last = bench.state.log.entries.back().unwrap().clone();
-    assert_eq!(last.changed.as_deref(), Some("tool_a/data_0"));
-    assert!(last.text.starts_with("The labels of tool_a/data_0 were changed: "), "{}", last.text);
-    bench.send(LabelsCommand::SetReview(Review::Flagged));
-    assert_eq!(said(&bench), 1, "what changes nothing says nothing");
 }

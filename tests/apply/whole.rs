@@ -12,9 +12,8 @@ use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{ColorRange, MaskSource, MaskTool};
 use touch2touch::app::state::results::Request;
 use touch2touch::app::state::{Absent, Lookup, State};
-use touch2touch::app::tasks::Entry;
 use touch2touch::app::{demand, results};
-use touch2touch_core::dataset::{PairId, Problem};
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::rig::lab;
 
 use super::double::{Bench, Double, SIMULATED};
@@ -137,23 +136,6 @@ fn where_the_mask_model_finds_nothing_depth_decides_and_label_and_log_say_so() {
     bench.settle();
     assert_eq!(results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap().label, "Threshold 5.00 mm");
     assert_eq!(said(&bench), 1);
-}
-
-#[test]
-fn what_is_odd_about_a_pair_is_logged_once_when_it_is_looked_at() {
-    let mut bench = Bench::open();
-    let note = Problem { file: "x.pt".into(), what: "the K is implausible".into(), hint: "check it".into() };
-    bench.services.source.notes.lock().unwrap().push(note);
-    bench.send(panes(&[Pane::Measured]));
-    let said = |bench: &Bench| {
-        let odd = |e: &&Entry| e.detail.as_ref().is_some_and(|d| d.contains("implausible") && d.contains("x.pt"));
-        bench.state.log.entries.iter().filter(odd).count()
-    };
-    for (pair, count) in [(9, 1), (10, 2), (9, 2)] {
-        bench.send(LibraryCommand::Select(PairId(pair)));
-        bench.settle();
-        assert_eq!(said(&bench), count, "pair {pair}: {:#?}", bench.state.log.entries);
-    }
 }
 
 #[test]

@@ -68,28 +68,6 @@ fn a_simulation_never_mixes_with_another_dataset_and_says_that_it_was_cut_short(
     assert!(!doctor.contains("was not finished"), "{doctor}");
 }
 
-#[cfg(unix)]
-#[test]
-fn a_killed_simulation_is_seen_by_the_doctor() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    let mut child = Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(["simulate", "--tools", "pattern_36", "--grasps", "2000", "--out", set.to_str().unwrap()])
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
-    let bubbles = set.join("test/test_only/bubbles");
-    while !std::fs::read_dir(&bubbles).is_ok_and(|mut files| files.next().is_some()) {
-        assert!(child.try_wait().unwrap().is_none(), "it ended early");
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let doctor = run(&["doctor", set.to_str().unwrap(), "--json"], dir.path());
-    assert!(json(&doctor).to_string().contains("was not finished"), "{}", error_text(&doctor));
-}
-
 #[cfg(target_os = "linux")]
 #[test]
 fn a_closed_or_full_standard_output_is_no_panic() {
@@ -133,21 +111,6 @@ fn a_closed_or_full_standard_output_is_no_panic() {
 }
 
 #[test]
-fn more_threads_than_a_system_starts_are_not_started() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = dir.path().join("set");
-    assert!(simulate(&set, &["--grasps", "1"]).status.success());
-    let out = Command::new(env!("CARGO_BIN_EXE_touch2touch"))
-        .args(["doctor", set.to_str().unwrap(), "--json"])
-        .env("RAYON_NUM_THREADS", "100000")
-        .env("TOUCH2TOUCH_CACHE", dir.path())
-        .output()
-        .unwrap();
-    assert!(json(&out)["pairs"].as_u64().is_some_and(|pairs| pairs > 0), "{}", error_text(&out));
-    assert!(error_text(&out).contains("256 are used"), "{}", error_text(&out));
-}
-
-#[test]
 fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
     let dir = tempfile::tempdir().unwrap();
     for (words, nearest) in [
@@ -164,47 +127,6 @@ fn a_mistyped_verb_opens_no_window_and_names_the_nearest() {
     }
     let deeper = run(&["masks", "exprt"], dir.path());
     assert!(error_text(&deeper).contains("export"), "{}", error_text(&deeper));
-}
-
-#[test]
-fn every_verb_takes_the_dataset_as_a_path_and_no_number_of_nothing() {
-    let verbs = ["generate", "stats", "evaluate", "pose", "masks export", "doctor", "watch"];
-    for verb in verbs {
-        let needed: &[&str] = match verb {
-            "generate" | "stats" | "masks export" => &["--out", "x"],
-            _ => &[],
-        };
-        let check = |dataset: &[&str]| {
-            let words = ["touch2touch"].into_iter().chain(verb.split(' ')).chain(dataset.iter().copied());
-            touch2touch::headless::check_command(words.chain(needed.iter().copied()))
-        };
-        check(&["demo"]).unwrap_or_else(|err| panic!("{verb}: {err}"));
-        check(&["demo"]).unwrap_or_else(|err| panic!("{verb}: {err}"));
-        assert!(check(&["demo", "demo"]).is_err() && check(&[]).is_err(), "{verb}");
-    }
-    for words in [
-        "generate demo --out x --limit 0",
-        "stats demo --out x --limit 0",
-        "pose demo --limit 0",
-        "masks export demo --out x --limit 0",
-        "simulate --out x --grasps 0",
-        "evaluate demo --grasps 0",
-    ] {
-        let refused = touch2touch::headless::check_command(["touch2touch"].into_iter().chain(words.split(' ')));
-        assert!(refused.is_err_and(|err| err.contains("leaves nothing to do")), "{words}");
-    }
-}
-
-#[test]
-fn what_the_system_says_is_said_once() {
-    let dir = tempfile::tempdir().unwrap();
-    let refused = run(&["doctor", "/no/such/folder"], dir.path());
-    let said = error_text(&refused);
-    assert_eq!(said.matches("os error 2").count(), 1, "{said}");
-    let file = dir.path().join("none.json");
-    let args = ["stats", "demo", "--out", file.to_str().unwrap(), "--shift", "refit:/no/such/file"];
-    let said = error_text(&run(&args, dir.path()));
-    assert!(said.matches("os error 2").count() <= 1, "{said}");
 }
 
 #[test]

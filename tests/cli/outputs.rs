@@ -111,15 +111,3 @@ fn a_killed_run_is_known_by_its_report_and_its_leftovers_go() {
     assert!(again.status.success(), "{}", error_text(&again));
     assert_eq!((&report()["finished"], ending(&out, ".part").len()), (&Value::from(true), 0));
 }
-
-#[test]
-fn watch_gives_look_alikes_files_of_their_own() {
-    let dir = tempfile::tempdir().unwrap();
-    let set = look_alike(dir.path());
-    let out = dir.path().join("out");
-    let args = ["watch", set.to_str().unwrap(), "--out", out.to_str().unwrap(), "--once", "--steps", "1"];
-    let done = run(&args, dir.path());
-    assert!(done.status.success(), "{}", error_text(&done));
-    let pairs: Vec<_> = ending(&out, ".t2t.json").iter().map(|stem| names::pair_of_output(stem).unwrap()).collect();
-    assert_eq!(pairs, ["a__b", "a/b"]);
-}

@@ -261,18 +261,3 @@ fn a_foreign_file_neither_hides_touches_nor_goes_unsaid() {
     );
     watch.stop();
 }
-
-/// A folder that holds the foreign file from the start, before any touch.
-#[test]
-fn a_foreign_file_that_was_there_first_hides_nothing() {
-    let dir = tempfile::tempdir().unwrap();
-    let (_, files) = set(dir.path());
-    let folder = dir.path().join("robot");
-    std::fs::create_dir(&folder).unwrap();
-    std::fs::copy(bubble(&files[0]), folder.join("calibration.pt")).unwrap();
-    std::fs::copy(&files[0], folder.join("grasp_1.pt")).unwrap();
-    let done = run(&["watch", folder.to_str().unwrap(), "--once", "--steps", "1"], dir.path());
-    let text = String::from_utf8_lossy(&done.stdout).into_owned();
-    assert_eq!(done.status.code(), Some(1), "{text}");
-    assert!(text.contains("1 done, 0 skipped, 1 failed") && text.contains("calibration"), "{text}");
-}

@@ -5,28 +5,23 @@ use std::path::{Path, PathBuf};
 use sha2::Digest as _;
 use touch2touch::app::services::Services as _;
 use touch2touch::app::services::live::LiveServices;
-use touch2touch_bench::known::{self, Case, Stratum};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::GenerateConfig;
-use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::label::{self, Marks};
 use touch2touch_core::moments::Moments;
 use touch2touch_core::postprocess::{RawPrediction, ShiftFit};
 use touch2touch_core::rig::lab;
-use touch2touch_core::sample::DepthCamera;
-use touch2touch_core::sensor::Intrinsics;
 use touch2touch_pipeline::infer::bundle::{Bundle, MANIFEST};
 use touch2touch_pipeline::infer::engine::EngineKind;
 use touch2touch_pipeline::infer::kept_key::KeptKey;
 use touch2touch_pipeline::infer::store::Store;
 use touch2touch_pipeline::io::dataset::{Dataset, UNIT_FILE, read_in_meters};
 use touch2touch_pipeline::io::masks::{MaskStore, StoredMask, StoredReview};
-use touch2touch_pipeline::io::pt::Tensor;
 use touch2touch_pipeline::io::statistics::{Provenance, ShiftStatistics};
 use touch2touch_pipeline::io::{images, npz, pt, stl};
 
-use super::seeds::{self, Content, Seed, bad, good, opened, text, written};
+use super::seeds::{self, Content, Seed, bad, good, text, written};
 
 /// A reader.
 pub(super) struct Target {
@@ -86,13 +81,6 @@ pub(super) fn all() -> Vec<Target> {
             seeds::npz(),
             |dir, bytes| put(dir.join("a.npz"), bytes),
             |_, file| npz::read(file).map(drop).map_err(said),
-        ),
-        target(
-            "case",
-            NPZ_MIB,
-            case_seeds(),
-            |dir, bytes| put(dir.join("case_000.npz"), bytes),
-            |_, file| known::read(file).map(drop).map_err(said),
         ),
         target(
             "stl",
@@ -156,40 +144,6 @@ fn read_pair(dir: &Path, file: &Path) -> Outcome {
     dataset.bubble_tile(PairId(0), loaded.sample.laid).map_err(said)?;
     dataset.gelslim_is_clipped(PairId(0)).map_err(said)?;
     Ok(())
-}
-
-fn case_seeds() -> Vec<Seed> {
-    let camera = DepthCamera {
-        depth_reference: Grid::from_fn(6, 4, |x, y| 0.09 + 1e-3 * (x + y) as f32),
-        intrinsics: Intrinsics { fx: 212.0, fy: 211.0, cx: 112.3, cy: 86.1 },
-        crop: lab::BUBBLE.crop,
-        grasp_from_camera: glam::DAffine3::from_translation(glam::DVec3::new(-0.0764, 0.001, -0.0541)),
-    };
-    let mask = Mask::from_fn(6, 4, |x, _| x > 2);
-    let case = Case {
-        predicted: false,
-        imprints: [0.0, 1e-3].map(|depth| Grid::from_fn(6, 4, |x, _| depth * x as f32)),
-        cameras: [camera.clone(), camera],
-        masks: [mask.clone(), mask.clone()],
-        masks_clean: [mask.clone(), mask],
-        grasp_from_object: PlanarPose { theta_rad: 0.2, y_m: 1e-3, z_m: -2e-3 },
-        tool: 7,
-        stratum: Stratum::Hard,
-    };
-    let whole = opened(&written(|file| known::write(file, &case).unwrap()));
-    let mut seeds = vec![good("a case", whole)];
-    let arrays = |name: &str, with: Tensor| {
-        let dir = tempfile::tempdir().unwrap();
-        let file = dir.path().join("case.npz");
-        known::write(&file, &case).unwrap();
-        let mut arrays = npz::read(&file).unwrap();
-        arrays.insert(name.to_owned(), with);
-        let list: Vec<(&str, Tensor)> = arrays.iter().map(|(name, tensor)| (name.as_str(), tensor.clone())).collect();
-        opened(&written(|file| npz::write(file, &list).unwrap()))
-    };
-    seeds.push(bad("tool -1", arrays("tool", Tensor::f64(&[], vec![-1.0])), "whole number"));
-    seeds.push(bad("no pixels", arrays("depth_ref", Tensor::f32(&[2, 0, 5], vec![])), "no pixels"));
-    seeds
 }
 
 fn tetrahedron() -> touch2touch_core::mesh::TriMesh {

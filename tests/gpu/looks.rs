@@ -5,87 +5,9 @@ use touch2touch::gpu::floor::Floor;
 use touch2touch::gpu::view::Part;
 use touch2touch::spatial::still::Stills;
 
-/// Red, green and blue of a picture's pixel.
-fn at(view: &View, picture: &Picture, p: DVec3) -> [u8; 3] {
-    let [x, y] = view.pixel(p);
-    picture.rgb(x, y).unwrap()
-}
-
-#[test]
-fn a_dashed_outline_has_gaps_and_a_whole_one_none() {
-    let Some(mut view) = View::new() else { return };
-    view.camera.orthographic = true;
-    let back = view.camera.axes()[2];
-    let (v, u) = back.any_orthonormal_pair();
-    for (revision, dash_px) in [(1, 0.0), (2, 12.0)] {
-        let edges = EdgeStyle { color: [0.0, 1.0, 0.0], opacity: 1.0, width_px: 3.0, creases: false, dash_px };
-        let style = MeshStyle { look: Look::Outline, edges: Some(edges), ..MeshStyle::default() };
-        let item = MeshItem { revision, ..mesh_item(square(DVec3::ZERO, back, 0.02), style) };
-        let picture = view.picture(&SceneData { meshes: vec![item], ..scene() });
-        // Along one side, without its ends.
-        let greens: Vec<bool> =
-            (-90..=90).map(|i| at(&view, &picture, v * 0.02 + u * (f64::from(i) * 0.0002))[1] > 200).collect();
-        let gaps = greens.windows(2).filter(|two| two[0] && !two[1]).count();
-        let share = greens.iter().filter(|on| **on).count() as f64 / greens.len() as f64;
-        match dash_px == 0.0 {
-            true => assert!(gaps == 0 && share == 1.0, "{gaps} gaps, {share}"),
-            // 36 mm at 2585 px/m are 93 px: gaps every 8 to 17 px, and more line than gap.
-            false => assert!((5..=12).contains(&gaps) && (0.45..0.75).contains(&share), "{gaps} gaps, {share}"),
-        }
-    }
-}
-
-#[test]
-fn a_veil_is_one_layer_and_thin_before_what_is_solid() {
-    let Some(mut view) = View::new() else { return };
-    let [right, _, back] = view.camera.axes();
-    let blue = MeshStyle { color: [0.1, 0.2, 0.9], opacity: 0.5, look: Look::Veil, ..MeshStyle::default() };
-    let red = MeshStyle { color: [0.9, 0.1, 0.1], ..MeshStyle::default() };
-    let veil = |name: &str, off: f64| MeshItem {
-        name: name.into(),
-        ..mesh_item(square(back * off, back, 0.02), MeshStyle { closed: false, ..blue })
-    };
-    let plate = MeshItem { name: "plate".into(), ..mesh_item(square(DVec3::ZERO, back, 0.005), red) };
-    let middle = DVec3::ZERO;
-    let beside = right * 0.011;
-    let mut draw = |meshes: Vec<MeshItem>| {
-        let picture = view.picture(&SceneData { meshes, ..scene() });
-        [middle, beside].map(|p| at(&view, &picture, p))
-    };
-    let [bare, _] = draw(vec![plate.clone()]);
-    let [over, free] = draw(vec![veil("near", 0.01), plate.clone()]);
-    assert!(over[0] > 150 && over[0] < bare[0], "the model's color comes through: {over:?} of {bare:?}");
-    assert!(free[2] > 80 && free[2] > free[0] + 40, "the veil itself: {free:?}");
-    let [two, free_two] = draw(vec![veil("near", 0.01), veil("nearer", 0.012), plate.clone()]);
-    let near = |a: [u8; 3], b: [u8; 3]| a.iter().zip(b).all(|(a, b)| a.abs_diff(b) <= 3);
-    assert!(near(two, over) && near(free_two, free), "a second layer adds nothing: {two:?} {free_two:?}");
-    let [behind, _] = draw(vec![veil("far", -0.01), plate]);
-    assert_eq!(behind, bare, "behind the model it is not seen");
-}
-
 /// A floor 20 mm below the origin.
 fn floor(opacity: f32, shadow: f32) -> Option<Floor> {
     Some(Floor { center: DVec3::new(0.0, 0.0, 0.02), reach_m: 0.08, color: [0.9; 3], opacity, shadow })
-}
-
-#[test]
-fn a_shadow_darkens_the_floor_below_and_is_drawn_again_only_when_something_moves() {
-    let Some(mut view) = View::new() else { return };
-    let ball = mesh_item(sphere(0.008, 24), MeshStyle::default());
-    // Straight down, where the light comes from nearly, and a place at the side of it.
-    let (below, away) = (DVec3::new(0.005, 0.007, 0.02), DVec3::new(-0.03, 0.03, 0.02));
-    let mut picture = |shadow: f32, moved: f64| {
-        let style = MeshStyle { world_from_mesh: DAffine3::from_translation(DVec3::X * moved), ..ball.style };
-        let meshes = vec![MeshItem { style, ..ball.clone() }];
-        let picture = view.picture(&SceneData { meshes, floor: floor(1.0, shadow), ..scene() });
-        [below, away].map(|p| i32::from(at(&view, &picture, p)[0]))
-    };
-    let [plain_below, plain_away] = picture(0.0, 0.0);
-    let [dark, light] = picture(0.6, 0.0);
-    assert!(dark < plain_below - 60, "{dark} of {plain_below}");
-    assert!((light - plain_away).abs() <= 6, "{light} of {plain_away}");
-    let [moved, _] = picture(0.6, -0.05);
-    assert!(moved > dark + 40, "the shadow goes with the ball: {moved} after {dark}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::path::Path;
 use touch2touch_core::grid::{Grid, Mask};
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::io::exchange::{
-    Content, ExportConfig, ExportEntry, ExportError, IGNORED, MANIFEST, PARTS, check_folder, export,
+    Content, ExportConfig, ExportEntry, ExportError, MANIFEST, check_folder, export,
 };
 use touch2touch_pipeline::io::images;
 
@@ -133,27 +133,4 @@ fn the_check_finds_what_the_loader_would_trip_over() {
     {
         assert!(problems.iter().any(|p| p.what.contains(word)), "{word}: {problems:#?}");
     }
-}
-
-#[test]
-fn pixels_of_which_a_mask_says_nothing_lie_beside_it() {
-    let dir = tempfile::tempdir().unwrap();
-    let folder = dir.path().join("out");
-    let some = Mask::from_fn(175, 140, |x, _| x < 9);
-    let load = |i: usize| Ok(Content { ignored: (i == 2).then(|| some.clone()), ..content(i) });
-    let report = export(&folder, &entries(5), &ExportConfig::default(), load).unwrap();
-    assert_eq!(report.ignored_px, 9 * 140);
-    let found: Vec<_> = PARTS
-        .iter()
-        .filter_map(|part| std::fs::read_dir(folder.join(part).join(IGNORED)).ok())
-        .flatten()
-        .map(|entry| entry.unwrap().path())
-        .collect();
-    assert_eq!(found.len(), 1);
-    let read = images::read_gray8(&found[0]).unwrap();
-    assert!(read.map(|v| *v == 255) == some);
-    // The loader's rules still hold, and a second export over the first goes.
-    assert!(check_folder(&folder).problems.is_empty());
-    export(&folder, &entries(5), &ExportConfig::default(), |i| Ok(content(i))).unwrap();
-    assert!(!folder.join("train").join(IGNORED).exists());
 }

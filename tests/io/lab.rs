@@ -4,7 +4,6 @@ use glam::DVec3;
 use touch2touch_core::dataset::{PairId, Split};
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::io::dataset::{Dataset, SourceKind};
-use touch2touch_pipeline::io::{npz, stl};
 
 use crate::support;
 
@@ -132,20 +131,5 @@ fn the_real_pictures_open_without_a_problem() {
     // The released training set's spread on the 0..255 scale.
     for (square, want) in squares.iter().zip([17.5, 10.9, 14.7]) {
         assert!((square.sqrt() / want - 1.0).abs() < 0.05, "{} for {want}", square.sqrt());
-    }
-}
-
-#[test]
-fn the_pose_cases_and_their_meshes_are_read() {
-    let Some(root) = support::shared("pose-cases") else { return };
-    let arrays = npz::read(&root.join("case_000.npz")).unwrap();
-    assert_eq!(arrays["depth_ref"].shape, [2, 140, 175]);
-    assert_eq!(arrays["mask"].shape, [2, 140, 175]);
-    assert_eq!(arrays["T"].shape, [2, 4, 4]);
-    assert_eq!(arrays["theta_deg"].shape.iter().product::<usize>(), 1);
-    for number in 0..12 {
-        let file = stl::read(&root.join(format!("tool_{number:02}.stl"))).unwrap();
-        assert_eq!(file.suggested_scale, None);
-        eprintln!("tool {number}: {} degenerate, closed {}", file.degenerate, file.mesh.is_watertight());
     }
 }

@@ -1,7 +1,7 @@
 //! Corrected masks on disk: nothing is lost, nothing is overwritten blindly.
 
-use std::io::{BufRead as _, BufReader, Write as _};
-use std::process::{Command, Stdio};
+use std::io::Write as _;
+use std::process::Command;
 
 use glam::DVec2;
 use serde_json::Value;
@@ -18,7 +18,6 @@ use touch2touch_pipeline::io::predicted_id::PredictedId;
 
 use super::touch_file;
 
-const STORE_VARIABLE: &str = "TOUCH2TOUCH_TEST_STROKES_INTO";
 const PAIR: &str = "pattern_31_rod/data_0";
 
 fn stored(mask: Mask) -> StoredMask {
@@ -216,67 +215,6 @@ fn masks_lie_beside_the_dataset_or_in_the_users_folder() {
     assert_eq!(store.folder(), missing.join(FOLDER));
     assert!(store.load(PAIR, lab::LEFT).unwrap().is_some());
     assert!(matches!(MaskStore::choose(Some(&dir.path().join("no")), None), Err(StoreError::NoFolder { .. })));
-}
-
-/// Runs only inside the process that [`a_kill_in_mid_stroke_loses_at_most_that_stroke`] starts: paints and saves
-/// until it is killed.
-#[test]
-#[ignore = "played by a process that another test starts and kills"]
-fn child_that_paints() {
-    let folder = std::env::var_os(STORE_VARIABLE).expect("the test that starts this one names a folder");
-    let store = MaskStore::in_folder(folder.into());
-    let mut mask = Mask::filled(175, 140, false);
-    for number in 0..1_000_000 {
-        store.append_journal(PAIR, &entry(number)).unwrap();
-        paint(&mut mask, number);
-        store.save(PAIR, lab::RIGHT, Some(&stored(mask.clone()))).unwrap();
-        println!("saved {number}");
-    }
-}
-
-#[test]
-fn a_kill_in_mid_stroke_loses_at_most_that_stroke() {
-    // The moment is seeded by stroke; where within the next stroke it hits is up to the machine.
-    for last in [0u32, 1, 7, 23, 58] {
-        let dir = tempfile::tempdir().unwrap();
-        let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["io::masks::child_that_paints", "--exact", "--ignored", "--nocapture", "--test-threads=1"])
-            .env(STORE_VARIABLE, dir.path())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let mut saved = None;
-        let mut killed = false;
-        // After the kill, what the child had already said is still read.
-        for line in BufReader::new(child.stdout.take().unwrap()).lines() {
-            let line = line.unwrap();
-            let Some(number) = line.rsplit_once("saved ").and_then(|(_, n)| n.parse::<u32>().ok()) else { continue };
-            saved = Some(number);
-            if number >= last && !killed {
-                child.kill().unwrap();
-                killed = true;
-            }
-        }
-        child.wait().unwrap();
-        assert!(killed, "the child ended by itself");
-        let saved = saved.unwrap();
-        let store = MaskStore::in_folder(dir.path().to_owned());
-        let found = store.load(PAIR, lab::RIGHT).unwrap().unwrap().mask;
-        let mut expected = Mask::filled(175, 140, false);
-        (0..=saved).for_each(|number| paint(&mut expected, number));
-        if found != expected {
-            paint(&mut expected, saved + 1);
-            assert!(found == expected, "neither {saved} nor {} strokes are in the file", saved + 1);
-        }
-        let journal = lines(&store);
-        let entries = journal.len() as u32;
-        assert!(entries > saved && entries <= saved + 2, "{entries} lines for {saved} strokes");
-        assert!(journal.iter().enumerate().all(|(i, e)| *e == entry(i as u32)));
-        // Work goes on after the crash.
-        store.save(PAIR, lab::RIGHT, Some(&stored(expected.clone()))).unwrap();
-        assert_eq!(store.load(PAIR, lab::RIGHT).unwrap().unwrap().mask, expected);
-    }
 }
 
 #[test]

@@ -67,36 +67,6 @@ fn numpy_values_and_top_level_tensors_are_refused_by_name() {
     assert!(matches!(read_dict(&data("torch_toplevel.pt")), Err(PtError::NotADict { .. })));
 }
 
-#[test]
-fn damaged_files_are_errors_at_every_length() {
-    let whole = std::fs::read(data("torch_views.pt")).unwrap();
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("cut.pt");
-    for length in (0..whole.len()).step_by(97) {
-        std::fs::write(&path, &whole[..length]).unwrap();
-        let text = read_dict(&path).unwrap_err().to_string();
-        assert!(text.contains("cut.pt"), "{text}");
-    }
-    // A flipped byte is either found or lands in padding; it never panics.
-    for at in (0..whole.len()).step_by(61) {
-        let mut bytes = whole.clone();
-        bytes[at] ^= 0x55;
-        std::fs::write(&path, &bytes).unwrap();
-        if let Ok(dict) = read_dict(&path) {
-            for key in dict.keys() {
-                dict.tensor(&key).ok();
-            }
-        }
-    }
-    for (content, name) in [(&b"hello world"[..], "text.pt"), (b"", "empty.pt"), (b"PK\x03\x04", "pk.pt")] {
-        let path = dir.path().join(name);
-        std::fs::write(&path, content).unwrap();
-        assert!(read_dict(&path).unwrap_err().to_string().contains(name));
-    }
-    assert!(matches!(read_dict(&dir.path().join("none.pt")), Err(PtError::Io { .. })));
-    assert!(matches!(read_dict(dir.path()), Err(PtError::NotADict { .. })));
-}
-
 /// The archive `bytes` as `torch.save` writes it to a file of this name: everything in a folder of the name, no sizes before
 /// the values, and at the end both kinds of end records, where nothing in the short one points to the long one.
 fn as_torch_writes(bytes: &[u8], name: &str) -> Vec<u8> {

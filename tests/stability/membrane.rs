@@ -64,37 +64,6 @@ fn m02_an_offset_or_a_gain_of_the_depth_costs_little() {
 }
 
 #[test]
-fn m03_without_a_membrane_to_see_the_mask_answers_bit_for_bit() {
-    let (case, model) = case();
-    let nothing = changed(case, |_, _| f32::NAN);
-    let one_pixel = {
-        let mut imprints = nothing.clone();
-        imprints[0][(87, 70)] = case.imprints[0][(87, 70)];
-        imprints
-    };
-    let flat = changed(case, |_, _| 0.0);
-    let points = points(&case.imprints, &case.masks);
-    let by_mask = register(&points, model, Registration::DistanceField(None), false).unwrap().grasp_from_object;
-    for (name, imprints) in [("no pixel", nothing), ("one pixel", one_pixel), ("flat", flat)] {
-        let report = registered(&points, &imprints, false);
-        let basis = report.joint.unwrap().basis;
-        assert!(matches!(basis, Basis::NoZone | Basis::LittleContact), "{name}: {basis:?}");
-        assert_eq!(report.grasp_from_object, by_mask, "{name}");
-    }
-}
-
-#[test]
-fn m04_points_that_are_there_twice_change_less_than_noise_does() {
-    let (case, _) = case();
-    let points = points(&case.imprints, &case.masks);
-    let twice: Vec<_> = points.iter().flat_map(|p| [*p, *p]).collect();
-    let [a, b] = [&points, &twice].map(|points| registered(points, &case.imprints, false).grasp_from_object);
-    // Of so many points others are chosen.
-    assert!(angle_error(a.theta_rad, b.theta_rad).to_degrees() < 0.2, "{a:?} {b:?}");
-    assert!((a.y_m - b.y_m).hypot(a.z_m - b.z_m) < 1e-4, "{a:?} {b:?}");
-}
-
-#[test]
 fn m05_any_number_of_threads_gives_the_same_bits() {
     let (case, _) = case();
     let by = |threads: usize| {

@@ -1,12 +1,11 @@
 //! The fit to one's own pairs in the studio, with the shipped models on a few simulated grasps.
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LearnCommand, Pane, UiRequest, ViewCommand};
-use touch2touch::app::learn::{LearnForm, Network};
+use touch2touch::app::command::{Pane, UiRequest, ViewCommand};
+use touch2touch::app::learn::Network;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::{learn, recipe};
 use touch2touch_pipeline::steps::bundles::BundleKind;
 
@@ -57,27 +56,4 @@ fn the_model_is_fitted_by_a_click_scored_and_used() {
     // It is made again from what it was made from.
     let setup = learn::adapt_setup(rig.harness.state().state()).unwrap();
     assert_eq!((setup.recipe.generating().unwrap().bundle.id.clone(), setup.pairs.len()), (shipped.id, 6));
-}
-
-/// For the pictures only: minutes.
-#[test]
-#[ignore = "minutes: a look at the pane after the networks were tuned"]
-fn pictures_of_tuning() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("grasps");
-    write_dataset(&data, 3);
-    for size in [[1280.0, 800.0], [1920.0, 1080.0]] {
-        let Some(mut rig) = Rig::live(size, Place::Path(data.clone())) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
-        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Adapt)));
-        rig.send(LearnCommand::SetForm(LearnForm { tune: true, tuning_steps: 30, ..LearnForm::default() }));
-        rig.send(LearnCommand::Start(Network::Generator));
-        while rig.harness.state().state().tasks.of_kind(TaskKind::Learn).is_some() {
-            std::thread::sleep(std::time::Duration::from_millis(100));
-            rig.harness.step();
-        }
-        rig.settle();
-        rig.shoot(&format!("tuned-{}", size[0]));
-    }
 }

@@ -2,16 +2,12 @@
 
 use eframe::egui::vec2;
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, TasksCommand, UiRequest, ViewCommand};
+use touch2touch::app::command::{Command, LibraryCommand, Pane, SettingsCommand, UiRequest, ViewCommand};
 use touch2touch::app::keys::ImprintSource;
-use touch2touch::app::results;
+use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{MaskSource, Workspace};
-use touch2touch::app::state::{Lookup, State};
-use touch2touch::app::tasks::Level;
-use touch2touch_core::pose::Registration;
+use touch2touch::app::state::State;
 use touch2touch_core::rig::lab;
-use touch2touch_pipeline::error::TaskError;
 
 use super::rig::Rig;
 
@@ -76,56 +72,4 @@ fn a_restart_brings_back_pair_finger_camera_and_the_large_pane() {
     rig.send(SettingsCommand::ResetSettings);
     rig.restart(SIZE);
     assert_ne!(state(&rig).pair_name(), pair);
-}
-
-#[test]
-fn a_mask_without_contact_offers_the_threshold() {
-    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    let mut mask = state(&rig).settings.mask.clone();
-    mask.choice.source = MaskSource::TopPercent;
-    mask.choice.top_percent = 0.0;
-    rig.send(prefer(move |s| s.mask = mask.clone()));
-    // Membranes need no mask.
-    rig.send(prefer(|s| s.registration = Registration::DistanceField(None)));
-    rig.send(prefer(|s| s.workspace = Workspace::Align));
-    assert!(
-        matches!(results::pose(state(&rig), MEASURED), Lookup::Failed(_)),
-        "{:?}",
-        results::pose(state(&rig), MEASURED)
-    );
-    rig.shoot("daily-no-contact");
-    rig.harness.get_all_by_label("Use threshold").next().unwrap().click();
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(state(&rig).settings.mask.choice.source, MaskSource::Threshold);
-    assert!(results::pose(state(&rig), MEASURED).ready().is_some(), "{:?}", results::pose(state(&rig), MEASURED));
-    assert!(rig.harness.query_by_label("Use threshold").is_none());
-}
-
-#[test]
-fn notes_cover_nothing_and_only_errors_stay() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Align));
-    let dismiss = |rig: &Rig| rig.harness.query_all_by_label("Dismiss").next().map(|button| button.rect());
-    // That there is no mask model is a warning: it goes by itself, and stays in the log.
-    quiet(&mut rig);
-    assert!(state(&rig).log.unseen().any(|entry| entry.level == Level::Warning));
-    assert!(dismiss(&rig).is_none());
-    rig.send(TasksCommand::Report(TaskError::new("Read the cup", "the handle is missing")));
-    let note = dismiss(&rig).expect("an error is said");
-    let view = rig.harness.get_by_label("3D view, measured").rect();
-    let panes = rig.harness.get_by_label("Filter pairs").rect();
-    assert!(note.top() >= view.bottom() && note.top() >= panes.bottom(), "{note:?} {view:?}");
-    rig.shoot("daily-note");
-    // A minute of the window's clock: the error stands.
-    for _ in 0..240 {
-        rig.harness.step();
-    }
-    assert!(dismiss(&rig).is_some());
-    rig.harness.get_by_label("Dismiss").click();
-    rig.harness.step();
-    rig.settle();
-    assert!(dismiss(&rig).is_none());
 }

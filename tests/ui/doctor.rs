@@ -3,18 +3,17 @@
 use eframe::egui::Key;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
-use touch2touch::app::command::{LearnCommand, Pane, ViewCommand};
+use touch2touch::app::command::Pane;
 use touch2touch::app::learn;
-use touch2touch::app::learn::{LearnForm, Network};
+use touch2touch::app::learn::Network;
 use touch2touch::app::library::Place;
-use touch2touch::app::settings::{Theme, prefer};
+use touch2touch::app::settings::prefer;
 use touch2touch_core::read_as::ReadAs;
 use touch2touch_pipeline::io::dataset::{READ_AS_FILE, write_read_as};
 use touch2touch_pipeline::io::masks::FOLDER;
 
 use super::rig::{Rig, write_dataset};
-use crate::support::{run, shared};
-use crate::training::bytes;
+use crate::support::shared;
 
 const SIZE: [f32; 2] = [1280.0, 800.0];
 
@@ -132,53 +131,4 @@ fn data_that_are_read_wrongly_are_read_rightly_by_a_click() {
     // It was opened again, and the panel is still there.
     rig.harness.get_by_label_contains("none at a glance");
     assert!(rig.harness.query_by_label("Read as stored").is_none());
-}
-
-/// Masks from CAD and a training are one button, which ends in the verb's bundle.
-#[test]
-fn masks_from_cad_are_trained_on_by_one_click_to_the_verbs_bundle() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("grasps");
-    write_dataset(&data, 3);
-    let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data.clone()), true) else { return };
-    rig.send(LearnCommand::SetForm(LearnForm { by_steps: true, steps: 2, ..LearnForm::default() }));
-    rig.harness.get_all_by_label("Masks from CAD, and train").next().unwrap().click();
-    rig.harness.step();
-    rig.settle();
-    let state = rig.harness.state().state();
-    let found = state.learn.trained.clone().expect("the training is there");
-    assert_eq!((found.masks, found.pairs, found.held_out.len(), found.persons.len()), (10, 5, 2, 0), "{found:?}");
-    let [before, after] = found.poses.expect("true poses are known");
-    assert!(before.grasps == 1 && after.grasps == 1 && before.iou > 0.5 && after.iou > 0.5, "{before:?} {after:?}");
-    assert!(learn::made(state, Network::Masks).unwrap().name.contains("10 CAD masks"), "{}", found.name);
-    rig.harness.get_by_label_contains("before: IoU ");
-    rig.shoot("train-from-cad");
-    assert!(!data.join(FOLDER).exists(), "no label was written");
-
-    let out = folder.path().join("by-verb");
-    let [path, out_text] = [&data, &out].map(|path| path.to_str().unwrap());
-    let verb = ["masks", "train", path, "--from", "cad", "--steps", "2", "--no-cache", "--out", out_text];
-    let made = run(&verb, folder.path());
-    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
-    assert!(bytes(&out) == bytes(&found.bundle));
-}
-
-/// For looking at.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_panel() {
-    let folder = tempfile::tempdir().unwrap();
-    let (pairs, grasps) = (folder.path().join("pairs"), folder.path().join("grasps"));
-    copied(&shared("real-pairs").unwrap(), &pairs);
-    write_dataset(&grasps, 3);
-    for (data, name) in [(pairs, "pairs"), (grasps, "grasps")] {
-        for size in [SIZE, [1920.0, 1080.0]] {
-            let Some(mut rig) = Rig::greeting(size, Place::Path(data.clone()), true) else { return };
-            rig.send(ViewCommand::SetPalette(false));
-            for theme in [Theme::Dark, Theme::Light] {
-                rig.send(prefer(move |s| s.theme = theme));
-                rig.shoot(&format!("about-{name}-{}-{theme:?}", size[0]).to_lowercase());
-            }
-        }
-    }
 }

@@ -1,6 +1,6 @@
 //! Frames of which only what changed is painted: the same pictures, and little to paint.
 
-use eframe::egui::{Key, Modifiers, PointerButton, Pos2, Rect, vec2};
+use eframe::egui::{Key, Modifiers, Pos2, Rect, vec2};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::LibraryCommand;
 use touch2touch::app::keys::ImprintSource;
@@ -82,36 +82,6 @@ fn what_is_painted_in_parts_is_what_is_painted_whole() {
 }
 
 #[test]
-fn a_turned_view_is_painted() {
-    let Some(mut parts) = Rig::new(SIZE, 1) else { return };
-    let mut whole = parts.painted_whole(SIZE);
-    for rig in [&mut parts, &mut whole] {
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(prefer(|s| s.workspace = Workspace::Align));
-        let center = rig.harness.get_by_label("3D view, measured").rect().center();
-        rig.harness.hover_at(center);
-        rig.harness.step();
-        rig.harness.drag_at(center);
-        for i in 1..5_u8 {
-            rig.harness.hover_at(center + vec2(12.0 * f32::from(i), 3.0));
-            rig.harness.step();
-        }
-        rig.harness.event(eframe::egui::Event::PointerButton {
-            pos: center + vec2(48.0, 3.0),
-            button: PointerButton::Primary,
-            pressed: false,
-            modifiers: Modifiers::NONE,
-        });
-        rig.settle();
-        for _ in 0..4 {
-            rig.harness.step();
-        }
-    }
-    let (share, most) = difference(&mut parts, &mut whole, "turned");
-    assert!(share < 0.002, "{share} of the bytes differ, by at most {most}");
-}
-
-#[test]
 fn an_idle_window_paints_nothing_and_a_pointer_on_the_move_little() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));
@@ -135,19 +105,6 @@ fn an_idle_window_paints_nothing_and_a_pointer_on_the_move_little() {
     }
     let share = (painted(&rig) - rested) as f64 / frames as f64 / f64::from(SIZE[0] * SIZE[1]);
     assert!(share < 0.25, "a move of the pointer paints {:.0} % of the window", share * 100.0);
-}
-
-#[test]
-fn what_is_computed_stays_within_its_budget() {
-    // What the documentation says of memory.
-    const { assert!(Results::BUDGET <= 1400 << 20) };
-    let Some(mut rig) = Rig::new(SIZE, 4) else { return };
-    let first = rig.harness.state().state().results.bytes();
-    for _ in 0..7 {
-        rig.send(LibraryCommand::Step(1));
-    }
-    let bytes = rig.harness.state().state().results.bytes();
-    assert!(bytes > first && bytes <= Results::BUDGET, "{first} {bytes}");
 }
 
 /// The smallest and the largest byte of green in the upper left of `rect`, beside what may be written in its middle.

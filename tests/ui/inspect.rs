@@ -96,37 +96,3 @@ fn scrub_by_keys_pin_two_and_compare() {
     assert_eq!(rig.at()[0], 0);
     assert_eq!(rig.harness.state().state().results.inspections.len(), 1, "scrubbing registers nothing");
 }
-
-#[test]
-fn space_plays_where_the_pointer_is_over_the_steps() {
-    let Some(mut rig) = Rig::align() else { return };
-    let over = |rig: &mut Rig, label: &str| {
-        let rect = rig.harness.get_by_label(label).rect();
-        rig.harness.hover_at(rect.center());
-        rig.harness.step();
-        rig.settle();
-    };
-    over(&mut rig, "Filter pairs");
-    rig.tap(Modifiers::NONE, Key::Space);
-    assert!(!rig.harness.state().state().inspect.playing, "Space is not for the list");
-    over(&mut rig, "3D view, measured");
-    let last = rig.at()[1];
-    rig.harness.key_press(Key::Space);
-    rig.harness.step();
-    rig.harness.step();
-    assert!(rig.harness.state().state().inspect.playing);
-    let mut seen = std::collections::BTreeSet::new();
-    // The harness' clock goes on by a quarter of a second per frame: two frames per step and some to spare.
-    for _ in 0..4 * (last + 2) {
-        seen.insert(rig.at()[1]);
-        rig.harness.step();
-    }
-    assert!(!rig.harness.state().state().inspect.playing, "it ends at the end");
-    assert_eq!(rig.at()[1], last);
-    assert_eq!(seen.len(), last + 1, "every step was shown: {seen:?}");
-    rig.settle();
-    // At rest nothing is drawn.
-    rig.harness.step();
-    let delays: Vec<_> = rig.harness.output().viewport_output.values().map(|v| v.repaint_delay).collect();
-    assert!(delays.iter().all(|d| *d > std::time::Duration::from_secs(3600)), "{delays:?}");
-}

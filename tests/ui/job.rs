@@ -5,15 +5,12 @@ use std::path::{Path, PathBuf};
 
 use eframe::egui::{Key, Modifiers, Pos2, vec2};
 use egui_kittest::kittest::Queryable as _;
-use strum::IntoEnumIterator as _;
-use touch2touch::app::action::Action;
 use touch2touch::app::command::{LibraryCommand, Pane, PredictCommand, TasksCommand};
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::MaskPlace;
 use touch2touch::app::library::Place;
 use touch2touch::app::results;
-use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{GelView, Theme, Workspace};
+use touch2touch::app::settings::{GelView, Workspace};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::rig::{PadId, lab};
 use touch2touch_pipeline::io::dataset::Dataset;
@@ -162,56 +159,6 @@ fn browse_generate_shift_paint_undo() {
 }
 
 #[test]
-fn keys_of_tools_do_nothing_while_typing() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.key(Modifiers::CTRL, Key::F);
-    let before = rig.harness.state().state().selection.pair;
-    rig.harness.get_by_label("Filter pairs").type_text("d");
-    rig.harness.key_press(Key::D);
-    rig.settle();
-    let state = rig.harness.state().state();
-    assert_eq!(state.selection.pair, before, "D is a letter here");
-    assert_eq!(state.library.filter, "d");
-}
-
-#[test]
-fn the_palette_finds_and_runs_an_action() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    assert_eq!(rig.harness.state().state().settings.theme, Theme::Dark);
-    rig.key(Modifiers::CTRL, Key::P);
-    assert!(rig.harness.state().state().selection.palette);
-    rig.harness.get_by_label("Find anything").type_text("dark or");
-    rig.harness.step();
-    rig.settle();
-    rig.shoot("test-palette");
-    rig.key(Modifiers::NONE, Key::Enter);
-    let state = rig.harness.state().state();
-    assert!(!state.selection.palette);
-    assert_eq!(state.settings.theme, Theme::Light);
-    // Samples too, with the other key.
-    rig.key(Modifiers::CTRL, Key::K);
-    let last = rig.harness.state().state().library.pairs().last().unwrap().name.clone();
-    rig.harness.get_by_label("Find anything").type_text(&last);
-    rig.harness.step();
-    rig.settle();
-    rig.key(Modifiers::NONE, Key::Enter);
-    assert_eq!(rig.harness.state().state().pair_name(), last);
-}
-
-#[test]
-fn the_shortcut_sheet_lists_every_action() {
-    let Some(mut rig) = Rig::new([1600.0, 1000.0], 2) else { return };
-    rig.key(Modifiers::NONE, Key::F1);
-    rig.shoot("test-shortcuts");
-    for action in Action::iter() {
-        let listed = rig.harness.query_all_by_label(action.name()).count();
-        assert!(listed > 0, "{} is not listed", action.name());
-    }
-    rig.key(Modifiers::NONE, Key::Escape);
-    assert!(!rig.harness.state().state().selection.shortcut_sheet);
-}
-
-#[test]
 fn at_rest_nothing_is_drawn_uploaded_or_written() {
     let Some(mut rig) = Rig::new(SIZE, 2) else { return };
     rig.send(PredictCommand::Generate);
@@ -230,18 +177,6 @@ fn at_rest_nothing_is_drawn_uploaded_or_written() {
     let mut after = BTreeMap::new();
     files(&rig.data, &mut after);
     assert_eq!(before, after);
-}
-
-#[test]
-fn no_pane_asks_for_what_it_does_not_show() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    // One pane alone: its panes are all that is computed for.
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    rig.fill("Mask");
-    let state = rig.harness.state().state();
-    assert_eq!(state.selection.panes.iter().copied().collect::<Vec<_>>(), vec![Pane::Masks]);
-    rig.key(Modifiers::NONE, Key::Backtick);
-    assert!(rig.harness.state().state().selection.panes.len() > 3);
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! Jobs of a working day by clicks and keys, with the actions that they may take.
 
-use eframe::egui::{Event, Key, Modifiers};
-use egui_kittest::kittest::{NodeT as _, Queryable as _};
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::command::PredictCommand;
-use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::labels::Review;
 use touch2touch::app::results;
 use touch2touch::app::settings::{Workspace, prefer};
@@ -44,11 +43,6 @@ impl Person {
         node.click();
         self.done();
     }
-
-    fn press(&mut self, key: Key) {
-        self.rig.harness.key_press_modifiers(Modifiers::NONE, key);
-        self.done();
-    }
 }
 
 #[test]
@@ -69,44 +63,6 @@ fn two_models_are_compared_on_the_pair_on_screen() {
     assert!(found.mae_m > 0.0);
     assert!(person.actions <= 3, "{} actions", person.actions);
     person.rig.shoot("job-two-models");
-}
-
-#[test]
-fn the_distance_between_the_model_and_the_tip_is_read() {
-    let Some(rig) = Rig::aligned() else { return };
-    let mut person = Person::at(rig);
-    person.press(Key::V);
-    let state = person.state();
-    let source = ImprintSource::Measured;
-    let found = results::deviation(state, source).ready().expect("the distances are shown");
-    let cloud = results::cloud(state, source).ready().unwrap().finger(lab::RIGHT).unwrap();
-    // The contact points farthest from the hand: the tip.
-    let contact: Vec<usize> = (0..cloud.points.len()).filter(|i| cloud.contact[*i]).collect();
-    let distances = found.points[lab::RIGHT].as_ref().unwrap();
-    let mut tip: Vec<usize> = (0..contact.len()).collect();
-    tip.sort_by(|a, b| cloud.points[contact[*b]].z.total_cmp(&cloud.points[contact[*a]].z));
-    let tip: Vec<_> = tip[..40].iter().map(|at| (cloud.points[contact[*at]], f64::from(distances[*at]))).collect();
-    let number = |text: &str| -> Option<f64> {
-        let part = text.split("   ").find(|part| part.contains("from the model"))?;
-        part.split(' ').next()?.parse().ok()
-    };
-    // The pointer goes along the tip; where another point lies in front, that one is read.
-    let mut read = Vec::new();
-    for (point, off) in tip {
-        let at = person.rig.harness.state().on_screen(source, point.to_array()).expect("it is drawn");
-        for at in [at + eframe::egui::vec2(1.0, 0.0), at] {
-            person.rig.harness.event(Event::PointerMoved(at));
-            person.rig.harness.step();
-        }
-        person.rig.settle();
-        let said = person.rig.harness.query_all_by_label_contains("from the model");
-        let said = said.filter_map(|node| number(&node.accesskit_node().value()?)).next();
-        read.extend(said.map(|mm| (mm - off * 1e3).abs()));
-    }
-    person.actions += 1;
-    assert!(read.len() > 5, "the status bar says the distance of the point under the pointer");
-    assert!(read.iter().any(|apart| *apart < 0.006), "to the digits that are shown: {read:?}");
-    assert!(person.actions <= 2, "{} actions", person.actions);
 }
 
 #[test]

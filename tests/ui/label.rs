@@ -161,54 +161,6 @@ fn a_polygon_grows_by_quick_clicks_whatever_was_drawn_before() {
 }
 
 #[test]
-fn keys_close_a_polygon_and_take_its_corners_back() {
-    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    with_nothing_automatic(&mut rig);
-    let picture = rig.harness.get_by_label("Measured imprint right").rect();
-    let corners = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]].map(|[x, y]| inside(picture, x, y));
-    let set = |rig: &Rig| rig.harness.state().state().document.stroke.as_ref().map(|s| s.drawing.points.len() - 1);
-    let click = |rig: &mut Rig, at| {
-        rig.button(at, true);
-        rig.button(at, false);
-    };
-    let key = |rig: &mut Rig, modifiers, key| {
-        rig.harness.key_press_modifiers(modifiers, key);
-        rig.harness.step();
-        rig.harness.step();
-    };
-    let empty = rig.mask(lab::RIGHT);
-    key(&mut rig, Modifiers::NONE, Key::P);
-    corners.iter().for_each(|at| click(&mut rig, *at));
-    assert_eq!(set(&rig), Some(4));
-    key(&mut rig, Modifiers::NONE, Key::Backspace);
-    assert_eq!(set(&rig), Some(3), "Backspace takes a corner back");
-    key(&mut rig, Modifiers::CTRL, Key::Z);
-    assert_eq!(set(&rig), Some(2), "so does Ctrl+Z");
-    for (at, expected) in corners[2..].iter().zip([3, 4]) {
-        click(&mut rig, *at);
-        assert_eq!(set(&rig), Some(expected), "{:?}", rig.harness.state().state().log.entries.back());
-    }
-    key(&mut rig, Modifiers::CTRL, Key::Enter);
-    rig.settle();
-    let pair = rig.harness.state().state().pair_name().to_owned();
-    assert_eq!((set(&rig), rig.harness.state().state().document.review(&pair)), (Some(4), Review::Todo));
-    assert!(rig.harness.query_all_by_label_contains("A polygon is still open").next().is_some());
-    key(&mut rig, Modifiers::NONE, Key::Enter);
-    rig.settle();
-    assert_eq!((set(&rig), rig.harness.state().state().pair_name()), (None, pair.as_str()));
-    assert!(count(&rig.mask(lab::RIGHT)) > count(&empty) + 2000, "Enter closes it");
-    // Then another one can be begun, and Ctrl+Z takes back what the first one drew once this one is given up.
-    click(&mut rig, corners[0]);
-    assert_eq!(set(&rig), Some(1));
-    key(&mut rig, Modifiers::NONE, Key::Escape);
-    key(&mut rig, Modifiers::CTRL, Key::Z);
-    rig.settle();
-    assert_eq!((set(&rig), rig.mask(lab::RIGHT)), (None, empty));
-}
-
-#[test]
 fn a_letter_changes_no_labels_elsewhere_and_another_way_can_be_taken_back_at_once() {
     let Some(mut rig) = Rig::new(SIZE, 1) else { return };
     rig.send(prefer(|s| s.hint_dismissed = true));

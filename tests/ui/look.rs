@@ -1,16 +1,12 @@
 //! Nothing to see is an error, and pictures for people.
 
-use egui_kittest::kittest::Queryable as _;
 use strum::IntoEnumIterator as _;
-use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, Pane, PredictCommand, UiRequest, ViewCommand};
-use touch2touch::app::evaluate::EvaluateCommand;
+use touch2touch::app::command::{Command, LabelsCommand, LibraryCommand, PredictCommand, ViewCommand};
 use touch2touch::app::inspect::InspectCommand;
 use touch2touch::app::keys::ImprintSource;
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::settings::{
-    LayerLook, MaskSource, MaskTool, ProposalSource, SceneLayer, Theme, Versus, VersusMode, Workspace,
-};
+use touch2touch::app::settings::{MaskSource, MaskTool, ProposalSource, Theme, Workspace};
 use touch2touch::app::workbench::{Layer, SceneTool, WorkbenchCommand};
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
@@ -18,7 +14,6 @@ use touch2touch_core::label::Paint;
 use touch2touch_core::manual::PoseAxis;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sim::Fault;
-use touch2touch_pipeline::compare::subject::Subject;
 use touch2touch_pipeline::io::simulated::{Layout, write_pair, write_tools};
 
 use super::rig::Rig;
@@ -153,98 +148,5 @@ fn pictures_of_the_faults() {
             rig.shoot(&format!("fault-{name}-{}", layer.name()).to_lowercase());
         }
         rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
-    }
-}
-
-/// The scores of many pairs, for looking at.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_scores() {
-    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
-        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(prefer(|s| s.workspace = Workspace::Evaluate));
-        rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Table)));
-        rig.shoot(&format!("{name}-scores-none"));
-        rig.send(Command::Evaluate(EvaluateCommand::Grasps(Some(4))));
-        rig.send(Command::Evaluate(EvaluateCommand::Start));
-        rig.send(LibraryCommand::NextWorst);
-        rig.shoot(&format!("{name}-scores-dark"));
-        rig.harness.get_by_label("histograms").click();
-        rig.harness.step();
-        rig.settle();
-        rig.send(prefer(|s| s.theme = Theme::Light));
-        rig.shoot(&format!("{name}-scores-light"));
-    }
-}
-
-/// The looks of the 3D views, for looking at.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_3d_views() {
-    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
-        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(LibraryCommand::Select(PairId(30)));
-        rig.send(PredictCommand::Generate);
-        rig.send(prefer(|s| s.workspace = Workspace::Align));
-        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::Distance)));
-        rig.shoot(&format!("{name}-3d-distance"));
-        let hidden = LayerLook { shown: false, ..SceneLayer::Membrane.preset() };
-        let surface = LayerLook { shown: true, ..SceneLayer::Surface.preset() };
-        rig.send(prefer(move |s| s.scene.set(SceneLayer::Membrane, hidden)));
-        rig.shoot(&format!("{name}-3d-distance-alone"));
-        rig.send(Command::Workbench(WorkbenchCommand::SetLayer(Layer::None)));
-        rig.send(prefer(move |s| s.scene.set(SceneLayer::Surface, surface)));
-        rig.shoot(&format!("{name}-3d-surface"));
-        rig.send(prefer(move |s| (s.scene.only_window, s.scene.orthographic) = (true, true)));
-        rig.send(prefer(|s| s.theme = Theme::Light));
-        rig.shoot(&format!("{name}-3d-light"));
-    }
-}
-
-/// The 3D views as they open, for looking at.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_3d_views_as_they_open() {
-    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
-        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        for pair in [30, 6, 17] {
-            rig.send(LibraryCommand::Select(PairId(pair)));
-            rig.send(PredictCommand::Generate);
-            for theme in [Theme::Dark, Theme::Light] {
-                rig.send(prefer(move |s| s.theme = theme));
-                for workspace in [Workspace::Inspect, Workspace::Align] {
-                    rig.send(prefer(move |s| s.workspace = workspace));
-                    rig.shoot(&format!("{name}-3d-{}-{pair}-{theme:?}", workspace.name()).to_lowercase());
-                }
-            }
-        }
-    }
-}
-
-/// Any two imprints against each other, for looking at.
-#[test]
-#[ignore = "pictures for looking at, into the folder TOUCH2TOUCH_SCREENSHOTS"]
-fn pictures_of_the_comparison() {
-    for (size, name) in [([1280.0, 800.0], "1280"), ([1920.0, 1080.0], "1920")] {
-        let Some(mut rig) = Rig::live(size, Place::Demo) else { return };
-        rig.send(prefer(|s| s.hint_dismissed = true));
-        rig.send(LibraryCommand::Select(PairId(30)));
-        rig.send(PredictCommand::Generate);
-        for workspace in [Workspace::Inspect, Workspace::Align] {
-            rig.send(prefer(move |s| s.workspace = workspace));
-            rig.send(ViewCommand::Ui(UiRequest::ShowPane(Pane::Compare)));
-            for mode in VersusMode::iter() {
-                let a: Subject = "prediction:seed=7,steps=8".parse().unwrap();
-                let b = "prediction".parse().unwrap();
-                let b: Subject = if mode.is_3d() { Subject::Measured } else { b };
-                rig.send(prefer(move |s| *s.versus_mut() = Versus { a: a.clone(), b: b.clone(), mode }));
-                rig.shoot(&format!("{name}-compare-{workspace:?}-{mode:?}").to_lowercase());
-            }
-        }
-        rig.send(prefer(|s| s.theme = Theme::Light));
-        rig.shoot(&format!("{name}-compare-light"));
     }
 }

@@ -315,21 +315,6 @@ impl Rig {
         Some(rig)
     }
 
-    /// As [`Rig::live`] with lanes of its own: jobs go on while frames do.
-    pub(super) fn at_work(size: [f32; 2], data: &Path) -> Option<Self> {
-        crate::support::gpu()?;
-        let folder = tempfile::tempdir().unwrap();
-        let config = folder.path().join("config");
-        let services = LiveServices::with_config_folder(Some(config.clone()));
-        let mut settings = Settings { about_own_data: false, hint_dismissed: true, ..Settings::default() };
-        settings.generate.by_itself = false;
-        services.save_settings(&settings).unwrap();
-        let harness = Self::build(size, Arc::new(services), Some(data.to_owned()), false);
-        let mut rig = Self { harness, data: data.to_owned(), config, _folder: folder };
-        rig.until("the data set", |state| state.library.open.is_some() && results::sample(state).ready().is_some());
-        Some(rig)
-    }
-
     fn start(size: [f32; 2], data: &Path, config: &Path) -> Harness<'static, StudioApp> {
         let live = LiveServices::with_config_folder(Some(config.to_owned()));
         Self::build(size, Arc::new(QuickGenerator { live, gate: None }), Some(data.to_owned()), true)

@@ -1,6 +1,6 @@
 //! The 3D views: distances, what is drawn, cameras.
 
-use eframe::egui::{Event, Key, Modifiers, Pos2, vec2};
+use eframe::egui::Pos2;
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::action::Action;
 use touch2touch::app::command::WorkbenchCommand;
@@ -18,17 +18,6 @@ const MEASURED: ImprintSource = ImprintSource::Measured;
 
 fn state(rig: &Rig) -> &State {
     rig.harness.state().state()
-}
-
-fn press(rig: &mut Rig, key: Key) {
-    rig.harness.key_press_modifiers(Modifiers::NONE, key);
-    rig.harness.step();
-    rig.settle();
-}
-
-fn view_center(rig: &Rig) -> Pos2 {
-    let rect = rig.harness.get_by_label("3D view, measured").rect();
-    rect.min + vec2(0.5, 0.45) * rect.size()
 }
 
 /// Colors of the measured view, as a set.
@@ -92,43 +81,4 @@ fn the_list_of_what_is_drawn_switches_it_and_it_stays_so() {
     let red = LayerLook { color: Some([250, 10, 10]), ..SceneLayer::Contact.preset() };
     rig.send(prefer(move |s| s.scene.set(SceneLayer::Contact, red)));
     assert!(colors(&mut rig).contains(&[250, 10, 10, 255]) || colors(&mut rig).len() > 100);
-}
-
-#[test]
-fn only_the_window_is_shown_by_key_and_all_again_by_the_bar() {
-    let Some(mut rig) = Rig::aligned() else { return };
-    let whole = colors(&mut rig);
-    rig.harness.hover_at(view_center(&rig));
-    press(&mut rig, Key::W);
-    assert!(state(&rig).settings.scene.only_window);
-    assert_ne!(colors(&mut rig), whole);
-    let close = rig.harness.query_all_by_label("Show all").next().unwrap().rect().center();
-    rig.click_at(close);
-    assert!(!state(&rig).settings.scene.only_window);
-}
-
-#[test]
-fn a_camera_is_pasted_and_a_foreign_text_is_not() {
-    let Some(mut rig) = Rig::aligned() else { return };
-    rig.harness.hover_at(view_center(&rig));
-    rig.harness.step();
-    let point = [0.003, 0.004, 0.002];
-    let before = rig.harness.state().on_screen(MEASURED, point).unwrap();
-    rig.harness.event(Event::Paste("{\"distance\": -1}".into()));
-    rig.harness.step();
-    rig.settle();
-    assert_eq!(
-        rig.harness.state().on_screen(MEASURED, point).unwrap(),
-        before,
-        "not a camera that can be looked through"
-    );
-    rig.harness.event(Event::Paste(
-        "{\"target\": [0,0,0], \"distance\": 0.2, \"yaw_rad\": 0, \"pitch_rad\": 0.1, \"orthographic\": true}".into(),
-    ));
-    rig.harness.step();
-    rig.settle();
-    assert!(state(&rig).settings.scene.orthographic);
-    assert!((rig.harness.state().on_screen(MEASURED, point).unwrap() - before).length() > 3.0);
-    press(&mut rig, Key::I);
-    assert!(!state(&rig).settings.scene.orthographic);
 }

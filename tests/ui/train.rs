@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use egui_kittest::kittest::Queryable as _;
-use touch2touch::app::command::{LabelsCommand, LearnCommand, LibraryCommand, Pane};
+use touch2touch::app::command::{LabelsCommand, LearnCommand, LibraryCommand};
 use touch2touch::app::learn::{LearnForm, Network};
 use touch2touch::app::library::Place;
 use touch2touch::app::settings::Workspace;
 use touch2touch::app::settings::prefer;
-use touch2touch::app::state::State;
 use touch2touch::app::tasks::TaskKind;
 use touch2touch::app::{learn, recipe};
 use touch2touch_core::catalog;
@@ -138,43 +137,6 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
     for (place, mask) in &by_studio.masks {
         assert!(by_verb.masks[place].is_same(mask), "{place:?}");
     }
-}
-
-/// Cancel keeps the run, says so, and the same goes on from there.
-#[test]
-fn a_training_that_is_stopped_is_kept_and_goes_on() {
-    let folder = tempfile::tempdir().unwrap();
-    let data = folder.path().join("grasps");
-    corrected(&data, 2);
-    let Some(mut rig) = Rig::at_work([1280.0, 800.0], &data) else { return };
-    rig.harness.state_mut().push(prefer(|s| s.workspace = Workspace::Label));
-    rig.harness.state_mut().push(LearnCommand::Show(Network::Masks));
-    let form = LearnForm { by_steps: true, steps: 60, ..LearnForm::default() };
-    rig.harness.state_mut().push(LearnCommand::SetForm(form));
-    rig.harness.step();
-    let step = |state: &State| {
-        let text = state.tasks.of_kind(TaskKind::Learn).map(|(_, task)| task.progress.text.clone())?;
-        text.split_once("step ")?.1.split(' ').next()?.parse::<u32>().ok()
-    };
-    rig.until("the button", |state| state.selection.panes.contains(&Pane::Adapt));
-    rig.harness.get_by_label("Start training").click();
-    rig.harness.step();
-    rig.until("a few steps", |state| step(state) >= Some(4));
-    rig.harness.get_by_label_contains("Cancel: ").click();
-    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Learn).is_none());
-    assert!(rig.harness.state().state().learn.stopped[Network::Masks as usize].is_some());
-    rig.harness.get_by_label_contains("it is kept");
-    rig.shoot("train-stopped");
-    rig.harness.get_by_label("Start training").click();
-    rig.until("the first step after", |state| step(state).is_some());
-    assert!(step(rig.harness.state().state()) >= Some(4), "it goes on from where it was");
-    rig.harness.get_by_label_contains("Cancel: ").click();
-    rig.until("its end", |state| state.tasks.of_kind(TaskKind::Learn).is_none());
-    // What is kept is of what was asked for: another choice begins anew.
-    let other = LearnForm { steps: 61, ..form };
-    rig.harness.state_mut().push(LearnCommand::SetForm(other));
-    rig.harness.step();
-    assert!(rig.harness.state().state().learn.stopped[Network::Masks as usize].is_none());
 }
 
 /// Simulated grasps of one tool in the folder that the lab keeps for tests; nobody labeled them.

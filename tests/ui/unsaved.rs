@@ -3,7 +3,7 @@
 use std::time::Duration;
 use touch2touch::app::settings::prefer;
 
-use eframe::egui::{Event, Key, ViewportCommand, ViewportEvent, ViewportId};
+use eframe::egui::{Event, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::kittest::Queryable as _;
 use touch2touch::app::labels::{Question, Review};
 use touch2touch::app::library::Place;
@@ -147,23 +147,4 @@ fn a_lost_graphics_device_closes_the_window_unasked_with_everything_kept() {
     assert_eq!(labels.reviews().states.into_values().collect::<Vec<_>>(), [Review::Flagged]);
     // Frames may come after it.
     rig.step_answering();
-}
-
-#[test]
-fn a_data_set_that_is_renamed_under_the_studio_is_asked_about_and_nothing_is_made_in_its_place() {
-    let Some(mut rig) = Rig::new(SIZE, 1) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.workspace = Workspace::Label));
-    let renamed = rig.data.with_file_name("renamed");
-    std::fs::rename(&rig.data, &renamed).unwrap();
-    rig.flag();
-    assert_eq!(rig.question(), Some(Question::Lost));
-    assert!(!rig.data.exists());
-    rig.harness.get_by_label_contains("The data set is gone");
-    std::fs::rename(&renamed, &rig.data).unwrap();
-    rig.harness.get_by_label("Try again").click();
-    rig.settle();
-    assert_eq!(rig.question(), None);
-    rig.harness.key_press(Key::Escape);
-    assert!(rig.data.join(FOLDER).is_dir());
 }

@@ -8,8 +8,7 @@ use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::app::workbench::{Layer, ManualTry, SceneTool, WorkbenchCommand};
-use touch2touch_core::align::reason::Reason;
+use touch2touch::app::workbench::{ManualTry, SceneTool, WorkbenchCommand};
 use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::io::dataset::Dataset;
@@ -88,11 +87,6 @@ impl Rig {
         assert!(results::pose(rig.model(), MEASURED).ready().is_some());
         assert_eq!(rig.model().workbench.side, MEASURED, "the pointer says which side");
         self
-    }
-
-    fn asks_to_repaint(&self) -> bool {
-        let delays = self.harness.output().viewport_output.values().map(|v| v.repaint_delay);
-        delays.into_iter().any(|d| d < std::time::Duration::from_secs(3600))
     }
 }
 
@@ -248,42 +242,4 @@ fn a_clicked_point_says_all_about_itself() {
     rig.shoot("test-picked");
     rig.press(Modifiers::NONE, Key::Escape);
     assert_eq!(rig.model().workbench.picked, None);
-}
-
-#[test]
-fn layers_go_round_and_their_numbers_add_up() {
-    let Some(mut rig) = Rig::aligned() else { return };
-    for layer in [Layer::Residuals, Layer::Reasons, Layer::Distance, Layer::Correspondences, Layer::None] {
-        rig.press(Modifiers::SHIFT, Key::V);
-        assert_eq!(rig.model().workbench.layer, layer);
-        rig.shoot(&format!("test-layer-{}", layer.name()).to_lowercase());
-    }
-    // The distance is on or off.
-    for layer in [Layer::Distance, Layer::None] {
-        rig.press(Modifiers::NONE, Key::V);
-        assert_eq!(rig.model().workbench.layer, layer);
-    }
-    rig.send(WorkbenchCommand::SetLayer(Layer::Reasons));
-    let layers = results::layers(rig.model(), MEASURED).ready().expect("the points are painted with them");
-    for finger in lab::PADS {
-        let pixels = results::imprint(rig.model(), MEASURED, finger).ready().unwrap().len();
-        assert_eq!(layers.counts[finger].unwrap().iter().sum::<usize>(), pixels, "a reason for every pixel");
-        let mask = results::mask_in_force(rig.model(), MEASURED, finger).unwrap().mask;
-        let outside = mask.as_slice().iter().filter(|m| !**m).count();
-        assert_eq!(layers.counts[finger].unwrap()[Reason::OutsideMask as usize], outside);
-    }
-}
-
-#[test]
-fn what_no_pane_shows_is_not_computed_and_rest_is_rest() {
-    let Some(mut rig) = Rig::new(SIZE, 2) else { return };
-    rig.send(prefer(|s| s.hint_dismissed = true));
-    rig.send(prefer(|s| s.mask.choice.source = MaskSource::Truth));
-    // In Inspect there are 3D views, but no layers.
-    assert!(results::pose(rig.model(), MEASURED).ready().is_some());
-    assert!(rig.model().results.runs.is_empty() && rig.model().results.layers.is_empty());
-    rig.send(TasksCommand::LogSeen(u64::MAX));
-    // At rest nothing is painted.
-    rig.harness.step();
-    assert!(!rig.asks_to_repaint());
 }

@@ -197,13 +197,6 @@ mod tests {
 
     use super::*;
 
-    #[test]
-    fn names_are_the_labs() {
-        let unseen: Vec<&str> = tools().iter().filter(|t| !t.seen).map(|t| t.name.as_str()).collect();
-        assert_eq!(unseen, ["pattern_05_3_lines_angle_2", "pattern_35", "pattern_36"]);
-        assert_eq!(tools().len(), 12);
-    }
-
     /// Volumes (mm^3), and the highest z (mm), of the models that the lab published.
     #[test]
     fn the_labs_tools_are_as_large_as_the_labs_models() {

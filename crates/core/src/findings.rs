@@ -151,24 +151,4 @@ mod tests {
             assert_eq!((findings[0].count, findings[0].examples.len(), findings[0].what.as_str()), (2, 2, a));
         }
     }
-
-    #[test]
-    fn what_is_wrong_makes_a_kind() {
-        let findings = grouped(&[
-            ("a.pt", "key \"K\" is missing"),
-            ("a.pt", "key \"theta\" is missing"),
-            ("b.pt", "key \"K\" is missing"),
-            ("b.pt", "key \"K\" holds a list"),
-        ]);
-        assert_eq!(findings.iter().map(|f| f.count).collect::<Vec<_>>(), [2, 1, 1]);
-    }
-
-    #[test]
-    fn many_files_are_one_entry_with_a_few_examples() {
-        let mut findings = Findings::default();
-        let first = (0..1000).filter(|i| findings.add(problem(&format!("/d/t_data_{i}.pt"), "half a file"))).count();
-        assert_eq!((first, findings.list().len()), (1, 1));
-        let [one] = &findings.into_list()[..] else { panic!() };
-        assert_eq!((one.count, one.examples.len(), &one.examples[0]), (1000, EXAMPLES, &one.file));
-    }
 }

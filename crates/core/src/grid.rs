@@ -145,23 +145,3 @@ impl<T> IndexMut<(usize, usize)> for Grid<T> {
         &mut self.data[y * self.width + x]
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn wrong_length_is_an_error() {
-        assert_eq!(Grid::from_vec(2, 3, vec![0; 5]), Err(GridSizeError { width: 2, height: 3, len: 5 }));
-        assert!(Grid::from_vec(usize::MAX, 2, vec![0; 5]).is_err());
-    }
-
-    #[test]
-    fn rotating_twice_and_flipping_twice_change_nothing() {
-        let grid = Grid::from_fn(5, 3, |x, y| x + 10 * y);
-        assert_eq!(grid.rotated_180()[(0, 0)], 24);
-        assert_eq!(grid.rotated_180().rotated_180(), grid);
-        assert_eq!(grid.rows_reversed()[(1, 0)], 21);
-        assert_eq!(grid.rows_reversed().rows_reversed(), grid);
-    }
-}

@@ -153,15 +153,6 @@ mod tests {
     }
 
     #[test]
-    fn masks_differ_in_a_rectangle() {
-        let (a, mut b) = (empty(), empty());
-        assert_eq!(difference(&a, &b), None);
-        (b[(3, 9)], b[(12, 4)]) = (true, true);
-        assert_eq!(difference(&a, &b), Some(Rect { x: 3, y: 4, width: 10, height: 6 }));
-        assert_eq!(difference(&a, &Mask::filled(3, 3, true)), None);
-    }
-
-    #[test]
     fn outside_and_nonsense_change_nothing() {
         let mut mask = empty();
         let far = DVec2::new(1e300, -1e300);

@@ -49,14 +49,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nan_has_its_own_color_and_ends_are_those_of_the_map() {
-        let depth = DepthMap::from_vec(4, 1, vec![f32::NAN, 0.0, 0.018, 0.5]).unwrap();
-        let picture = colored(&depth, ColorMap::Viridis, Range { lo: 0.0, hi: 0.018 });
-        let [nan, low, high] = [f32::NAN, 0.0, 1.0].map(|unit| ColorMap::Viridis.rgb8(unit));
-        assert_eq!(picture.as_slice(), [nan, low, high, high]);
-    }
-
-    #[test]
     fn a_difference_lies_around_gray() {
         let image = RgbGrid::from_fn(10, 10, |x, _| [0.0, x as f32 - 4.5, f32::NAN]);
         let picture = difference(&image);

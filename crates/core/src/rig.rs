@@ -270,17 +270,4 @@ mod tests {
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, 0.0)), None);
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, f64::NAN)), None);
     }
-
-    #[test]
-    fn the_labs_rig_is_written_and_read() {
-        let rig = Rig::lab();
-        let text = serde_json::to_string(&*rig).unwrap();
-        assert_eq!(serde_json::from_str::<Rig>(&text).unwrap(), *rig);
-        assert_eq!(rig.pads().map(|pad| rig.pad_key(pad)).collect::<Vec<_>>(), ["right", "left"]);
-        assert_eq!(rig.pad_of_key("left"), Some(lab::LEFT));
-        assert_eq!((rig.sensor_of_key("bubble"), rig.sensor_of_key("digit")), (Some(lab::BUBBLE_ID), None));
-        assert_eq!(rig.window(lab::LEFT, lab::BUBBLE_ID, lab::GELSLIM_ID), None);
-        assert_eq!(rig.color_window(PadId::new(7)), None);
-        assert_eq!((rig.pad_name(PadId::new(7)), &*rig.pad_key(PadId::new(7))), ("?", "7"));
-    }
 }

@@ -116,13 +116,9 @@ impl std::fmt::Debug for Derived {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::atomic::{AtomicUsize, Ordering};
 
     use super::*;
     use crate::align::testing::cross;
-
-    #[derive(Debug, PartialEq)]
-    struct Count(usize);
 
     #[test]
     fn a_model_drawn_beside_the_grasp_plane_is_as_one_about_it() {
@@ -134,26 +130,5 @@ mod tests {
         for (a, b) in model.mesh.vertices.iter().zip(&centered.mesh.vertices) {
             assert!(a.abs_diff_eq(*b, 1e-9));
         }
-    }
-
-    #[test]
-    fn what_is_derived_is_made_once_for_each_type_on_any_thread() {
-        let tool = ToolModel::new(cross()).unwrap();
-        let calls = AtomicUsize::new(0);
-        let count = |tool: &ToolModel| {
-            calls.fetch_add(1, Ordering::Relaxed);
-            Count(tool.surface().len())
-        };
-        std::thread::scope(|scope| {
-            for _ in 0..4 {
-                scope.spawn(|| assert_eq!(*tool.derived(count), Count(SURFACE_POINTS)));
-            }
-        });
-        assert_eq!(calls.load(Ordering::Relaxed), 1);
-        // While one is made another may be asked for, of the same tool.
-        let nested = tool.derived(|tool| tool.derived(count).0.to_string());
-        assert_eq!(*nested, SURFACE_POINTS.to_string());
-        assert_eq!(calls.load(Ordering::Relaxed), 1);
-        assert_eq!(ToolModel::new(cross()).unwrap().derived(|_| Count(7)).0, 7, "another tool has its own");
     }
 }

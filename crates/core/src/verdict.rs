@@ -237,20 +237,3 @@ fn signs(report: &AlignReport, evidence: &Evidence, place_m: f64) -> Vec<Sign> {
     }
     signs
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_value_is_graded_by_its_limits_and_what_is_no_number_is_wrong() {
-        let at = |deg: f64| Grade::of_angle_error(deg.to_radians());
-        assert_eq!([at(0.0), at(-4.9), at(9.0), at(11.0)], [Grade::Good, Grade::Good, Grade::Check, Grade::Wrong]);
-        assert_eq!(at(f64::NAN), Grade::Wrong);
-        assert!(Grade::Wrong > Grade::Check && Grade::Check > Grade::Good);
-        // A place far off is not made good by its angle.
-        let off = PoseDifference { angle_rad: 0.0, position_m: 0.02 };
-        assert_eq!(Grade::of_difference(off), Grade::Wrong);
-        assert_eq!(("check".parse(), Grade::Wrong.to_string()), (Ok(Grade::Check), "wrong".to_owned()));
-    }
-}

@@ -64,16 +64,3 @@ pub(crate) fn filled(
         })
         .collect()
 }
-
-/// A flat disc across the closing axis, radius in meters, closed.
-pub(crate) fn disc(radius: f64, sides: u32) -> TriMesh {
-    let mut mesh =
-        TriMesh { vertices: vec![DVec3::new(-0.003, 0.0, 0.0), DVec3::new(0.003, 0.0, 0.0)], ..TriMesh::default() };
-    for i in 0..sides {
-        let p = DVec2::from_angle(std::f64::consts::TAU * f64::from(i) / f64::from(sides)) * radius;
-        mesh.vertices.extend([DVec3::new(-0.003, p.x, p.y), DVec3::new(0.003, p.x, p.y)]);
-        let (a, b) = (2 + 2 * i, 2 + 2 * ((i + 1) % sides));
-        mesh.triangles.extend([[0, b, a], [1, a + 1, b + 1], [a, b, a + 1], [b, b + 1, a + 1]]);
-    }
-    mesh
-}

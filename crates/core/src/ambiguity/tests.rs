@@ -47,18 +47,6 @@ fn bare_shafts_are_found_and_patterns_are_not_taken_for_them() {
     }
 }
 
-/// The rates that the documentation states: `cargo test --release -- --ignored ambiguity --nocapture`.
-#[test]
-#[ignore = "a survey of some minutes, not a test"]
-#[allow(clippy::print_stdout, reason = "its result is the print")]
-fn rates() {
-    let (shafts, mut plain) = (survey(7000..7240, true), survey(8000..8240, false));
-    let rods = plain.extract_if(.., |(name, _)| name.contains("rod")).collect::<Vec<_>>();
-    for (name, list) in [("on a shaft", &shafts), ("plain, no rod", &plain), ("plain rod", &rods)] {
-        println!("{name}: {:.1} % of {} images are called a bare shaft", 100.0 * share(list), list.len());
-    }
-}
-
 #[test]
 fn pictures_made_by_hand_are_judged_as_a_person_would() {
     let judged = |f: &dyn Fn(f32, f32) -> f32| {

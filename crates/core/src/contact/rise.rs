@@ -132,28 +132,3 @@ fn near(mask: &Mask, reach: usize) -> Mask {
     let columns: Vec<Vec<bool>> = (0..width).map(|x| spread(height, &|y| rows[y * width + x])).collect();
     Mask::from_fn(width, height, |x, y| columns[x][y])
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_in_a_mask_stands_out_of_what_lies_around_it_whatever_the_ramp() {
-        let mask = Mask::from_fn(175, 140, |x, y| (60..90).contains(&x) && (40..100).contains(&y));
-        let ramp = |height: f32| {
-            DepthMap::from_fn(175, 140, |x, y| {
-                0.03 * x as f32 / 175.0 + 0.01 * y as f32 / 140.0 + if mask[(x, y)] { height } else { 0.0 }
-            })
-        };
-        let deep = stands_out(&ramp(0.006), &mask).unwrap();
-        assert!((deep - 0.006).abs() < 6e-4, "{deep}");
-        assert!(stands_out(&ramp(0.0), &mask).unwrap().abs() < 1e-5);
-        assert!(rise(&ramp(0.0)) < 1e-5 && rise(&ramp(0.006)) > 0.004);
-        for nothing in [Mask::filled(175, 140, false), Mask::filled(175, 140, true), Mask::filled(3, 3, true)] {
-            assert_eq!(stands_out(&ramp(0.006), &nothing), None);
-        }
-        assert_eq!(stands_out(&DepthMap::filled(175, 140, f32::NAN), &mask), None);
-        assert_eq!(rise(&DepthMap::filled(1, 1, 0.3)), 0.0);
-        assert_eq!(rise(&DepthMap::filled(0, 0, 0.0)), 0.0);
-    }
-}

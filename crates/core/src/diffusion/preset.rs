@@ -61,23 +61,3 @@ impl Preset {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use strum::IntoEnumIterator as _;
-
-    use super::*;
-
-    #[test]
-    fn presets_keep_the_seed_and_never_ask_for_more_steps_than_there_are() {
-        let defaults = GenerateConfig { seed: 7, steps: 3, eta: 0.5, spacing: Spacing::Lab, ..Default::default() };
-        for preset in Preset::iter() {
-            assert_eq!(preset.key().parse(), Ok(preset));
-            let config = preset.config(defaults, 4);
-            assert_eq!(config.seed, 7);
-            assert!((1..=4).contains(&config.steps), "{preset:?}");
-        }
-        assert_eq!(Preset::Default.config(defaults, 1000), defaults);
-        assert!(Preset::Fast.config(defaults, 1000).steps <= 4);
-    }
-}

@@ -77,23 +77,3 @@ impl Tensor {
         self.data.iter().filter(|v| !v.is_finite()).count()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn stacking_and_taking_apart() {
-        let a = Tensor::new(vec![2, 2], vec![1.0, 2.0, 3.0, 4.0]).unwrap();
-        let both = Tensor::stack(&[a.clone(), Tensor::filled(vec![2, 2], 0.5)]).unwrap();
-        assert_eq!(both.shape(), [2, 2, 2]);
-        assert_eq!(both.item(0), Some(a.clone()));
-        assert_eq!(both.item(2), None);
-        let long = Tensor::concat(&[&both, &both]).unwrap();
-        assert_eq!((long.shape(), long.item(3)), (&[4, 2, 2][..], both.item(1)));
-        assert_eq!(Tensor::concat(&[&both, &a]), None);
-        assert_eq!(Tensor::stack(&[a, Tensor::filled(vec![4], 0.5)]), None);
-        assert_eq!(Tensor::new(vec![2, 2], vec![0.0; 3]), None);
-        assert_eq!(Tensor::new(vec![usize::MAX, 2], vec![]), None);
-    }
-}

@@ -53,13 +53,4 @@ mod tests {
         assert_eq!(agreement(&square(7), &square(5)), Some(agreed));
         assert_eq!(iou(&square(5), &square(7)), agreed.iou);
     }
-
-    #[test]
-    fn the_same_agrees_and_nothing_agrees_with_nothing() {
-        let empty = Mask::filled(40, 30, false);
-        assert_eq!(agreement(&square(5), &square(5)), Some(Agreement { iou: 1.0, dice: 1.0 }));
-        assert_eq!(agreement(&empty, &empty), Some(Agreement { iou: 1.0, dice: 1.0 }));
-        assert_eq!(agreement(&square(5), &empty), Some(Agreement { iou: 0.0, dice: 0.0 }));
-        assert_eq!(agreement(&empty, &Mask::filled(3, 3, false)), None);
-    }
 }

@@ -111,13 +111,4 @@ mod tests {
         assert!(!encloses(&square[..2], DVec2::new(2.0, 1.5)) && !encloses(&square, DVec2::NAN));
         assert_eq!(enclosed([0, 0], &square).len(), 0);
     }
-
-    #[test]
-    fn nothing_is_as_deep_as_nothing() {
-        let imprint = DepthMap::from_fn(5, 5, |x, _| if x == 2 { f32::NAN } else { 0.001 });
-        let left = about_as_deep(&imprint, DVec2::new(0.0, 0.0), 1.0);
-        assert_eq!(left.as_slice().iter().filter(|v| **v).count(), 10, "what is not measured parts regions");
-        assert!(!about_as_deep(&imprint, DVec2::new(2.0, 2.0), 1.0).as_slice().contains(&true));
-        assert!(!about_as_deep(&imprint, DVec2::new(0.0, 0.0), f64::NAN).as_slice().contains(&true));
-    }
 }

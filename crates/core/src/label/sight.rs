@@ -284,23 +284,6 @@ mod tests {
     }
 
     #[test]
-    fn parallel_lines_of_sight_have_layers_too() {
-        let mut sight = from_above(4000.0, Layers::Front);
-        // Depth from 1 at 0.2 m above to 0 as far below.
-        let (x, y) = (4000.0 / 200.0, 4000.0 / 150.0);
-        sight.clip_from_grasp = Mat4::from_cols(
-            Vec4::new(x, 0.0, 0.0, 0.0),
-            Vec4::new(0.0, y, 0.0, 0.0),
-            Vec4::new(0.0, 0.0, 2.5, 0.0),
-            Vec4::new(0.0, 0.0, 0.5, 1.0),
-        );
-        let (near, far) = (sheet(0.005), sheet(-0.005));
-        assert_eq!(stamp(&VisiblePixels::new(&sight, (&far.0, &far.1), &[&near.0]), CENTER, 9.0), 0);
-        assert_eq!(stamp(&VisiblePixels::new(&sight, (&near.0, &near.1), &[&far.0]), CENTER, 9.0), 69, "as on paper");
-        assert!((sight.px_per_m(DVec3::Z * 0.1).unwrap() - 4000.0).abs() < 1e-3);
-    }
-
-    #[test]
     fn nothing_and_nonsense_reach_nothing() {
         let sight = from_above(4000.0, Layers::Front);
         assert_eq!(stamp(&VisiblePixels::new(&sight, (&[], &[]), &[]), CENTER, 1e9), 0);
@@ -316,25 +299,5 @@ mod tests {
         assert_eq!(stamp(&VisiblePixels::new(&broken, (&points, &pixels), &[&points]), CENTER, 1e9), 0);
         let empty = Sight { size_px: [0, 0], clip_from_grasp: Mat4::ZERO, ..sight };
         assert_eq!(stamp(&VisiblePixels::new(&empty, (&points, &pixels), &[]), CENTER, 1e9), 0);
-    }
-
-    #[test]
-    fn lines_enclose_points_and_the_nearest_is_found() {
-        let (points, pixels) = sheet(0.0);
-        let seen = VisiblePixels::new(&from_above(4000.0, Layers::Front), (&points, &pixels), &[]);
-        let square = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]].map(|d| CENTER + DVec2::from(d));
-        assert_eq!(seen.within(&square, false).len(), 5 * 5, "2 px apart");
-        assert_eq!(seen.within(&square[..1], false), Vec::<[u16; 2]>::new());
-        assert_eq!(seen.within(&[square[0], CENTER, square[2]], true).len(), 5 * 5);
-        assert_eq!(seen.within(&[], true).len(), 0);
-        assert_eq!(seen.nearest(CENTER + DVec2::new(4.3, -1.6)), Some([12, 11]));
-    }
-
-    #[test]
-    fn a_sight_is_the_same_after_it_was_text() {
-        let mut sight = from_above(4321.987, Layers::All);
-        sight.cut.push(Vec4::new(0.1, 0.2, 0.3, 1.0 / 3.0));
-        let text = serde_json::to_string(&sight).unwrap();
-        assert_eq!(serde_json::from_str::<Sight>(&text).unwrap(), sight, "{text}");
     }
 }

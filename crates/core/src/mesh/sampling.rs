@@ -98,12 +98,4 @@ mod tests {
         assert_ne!(points, mesh.sample_surface(4000, 8));
         assert!(TriMesh::default().sample_surface(10, 0).is_empty());
     }
-
-    #[test]
-    fn spreading_is_increasing_and_complete() {
-        assert_eq!(spread(5, 8), [0, 1, 2, 3, 4]);
-        let chosen = spread(24_500, 512);
-        assert_eq!(chosen.len(), 512);
-        assert!(chosen.windows(2).all(|w| w[0] < w[1]) && chosen[511] < 24_500);
-    }
 }

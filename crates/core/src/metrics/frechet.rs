@@ -86,24 +86,6 @@ mod tests {
     }
 
     #[test]
-    fn known_distances() {
-        // One dimension: (m1 - m2)² + (s1 - s2)².
-        let a = vec![vec![0.0], vec![2.0]];
-        let b = vec![vec![10.0], vec![16.0]];
-        let expected = 144.0 + (2f64.sqrt() - 18f64.sqrt()).powi(2);
-        assert!((distance(&a, &b).unwrap() - expected).abs() < 1e-9);
-        // A shift alone is its squared length, a scale alone (k - 1)² of the variance.
-        let a = set(300, 7, 1, 1.0, 0.0);
-        let moved: Vec<Vec<f32>> = a.iter().map(|v| v.iter().map(|x| x + 0.5).collect()).collect();
-        assert!((distance(&a, &moved).unwrap() - 7.0 * 0.25).abs() < 1e-4);
-        let wider: Vec<Vec<f32>> = a.iter().map(|v| v.iter().map(|x| x * 3.0).collect()).collect();
-        let (mean, c) = moments(&a.iter().map(Vec::as_slice).collect::<Vec<_>>(), 7);
-        let variance = c.trace();
-        let shift: f64 = mean.iter().map(|m| 4.0 * m * m).sum();
-        assert!((distance(&a, &wider).unwrap() / (4.0 * variance + shift) - 1.0).abs() < 1e-5);
-    }
-
-    #[test]
     fn few_vectors_in_many_dimensions_are_no_trouble() {
         // 12 vectors in 40 dimensions: rank 11 at most.
         let (a, b) = (set(12, 40, 3, 0.02, 4.0), set(12, 40, 4, 0.02, 4.0));
@@ -134,28 +116,6 @@ mod tests {
                 (distance(&set("first"), &set("second")).unwrap(), case["distance"].as_f64().unwrap());
             assert!((found - theirs).abs() < 1e-3, "{found} for {theirs}");
         }
-    }
-
-    #[test]
-    fn products_and_covariances_give_the_same_distance() {
-        let (a, b) = (set(30, 32, 5, 0.1, 0.0), set(25, 32, 6, 0.2, 0.3));
-        let [a, b] = [&a, &b].map(|s| s.iter().map(Vec::as_slice).collect::<Vec<_>>());
-        let ((m1, c1), (m2, c2)) = (moments(&a, 32), moments(&b, 32));
-        let shared = (root(c1.clone()).unwrap() * root(c2.clone()).unwrap()).singular_values().sum();
-        let by_covariances = (m1 - m2).norm_squared() + c1.trace() + c2.trace() - 2.0 * shared;
-        let found = frechet_distance(&a, &b).unwrap();
-        assert!((found / by_covariances - 1.0).abs() < 1e-6, "{found} {by_covariances}");
-    }
-
-    #[test]
-    fn the_root_of_a_matrix_squares_to_it() {
-        let a = set(60, 30, 9, 1.0, 0.0);
-        let (_, c) = moments(&a.iter().map(Vec::as_slice).collect::<Vec<_>>(), 30);
-        let r = root(c.clone()).unwrap();
-        assert!((&r * &r - &c).amax() < 1e-12 * c[(29, 29)]);
-        let singular = r.singular_values().sum();
-        let eigen: f64 = eigen_symmetric(c).unwrap().0.iter().map(|v| v.max(0.0).sqrt()).sum();
-        assert!((singular / eigen - 1.0).abs() < 1e-12);
     }
 
     #[test]

@@ -176,35 +176,6 @@ mod tests {
     }
 
     #[test]
-    fn an_image_equals_itself_and_a_constant_equals_a_constant() {
-        let (prediction, truth) = textured(0.01);
-        for image in [&prediction, &truth, &Grid::filled(5, 3, 0.09)] {
-            let similarity = ssim(image, image, SsimRange::Explicit(0.0225)).unwrap();
-            assert!((similarity.mean - 1.0).abs() < 1e-12);
-        }
-        let flat = Grid::filled(20, 20, 0.09f32);
-        assert_eq!(ssim(&flat, &truth, SsimRange::Explicit(1.0)).err().map(|e| e.to_string().is_empty()), Some(false));
-        assert!(matches!(ssim(&flat, &flat, SsimRange::OfPrediction), Err(MetricError::Range(r)) if r == 0.0));
-        assert!(ssim(&flat, &flat, SsimRange::Explicit(f64::NAN)).is_err());
-    }
-
-    #[test]
-    fn a_large_offset_does_not_spoil_the_variances() {
-        for offset in [0.0, 0.09, 1.0] {
-            let (prediction, truth) = textured(offset);
-            let similarity = ssim(&prediction, &truth, SsimRange::Explicit(0.0225)).unwrap();
-            assert!(similarity.map.as_slice().iter().all(|s| (-1.0..=1.0).contains(s)), "offset {offset}");
-        }
-        // In f64 from f64 images there is no rounding of the pixels: the f32 images must agree within their own.
-        let (prediction, truth) = textured(1.0);
-        let back = |g: &Grid<f32>| g.map(|v| v - 1.0);
-        let inner = |g: Ssim| f64::from(g.map[(15, 12)]);
-        let near = inner(ssim(&prediction, &truth, SsimRange::Explicit(2.0)).unwrap());
-        let far = inner(ssim(&back(&prediction), &back(&truth), SsimRange::Explicit(2.0)).unwrap());
-        assert!((near - far).abs() < 1e-2);
-    }
-
-    #[test]
     fn invalid_pixels_are_counted() {
         let (mut prediction, truth) = textured(0.0);
         prediction[(3, 3)] = f32::NAN;

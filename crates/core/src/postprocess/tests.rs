@@ -53,16 +53,6 @@ fn the_papers_shift_is_an_affine_map() {
 }
 
 #[test]
-fn a_deviation_of_almost_zero_is_not_divided_by() {
-    for pred_std in [0.0, 7e-9, f64::NAN, -1.0] {
-        let stats = ShiftStats { pred_std, ..stats() };
-        let chain = chain().with_mode(ShiftMode::PaperShift, Some(stats)).unwrap();
-        assert!(chain.run(&picture()).unwrap().as_slice().iter().all(|v| v.is_finite() && v.abs() < 0.05));
-        assert!(kinds(&flags(&chain, &picture(), None).unwrap()).contains(&FlagKind::NoSpread));
-    }
-}
-
-#[test]
 fn luma_weighs_the_channels_as_the_released_code() {
     let channels = [1.0, -1.0, -1.0].map(|v| Grid::filled(2, 2, v)).to_vec();
     let chain = DepthChain { reduction: Reduction::Luma, size: [2, 2], ..chain() };
@@ -111,16 +101,6 @@ fn malformed_pictures_and_ranges_are_errors() {
     assert_eq!(Stats::of(&Grid::filled(2, 2, f32::NAN)).count, 0);
 }
 
-#[test]
-fn statistics_survive_a_large_mean() {
-    // A spread of 0.5 beside means up to 1e6, in f32 pixels that hold it exactly.
-    for mean in [0.0f32, 10.0, 1000.0, 1e6] {
-        let image = Grid::from_fn(100, 100, |x, _| mean + if x % 2 == 0 { 0.5 } else { -0.5 });
-        let stats = Stats::of(&image);
-        assert!((stats.std - 0.5).abs() < 1e-9 * 0.5, "{mean}: {}", stats.std);
-    }
-}
-
 /// A bar on a background, as a decoder means it.
 fn imprint() -> Grid<f32> {
     Grid::from_fn(60, 48, |x, y| {
@@ -141,12 +121,6 @@ fn whole(mode: ShiftMode) -> DepthChain {
 
 fn kinds(flags: &[Flag]) -> Vec<FlagKind> {
     flags.iter().map(|f| f.kind).collect()
-}
-
-#[test]
-fn a_sound_chain_has_no_flag() {
-    let found = flags(&whole(ShiftMode::ExactInverse), &decoded(&imprint(), 3), Some(&imprint())).unwrap();
-    assert_eq!(found, []);
 }
 
 #[test]

@@ -152,22 +152,3 @@ impl<'a, T> IntoIterator for &'a PerPad<T> {
         self.0.iter()
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_length_means_nothing() {
-        let mut some: PerPad<i32> = PerPad::default();
-        let third = PadId::new(2);
-        assert_eq!((some[third], some.get(third), some.is_empty()), (None, None, true));
-        assert_eq!(some, PerPad::from([None, None]));
-        some[third] = Some(5);
-        assert_eq!(some, PerPad::from([None, None, Some(5), None]));
-        assert_eq!(some.entries().collect::<Vec<_>>(), [(third, &5)]);
-        assert_eq!(some.as_ref().map(|v| v.map(|v| v + 1)), PerPad::from([None, None, Some(6)]));
-        *some.get_mut(third).unwrap() = 7;
-        assert_eq!(some.into_iter().flatten().collect::<Vec<_>>(), [7]);
-    }
-}

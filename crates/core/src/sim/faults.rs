@@ -96,28 +96,3 @@ impl Fault {
         mesh
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::rig::PadId;
-    use strum::IntoEnumIterator;
-
-    #[test]
-    fn each_touch_has_its_fault_and_only_that() {
-        for fault in Fault::iter() {
-            let sample = fault.sample();
-            let pushed = |finger: PadId| {
-                let bubble = sample.pad(finger).unwrap().depth().unwrap();
-                bubble.imprint.as_slice().iter().filter(|d| **d > 5e-3).count()
-            };
-            assert!(pushed(lab::RIGHT) > 500, "{fault}");
-            assert_eq!(pushed(lab::LEFT) == 0, fault == Fault::BlankFinger, "{fault}");
-            let mesh = fault.mesh();
-            let reach = mesh.vertices.iter().map(|v| v.length()).fold(0.0, f64::max);
-            assert_eq!(reach > 1.0, fault == Fault::StlInMillimeters, "{fault}");
-            assert_eq!(mesh == fault.tool().mesh(), !matches!(fault, Fault::WrongCad | Fault::StlInMillimeters));
-        }
-        assert_eq!(Fault::WrongCad.to_string(), "wrong_cad");
-    }
-}

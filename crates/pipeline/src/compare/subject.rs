@@ -249,36 +249,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_written_is_read() {
-        let change = RecipeChange {
-            bundle: Some("fitted".into()),
-            steps: Some(50),
-            seed: Some(u64::MAX),
-            shift: Some(Mapping::Unfitted),
-        };
-        let subjects = [
-            Subject::Measured,
-            Subject::Stored,
-            Subject::shown(),
-            Subject::Predicted(change.clone()),
-            Subject::Mean(change, 4),
-        ];
-        for subject in subjects {
-            assert_eq!(subject.to_string().parse::<Subject>().unwrap(), subject);
-            let json = serde_json::to_string(&subject).unwrap();
-            assert_eq!(serde_json::from_str::<Subject>(&json).unwrap(), subject);
-            assert!(!subject.label().is_empty());
-        }
-        assert_eq!("mean".parse::<Subject>().unwrap(), Subject::Mean(RecipeChange::default(), 8));
-        let names = ["trained, twice", "a \"b\", c", r"C:\models\", r"a\", "", " ", "a=b:c", "\u{89e6}, \n\""];
-        for bundle in names.map(|name| Some(name.to_owned())) {
-            let change = RecipeChange { bundle, seed: Some(7), ..RecipeChange::default() };
-            let subject = Subject::Predicted(change);
-            assert_eq!(subject.to_string().parse::<Subject>().unwrap(), subject);
-        }
-    }
-
-    #[test]
     fn a_subject_is_made_from_what_is_given_with_its_changes() {
         let given = |named: Option<&str>| match named {
             Some(_) => Err("there is no such generator"),

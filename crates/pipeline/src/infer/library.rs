@@ -78,25 +78,3 @@ fn python_onnxruntime() -> Option<PathBuf> {
     let text = text.trim();
     (output.status.success() && !text.is_empty()).then(|| PathBuf::from(text))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn only_the_library_itself_is_taken() {
-        let dir = tempfile::tempdir().unwrap();
-        assert_eq!(library_in(dir.path()), None);
-        for name in ["libonnxruntime_providers_shared.so", "onnxruntime_pybind11_state.so", "libonnxruntime.txt"] {
-            std::fs::write(dir.path().join(name), b"").unwrap();
-        }
-        assert_eq!(library_in(dir.path()), None);
-        for name in ["libonnxruntime.so.1.31.1", "libonnxruntime.1.31.1.dylib", "onnxruntime.dll"] {
-            let path = dir.path().join(name);
-            std::fs::write(&path, b"").unwrap();
-            assert_eq!(library_in(dir.path()), Some(path.clone()));
-            std::fs::remove_file(path).unwrap();
-        }
-        assert_eq!(library_in(&dir.path().join("absent")), None);
-    }
-}

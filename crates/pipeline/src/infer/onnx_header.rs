@@ -268,18 +268,4 @@ mod tests {
         let inputs = read(&within(7, &graph)).unwrap().inputs;
         assert_eq!(inputs.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["x"]);
     }
-
-    #[test]
-    fn damaged_files_are_errors_and_never_panics() {
-        assert!(read(b"").is_err());
-        assert!(read(b"{\"format\": 1}").is_err());
-        assert!(read(&[0xff; 64]).is_err());
-        for cut in 0..DENOISER.len() {
-            // A cut may still leave a readable beginning; it must only never panic.
-            drop(read(&DENOISER[..cut]));
-            let mut changed = DENOISER.to_vec();
-            changed[cut] ^= 0x55;
-            drop(read(&changed));
-        }
-    }
 }

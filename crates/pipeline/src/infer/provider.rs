@@ -129,32 +129,3 @@ impl Provider {
         }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use strum::IntoEnumIterator as _;
-
-    #[test]
-    fn keys_are_the_same_in_files_and_words() {
-        for provider in Provider::iter() {
-            assert_eq!(serde_json::to_value(provider).unwrap(), provider.key());
-            assert_eq!(provider.key().parse(), Ok(provider));
-            assert!(provider.engine_name().ends_with(provider.name()));
-            assert!(!provider.name().is_empty() && provider.name().len() < provider.engine_name().len());
-        }
-    }
-
-    #[test]
-    fn every_provider_has_a_way_to_it() {
-        for provider in Provider::iter() {
-            let way = provider.way_to();
-            assert!(way.contains(provider.needs()), "{way}");
-            assert_eq!(
-                way.contains("pip install onnx"),
-                provider.is_possible_here() && provider.package().is_some(),
-                "{way}"
-            );
-        }
-    }
-}

@@ -105,19 +105,3 @@ fn look_at(provider: Provider) -> ProviderReport {
         Err(why) => ProviderReport { provider, works: false, device: None, reason: Some(why.to_string()) },
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_report_always_says_why() {
-        let report = runtime_report();
-        assert!(!report.reason.is_empty() && report.threads >= 1);
-        assert_eq!(report.engine.is_some(), cfg!(feature = "onnx"));
-        let built_in = report.engine.is_none_or(|engine| engine == EngineKind::Rten);
-        assert_eq!(report.library.is_none(), built_in);
-        assert!(report.providers.iter().all(|found| found.works == found.reason.is_none()), "{report:?}");
-        assert!(report.to_string().contains(&report.reason));
-    }
-}

@@ -399,14 +399,4 @@ mod tests {
         assert_eq!(kept(&store).0, 1);
         assert!(store.folder().join("notes.txt").exists() && !part.exists());
     }
-
-    #[test]
-    fn a_folder_that_cannot_be_made_is_an_error_of_the_disk_and_no_panic() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("file");
-        fs::write(&file, "in the way").unwrap();
-        let store = Store::new(file, 1 << 20);
-        assert!(store.put(&recipe("a", 1), &raw(0.0), 0.0).is_err());
-        assert_eq!((store.get(&recipe("a", 1)), store.of_input("a", 9), kept(&store)), (None, vec![], (0, 0)));
-    }
 }

@@ -404,20 +404,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_last_integer_orders_files() {
-        for (text, want) in [
-            ("data_12", 12),
-            ("pattern_05_3_lines_angle_2_data_5", 5),
-            ("x", 0),
-            ("7é", 7),
-            ("é7", 7),
-            ("99999999999999999999999", u64::MAX),
-        ] {
-            assert_eq!(last_integer(text), want, "{text}");
-        }
-    }
-
-    #[test]
     fn a_panic_on_a_pair_is_that_pairs_error() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join("a_gelslim.png");
@@ -432,11 +418,5 @@ mod tests {
         );
         assert_eq!(problem.file, dir.path().canonicalize().unwrap().join("a_gelslim.png"));
         assert!(dataset.load(PairId(0)).is_err_and(|err| !matches!(err, LoadError::Bug { .. })));
-    }
-
-    #[test]
-    fn a_dataset_can_be_shared_with_threads() {
-        fn check<T: Send + Sync>() {}
-        check::<Dataset>();
     }
 }

@@ -157,49 +157,4 @@ mod tests {
         std::fs::write(&file, b"\xff").unwrap();
         assert_eq!(read_to_string(&file, 9).unwrap_err().kind(), io::ErrorKind::InvalidData);
     }
-
-    #[cfg(unix)]
-    #[test]
-    fn pipes_devices_and_links_to_them_are_refused_at_once() {
-        let dir = tempfile::tempdir().unwrap();
-        let pipe = dir.path().join("pipe");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        let zero = dir.path().join("zero");
-        std::os::unix::fs::symlink("/dev/zero", &zero).unwrap();
-        for path in [&pipe, &zero] {
-            let error = read(path, SMALL).unwrap_err();
-            assert!(error.to_string().contains("not an ordinary file"), "{error}");
-        }
-        let (file, link) = (dir.path().join("f"), dir.path().join("link"));
-        std::fs::write(&file, b"1").unwrap();
-        std::os::unix::fs::symlink(&file, &link).unwrap();
-        assert_eq!(read(&link, 1).unwrap(), b"1");
-    }
-
-    #[cfg(unix)]
-    #[test]
-    fn what_is_appended_to_is_an_ordinary_file_in_its_own_place() {
-        use std::io::Write as _;
-        let dir = tempfile::tempdir().unwrap();
-        let at = |name: &str| dir.path().join(name);
-        append(&at("new")).unwrap().write_all(b"1").unwrap();
-        append(&at("new")).unwrap().write_all(b"2").unwrap();
-        assert_eq!(std::fs::read(at("new")).unwrap(), b"12");
-        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().unwrap().success());
-        std::os::unix::fs::symlink(at("new"), at("link")).unwrap();
-        std::os::unix::fs::symlink(at("not there"), at("to nothing")).unwrap();
-        for name in ["pipe", "link", "to nothing"] {
-            let error = append(&at(name)).unwrap_err();
-            assert!(error.to_string().contains("not an ordinary file"), "{name}: {error}");
-        }
-        assert!(!at("not there").exists());
-        assert_eq!(append(dir.path()).unwrap_err().kind(), io::ErrorKind::IsADirectory);
-    }
-
-    #[test]
-    fn long_texts_are_clipped_at_a_character() {
-        assert_eq!(clip("short"), "short");
-        let long = clip(&"é".repeat(1000));
-        assert!(long.len() < 900 && long.ends_with("é ..."));
-    }
 }

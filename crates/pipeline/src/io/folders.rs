@@ -74,26 +74,3 @@ fn local_data() -> Option<PathBuf> {
 fn cache() -> Option<PathBuf> {
     Some(dirs::cache_dir()?.join(NAME))
 }
-
-#[cfg(test)]
-mod tests {
-    #[test]
-    #[cfg(target_os = "linux")]
-    fn folders_are_where_they_always_were() {
-        // The rules of the XDG base directory specification, which is where earlier versions put their files.
-        let base = |variable: &str, otherwise: &str| {
-            let named = std::env::var_os(variable).map(std::path::PathBuf::from).filter(|p| p.is_absolute());
-            named.or_else(|| Some(std::path::PathBuf::from(std::env::var_os("HOME")?).join(otherwise)))
-        };
-        for (found, variable, otherwise) in [
-            (super::config(), "XDG_CONFIG_HOME", ".config"),
-            (super::data(), "XDG_DATA_HOME", ".local/share"),
-            (super::local_data(), "XDG_DATA_HOME", ".local/share"),
-            (super::cache(), "XDG_CACHE_HOME", ".cache"),
-        ] {
-            if let Some(base) = base(variable, otherwise) {
-                assert_eq!(found, Some(base.join("touch2touch")), "{variable}");
-            }
-        }
-    }
-}

@@ -102,37 +102,7 @@ fn object(value: Result<Value, serde_json::Error>) -> Map<String, Value> {
 
 #[cfg(test)]
 mod tests {
-    use proptest::prelude::*;
-
     use super::*;
-    use touch2touch_core::diffusion::{Sampler, Spacing};
-
-    fn config() -> impl Strategy<Value = GenerateConfig> {
-        let sampler = prop_oneof![Just(Sampler::Ddim), Just(Sampler::Ddpm)];
-        let spacing = prop_oneof![Just(Spacing::Lab), Just(Spacing::Trailing)];
-        (1u32..1000, 0.0..=1.0f64, any::<u64>(), sampler, spacing, prop_oneof![Just(1.0), 0.0..20.0f64]).prop_map(
-            |(steps, eta, seed, sampler, spacing, guidance)| GenerateConfig {
-                steps,
-                eta,
-                seed,
-                sampler,
-                spacing,
-                guidance,
-            },
-        )
-    }
-
-    proptest! {
-        #[test]
-        fn choices_come_back_and_every_one_counts(a in config(), b in config()) {
-            let id = |config| PredictedId::new("b0", config, ShiftMode::Raw);
-            let (bundle, back, shift) = id(&a).parts().map(|(b, c, s)| (b.to_owned(), c, s)).unwrap();
-            prop_assert_eq!((&*bundle, back, shift), ("b0", a, ShiftMode::Raw));
-            prop_assert_eq!(id(&a) == id(&b), a == b);
-            let again = PredictedId::from(id(&a).to_string());
-            prop_assert_eq!(again, id(&a));
-        }
-    }
 
     #[test]
     fn defaults_are_left_out_and_each_choice_has_one() {

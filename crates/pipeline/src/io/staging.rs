@@ -198,23 +198,6 @@ mod tests {
     }
 
     #[test]
-    fn new_content_takes_the_place_of_old_and_nothing_is_left() {
-        let dir = tempfile::tempdir().unwrap();
-        let target = dir.path().join("unet");
-        for text in ["one", "two"] {
-            let staging = Staging::new(&target).unwrap();
-            std::fs::create_dir(staging.new_content()).unwrap();
-            std::fs::write(staging.new_content().join("mask"), text).unwrap();
-            staging.put(&target).unwrap();
-            assert_eq!(std::fs::read_to_string(target.join("mask")).unwrap(), text);
-        }
-        // Without new content the old one stays.
-        assert!(Staging::new(&target).unwrap().put(&target).is_err());
-        assert_eq!(std::fs::read_to_string(target.join("mask")).unwrap(), "two");
-        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1);
-    }
-
-    #[test]
     fn a_folder_is_kept_for_one_run_at_a_time() {
         let dir = tempfile::tempdir().unwrap();
         let target = dir.path().join("fitted");

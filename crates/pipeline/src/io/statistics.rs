@@ -219,34 +219,4 @@ mod tests {
             assert!(err.contains(named), "{named} is not named: {err}");
         }
     }
-
-    #[test]
-    fn what_is_no_statistics_file_is_said() {
-        let folder = tempfile::tempdir().unwrap();
-        let file = folder.path().join("stats.json");
-        let text = serde_json::to_string(&made()).unwrap();
-        let older = text.replace("\"version\":1", "\"version\":7");
-        let negative = text.replace("\"pred_std\":", "\"pred_std\":-");
-        for (bad, says) in [
-            ("", "not a statistics file"),
-            ("{}", "not a statistics file"),
-            (&text[..text.len() / 2], "not a statistics file"),
-            (&older, "version 7"),
-            (&negative, "negative"),
-        ] {
-            std::fs::write(&file, bad).unwrap();
-            let err = ShiftStatistics::read(&file).unwrap_err().to_string();
-            assert!(err.contains(says) && err.contains("stats.json"), "{bad}: {err}");
-        }
-        assert!(ShiftStatistics::read(&folder.path().join("none.json")).unwrap_err().to_string().contains("none.json"));
-        assert_eq!(ShiftStatistics::new(made().provenance, &ShiftFit::default()), None);
-    }
-
-    #[test]
-    fn dates_are_those_of_the_calendar() {
-        assert_eq!(utc_text(0), "1970-01-01T00:00:00Z");
-        assert_eq!(utc_text(951_782_400), "2000-02-29T00:00:00Z");
-        assert_eq!(utc_text(1_795_253_445), "2026-11-21T09:30:45Z");
-        assert_eq!(utc_text(4_107_542_400), "2100-03-01T00:00:00Z");
-    }
 }

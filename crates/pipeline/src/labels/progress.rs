@@ -59,26 +59,3 @@ impl Progress {
         Self { tools: tools.into_iter().map(tool).collect(), all }
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use touch2touch_core::dataset::Split;
-
-    #[test]
-    fn pairs_are_counted_by_tool_and_state() {
-        let entry = |name: &str, tool: Option<&str>| PairEntry {
-            name: name.into(),
-            tool: tool.map(str::to_owned),
-            split: Split::None,
-            number: 0,
-        };
-        let pairs = [entry("a", Some("rod")), entry("b", Some("rod")), entry("c", None)];
-        let reviews = BTreeMap::from([("a".to_owned(), Review::Done), ("elsewhere".to_owned(), Review::Done)]);
-        let progress = Progress::of(&pairs, &reviews);
-        assert_eq!((progress.all.of(Review::Done), progress.all.of(Review::Todo), progress.all.total()), (1, 2, 3));
-        let rod = progress.tools.iter().find(|tool| tool.tool.as_deref() == Some("rod")).unwrap();
-        assert_eq!((rod.pairs.of(Review::Done), rod.pairs.of(Review::Todo)), (1, 1));
-        assert_eq!(Progress::of(&[], &reviews).all.total(), 0);
-    }
-}

@@ -248,23 +248,3 @@ pub fn accepted(drawn: Option<&DrawnMask>, proposal: &Proposal, over_drawn: bool
     hand.replace(&proposal.mask, proposal.provenance.clone(), !over_drawn);
     hand
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use touch2touch_core::bits::Bits;
-    use touch2touch_core::contact::MaskBasis;
-
-    #[test]
-    fn a_model_says_how_sure_it_is() {
-        let recipe = MaskRecipe::Unet("id".into(), Some(Bits::from(0.5_f32)));
-        let found = |basis, unsure| ContactMask { mask: Arc::new(Mask::filled(2, 2, true)), basis, unsure };
-        let sure = automatic(found(MaskBasis::Source, Some(0.012)), &recipe, "model");
-        assert_eq!(sure.note, "the model is unsure of 1.2 % of the picture");
-        assert!(matches!(sure.provenance, Provenance::Model { .. }), "{:?}", sure.provenance);
-        let instead = automatic(found(MaskBasis::Depth(0.004), Some(0.2)), &recipe, "model");
-        assert!(instead.note.contains("found no contact") && instead.note.ends_with("20.0 % of the picture"));
-        let silent = automatic(found(MaskBasis::Source, None), &MaskRecipe::Truth, "");
-        assert_eq!(silent.note, "");
-    }
-}

@@ -217,22 +217,3 @@ pub fn thumbnail(sample: &Sample) -> DepthMap {
         if count == 0 { f32::NAN } else { sum / count as f32 }
     })
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use touch2touch_core::rig::lab;
-
-    #[test]
-    fn a_thumbnail_keeps_means_and_survives_holes() {
-        let imprint = Grid::from_fn(175, 140, |x, y| if (x + y) % 2 == 0 { f32::NAN } else { 0.004 });
-        let bubble = touch2touch_core::sample::DepthTouch { imprint, camera: None, truth: None };
-        let touch = touch2touch_core::sample::PadTouch::default().with(lab::BUBBLE_ID, Some(bubble));
-        let sample = Sample { pads: [None, Some(touch)].into(), ..Sample::default() };
-        let small = thumbnail(&sample);
-        assert_eq!(small.size(), [44, 36]);
-        // The mean of equal numbers is that number up to rounding of a sum of at most 20.
-        assert!(small.as_slice().iter().all(|v| (v - 0.004).abs() < 1e-8));
-        assert!(thumbnail(&Sample::default()).is_empty());
-    }
-}

@@ -119,34 +119,3 @@ fn starts_are_drawn_with_replacement_and_from_the_seed() {
     assert_eq!(angles.len(), 10);
     assert!((distinct as f64 / 200.0 - 6.5).abs() < 0.4, "ten draws from ten: 6.5 distinct");
 }
-
-#[test]
-fn stops_early_at_a_fixed_point_and_reports_it() {
-    let truth = PlanarPose { theta_rad: -0.05, y_m: 0.001, z_m: 0.001 };
-    let scene = in_space(cross_contacts(600, truth, 1e-4, 2));
-    let config = LabIcpConfig { record: true, ..LabIcpConfig::default() };
-    let report = lab_icp(&scene, &model(2000), &config).unwrap();
-    assert_eq!(report.stop, Stop::FixedPoint);
-    assert!(report.converged && report.iterations < 200);
-    assert_eq!(report.trace.len(), report.iterations + 1);
-    assert_eq!(report.trace[0].grasp_from_object, PlanarPose::default());
-    assert_eq!(report.trace.last().unwrap().grasp_from_object, report.grasp_from_object);
-    assert!((report.lab_angle_rad() - 0.05).abs() < 0.02, "the lab's sign");
-    assert_eq!(report.fits.len(), 600);
-}
-
-#[test]
-fn too_few_and_degenerate_inputs_are_errors() {
-    let config = LabIcpConfig::default();
-    let model = model(100);
-    let few = in_space(cross_contacts(3, PlanarPose::default(), 0.0, 1));
-    assert_eq!(lab_icp(&few, &model, &config), Err(AlignError::TooFewPoints { got: 3, needed: 4 }));
-    let same = vec![DVec3::new(0.0, 0.01, 0.02); 50];
-    assert!(matches!(lab_icp(&same, &model, &config), Err(AlignError::Coincident { .. })));
-    let scene = in_space(cross_contacts(50, PlanarPose::default(), 0.0, 1));
-    assert_eq!(lab_icp(&scene, &LabModel::new(&[DVec3::NAN; 9]), &config), Err(AlignError::EmptyModel { got: 0 }));
-    let same_model = LabModel::new(&vec![DVec3::new(0.0, 0.001, 0.002); 5000]);
-    assert!(lab_icp(&scene, &same_model, &config).unwrap().grasp_from_object.is_finite());
-    let none = LabIcpConfig { starts: Vec::new(), ..config };
-    assert_eq!(lab_icp(&scene, &same_model, &none), Err(AlignError::Config { what: "starts" }));
-}

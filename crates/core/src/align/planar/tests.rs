@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::align::register::{Ask, Register as _, Scene};
-use crate::align::testing::{cross, cross_contacts, cuboid, disc, filled};
+use crate::align::testing::{cross, cross_contacts};
 use crate::align::{Stop, TraceStep};
 use crate::tool::ToolModel;
 use crate::units::angle_error;
@@ -68,20 +68,6 @@ proptest! {
         let distance = report.grasp_from_object.transform_yz(corner).distance(expected);
         prop_assert!(distance < 1e-5, "{distance} m off after {motion:?}");
     }
-
-    #[test]
-    fn points_that_are_not_finite_change_nothing(seed in 0..1000u64, places in proptest::collection::vec(0..600usize, 1..40)) {
-        let points = cross_contacts(600, pose(-9.0, 0.001, 0.002), 3e-4, seed);
-        let clean = align(&points, field(), &AlignConfig::default()).unwrap();
-        let mut spoilt = points;
-        for (i, place) in places.iter().enumerate() {
-            let bad = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY][i % 3];
-            spoilt.insert(*place, if i % 2 == 0 { DVec2::new(bad, 0.0) } else { DVec2::new(0.0, bad) });
-        }
-        let report = align(&spoilt, field(), &AlignConfig::default()).unwrap();
-        prop_assert_eq!(report.grasp_from_object, clean.grasp_from_object);
-        prop_assert_eq!(report.not_finite, places.len());
-    }
 }
 
 #[test]
@@ -101,86 +87,6 @@ fn a_blob_that_is_not_the_tool_is_let_go() {
     let gone = report.fits[900..].iter().filter(|f| f.fate == Fate::BeyondGate).count();
     assert!(gone > 150, "{gone} of the blob's 300 points are beyond the gate");
     assert!(report.fits[..900].iter().all(|f| f.fate != Fate::BeyondGate));
-}
-
-#[test]
-fn a_rod_is_flagged_and_stays_where_it_started_along_itself() {
-    // A 120 mm rod of which the hand sees the middle 40 mm.
-    for (degrees, seed) in [(12.3, 1), (-17.0, 2), (0.0, 3), (3.3, 4)] {
-        let mesh = cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06));
-        let rod = DistanceField::from_mesh(&mesh).unwrap();
-        let truth = pose(degrees, 0.0, 0.0);
-        let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, truth, 3e-4, seed);
-        let report = align(&points, &rod, &AlignConfig::default()).unwrap();
-        let (angle, _) = errors(report.grasp_from_object, truth);
-        assert!(angle < 1.0, "{angle} deg");
-        let seen = report.observability.unwrap();
-        assert!(report.is_degenerate() && seen.eigenvalues[0] < 0.005, "{seen:?}");
-        let axis = DVec2::from_angle(truth.theta_rad).perp();
-        let weak = DVec2::new(seen.weakest[1], seen.weakest[2]);
-        assert!(weak.dot(axis).abs() > 5f64.to_radians().cos(), "{weak} is not along {axis}");
-        let slid = DVec2::new(report.grasp_from_object.y_m, report.grasp_from_object.z_m).dot(axis);
-        assert!(slid.abs() < 1e-4, "slid by {slid} m");
-    }
-}
-
-#[test]
-fn a_disc_may_turn_and_says_so() {
-    let field = DistanceField::from_mesh(&disc(0.012, 96)).unwrap();
-    let points: Vec<DVec2> = (0..800)
-        .map(|i| {
-            let radius = 0.0122 * (f64::from(i) / 800.0).sqrt();
-            DVec2::new(0.002, 0.001) + DVec2::from_angle(f64::from(i) * 2.399_963) * radius
-        })
-        .collect();
-    let report = align(&points, &field, &AlignConfig::default()).unwrap();
-    assert!(report.is_degenerate());
-    let place = DVec2::new(report.grasp_from_object.y_m, report.grasp_from_object.z_m);
-    assert!((place - DVec2::new(0.002, 0.001)).length() < 5e-4, "{place}");
-}
-
-#[test]
-fn degenerate_sets_and_wrong_units_are_errors() {
-    let config = AlignConfig::default();
-    let points = cross_contacts(600, PlanarPose::default(), 1e-4, 1);
-    assert_eq!(align(&[], field(), &config), Err(AlignError::TooFewPoints { got: 0, needed: MIN_POINTS }));
-    assert_eq!(align(&points[..31], field(), &config), Err(AlignError::TooFewPoints { got: 31, needed: MIN_POINTS }));
-    let nan = vec![DVec2::NAN; 500];
-    assert_eq!(align(&nan, field(), &config), Err(AlignError::TooFewPoints { got: 0, needed: MIN_POINTS }));
-    let spot = vec![DVec2::new(0.003, 0.004); 50];
-    assert_eq!(align(&spot, field(), &config), Err(AlignError::Coincident { extent_m: 0.0 }));
-    let away: Vec<DVec2> = points.iter().map(|p| *p + DVec2::new(0.2, 0.0)).collect();
-    assert!(matches!(align(&away, field(), &config), Err(AlignError::NoOverlap { .. })));
-    // Millimeters taken for meters: the 60 mm tool would be a building.
-    let millimeters: Vec<DVec2> = points.iter().map(|p| *p * 1000.0).collect();
-    assert!(matches!(align(&millimeters, field(), &config), Err(AlignError::NoOverlap { .. })));
-    // The other way round everything shrinks to one spot.
-    let shrunk: Vec<DVec2> = points.iter().map(|p| *p * 1e-3).collect();
-    assert!(matches!(align(&shrunk, field(), &config), Err(AlignError::Coincident { .. })));
-    let huge: Vec<DVec2> = points.iter().map(|p| *p + DVec2::new(1e300, 0.0)).collect();
-    assert!(matches!(align(&huge, field(), &config), Err(AlignError::TooFewPoints { .. })));
-}
-
-#[test]
-fn settings_that_make_no_sense_are_refused() {
-    let points = cross_contacts(100, PlanarPose::default(), 1e-4, 1);
-    let with = |change: fn(&mut AlignConfig)| {
-        let mut config = AlignConfig::default();
-        change(&mut config);
-        align(&points, field(), &config).map(|_| ())
-    };
-    assert_eq!(with(|_| ()), Ok(()));
-    assert_eq!(with(|c| c.starts = vec![pose(0.0, f64::NAN, 0.0)]), Err(AlignError::Config { what: "starts" }));
-    assert_eq!(with(|c| c.rungs.clear()), Err(AlignError::Config { what: "rungs" }));
-    assert_eq!(with(|c| c.rungs = vec![Rung::Fixed]), Err(AlignError::Config { what: "rungs" }));
-    assert_eq!(with(|c| c.prior.shift_m = 0.0), Err(AlignError::Config { what: "prior" }));
-    assert_eq!(with(|c| c.prior.theta_rad = f64::INFINITY), Err(AlignError::Config { what: "prior" }));
-    assert_eq!(with(|c| c.kernels_m.clear()), Err(AlignError::Config { what: "kernels_m" }));
-    assert_eq!(with(|c| c.kernels_m[1] = 0.0), Err(AlignError::Config { what: "kernels_m" }));
-    assert_eq!(with(|c| c.points = 3), Err(AlignError::Config { what: "points" }));
-    assert_eq!(with(|c| c.scout_points = 0), Err(AlignError::Config { what: "scout_points" }));
-    assert_eq!(with(|c| c.keep = 0), Err(AlignError::Config { what: "keep" }));
-    assert_eq!(with(|c| c.max_iterations = 0), Err(AlignError::Config { what: "max_iterations" }));
 }
 
 #[test]
@@ -272,27 +178,4 @@ fn a_far_pose_is_found_by_more_starts() {
         let (angle, shift) = errors(report.grasp_from_object, truth);
         assert!(angle < 0.5 && shift < 3e-4, "{angle} deg, {shift} m");
     }
-}
-
-#[test]
-fn a_single_rung_is_taken_as_it_is() {
-    for rung in [Rung::Single, Rung::Several, Rung::Grid, Rung::Certified] {
-        let config = AlignConfig { rungs: vec![rung], ..AlignConfig::default() };
-        let report = align(&with_blob(0.33), field(), &config).unwrap();
-        assert_eq!((report.rung, report.ladder.len(), report.ladder[0].outcome), (rung, 1, Outcome::Last));
-        assert!(rung.to_string().len() > 3 && report.ladder[0].cost_m2 > 0.2e-6);
-        assert_eq!((report.trace.capacity(), report.fits.capacity()), (0, 0));
-        let recorded = align(&with_blob(0.33), field(), &AlignConfig { record: true, ..config }).unwrap();
-        assert_eq!(report, AlignReport { trace: Vec::new(), fits: Vec::new(), ..recorded.clone() });
-        assert!(!recorded.trace.is_empty());
-    }
-}
-
-#[test]
-fn a_rod_does_not_climb() {
-    let rod = DistanceField::from_mesh(&cuboid(DVec3::ZERO, DVec3::new(0.003, 0.003, 0.06))).unwrap();
-    let points = filled(&[DVec2::new(0.003, 0.02)], 0.0, 800, pose(9.0, 0.001, 0.0), 3e-4, 1);
-    let report = align(&points, &rod, &AlignConfig::default()).unwrap();
-    assert!(report.is_degenerate());
-    assert_eq!((report.rung, report.ladder[0].outcome), (Rung::Single, Outcome::Last));
 }

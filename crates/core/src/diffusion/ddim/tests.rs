@@ -83,25 +83,6 @@ fn run(denoiser: &mut dyn Denoiser, schedule: &Schedule, config: GenerateConfig)
 }
 
 #[test]
-fn a_perfect_prediction_returns_the_clean_latent() {
-    let clean = vec![-1.5, -0.2, 0.0, 0.7, 1.0, 3.0];
-    for prediction in KINDS {
-        for steps in [1, 2, 7, 50, 1000] {
-            for spacing in [Spacing::Lab, Spacing::Trailing] {
-                for eta in [0.0, 1.0] {
-                    let mut model = Perfect { schedule: lab(), clean: clean.clone(), prediction, calls: 0 };
-                    let config = GenerateConfig { steps, eta, spacing, ..Default::default() };
-                    let sample = run(&mut model, &lab(), config).unwrap();
-                    for (a, b) in sample.data().iter().zip(&clean) {
-                        assert!((a - b).abs() < 1e-5, "{prediction:?} {steps} {spacing:?} {eta}: {a} for {b}");
-                    }
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn gaussian_data_comes_back_with_its_mean_and_spread() {
     // 1024 pixels: standard error of the mean 0.5/32, of the deviation 0.5/45; four of them, plus the sampler's own
     // error, which falls with the number of steps.
@@ -140,46 +121,6 @@ fn deterministic_sampling_follows_the_exact_flow() {
     }
     assert!(errors[0] < 0.2 && errors[1] < 0.02, "{errors:?}");
     assert!(errors[1] < errors[0] / 4.0, "{errors:?}");
-}
-
-#[test]
-fn every_step_count_and_eta_stays_finite() {
-    let mut model = Gaussian { schedule: lab(), mean: vec![0.0], std: 1.0, prediction: Prediction::Epsilon };
-    for steps in (1..=12).chain([20, 33, 64, 100, 333, 501, 999, 1000]) {
-        for eta in [0.0, 0.3, 1.0] {
-            for spacing in [Spacing::Lab, Spacing::Trailing] {
-                let config = GenerateConfig { steps, eta, spacing, ..Default::default() };
-                assert_eq!(run(&mut model, &lab(), config).unwrap().non_finite(), 0);
-            }
-        }
-    }
-}
-
-#[test]
-fn extreme_schedules_are_finite_or_refused() {
-    // No noise at all, all noise at the end, a plateau, almost no signal, and one step.
-    let shares = [vec![1.0, 1.0], vec![1.0, 0.5, 0.0], vec![0.5, 0.5, 0.5], vec![1.0, 1e-300], vec![1e-12]];
-    for shares in shares {
-        let schedule = Schedule::from_alpha_bar(shares.clone()).unwrap();
-        for prediction in KINDS {
-            for eta in [0.0, 1.0] {
-                for spacing in [Spacing::Lab, Spacing::Trailing] {
-                    let mut model = Perfect { schedule: schedule.clone(), clean: vec![0.5; 4], prediction, calls: 0 };
-                    let config = GenerateConfig { steps: shares.len() as u32, eta, spacing, ..Default::default() };
-                    match run(&mut model, &schedule, config) {
-                        Ok(latent) => {
-                            assert_eq!(latent.non_finite(), 0, "{shares:?} {prediction:?} {eta}")
-                        }
-                        Err(err) => assert!(
-                            prediction == Prediction::Epsilon
-                                && matches!(err, DiffusionError::Schedule(ScheduleError::PureNoise { .. })),
-                            "{shares:?} {prediction:?}: {err}"
-                        ),
-                    }
-                }
-            }
-        }
-    }
 }
 
 #[test]
@@ -374,15 +315,4 @@ fn estimates_are_what_the_model_sees_and_are_made_only_where_wanted() {
     let config = GenerateConfig { guidance: f64::INFINITY, ..Default::default() };
     let mut model = Perfect { schedule: lab(), clean, prediction: Prediction::V, calls: 0 };
     assert!(matches!(run(&mut model, &lab(), config), Err(DiffusionError::Guidance(_))));
-}
-
-#[test]
-fn choices_are_keys() {
-    let of = |eta, guidance| GenerateConfig { eta, guidance, ..GenerateConfig::default() };
-    assert_eq!(of(0.0, 1.0), of(-0.0, 1.0));
-    assert_eq!(of(f64::NAN, 1.0), of(f64::NAN, 1.0), "a key finds itself");
-    let mut keys = [of(0.5, 2.0), of(f64::NAN, 1.0), of(-0.0, 1.0), of(0.5, 1.0)];
-    keys.sort();
-    assert_eq!(keys, [of(0.0, 1.0), of(0.5, 1.0), of(0.5, 2.0), of(f64::NAN, 1.0)]);
-    assert_eq!(std::collections::HashSet::from([of(0.0, 1.0), of(-0.0, 1.0), of(0.5, 1.0)]).len(), 2);
 }

@@ -178,13 +178,4 @@ mod tests {
             }
         }
     }
-
-    #[test]
-    fn an_origin_is_read_back_from_its_text() {
-        for origin in Origin::built_in().chain([Origin::Folder("models/mine".into())]) {
-            assert_eq!(Origin::from(Path::new(&origin.to_string())), origin);
-        }
-        let absent = Origin::from(Path::new("built-in:absent"));
-        assert_eq!(absent.file("manifest.json").read(1).unwrap_err().kind(), io::ErrorKind::NotFound);
-    }
 }

@@ -424,15 +424,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_tile_is_turned_back_and_scaled() {
-        let tile = Grid::from_fn(128, 128, |x, y| if x < 10 && y < 10 { 255.0 } else { 0.0 });
-        let imprint = imprint_from_tile(&tile, &Rig::lab());
-        assert_eq!(imprint.size(), [175, 140]);
-        assert!((imprint[(174, 139)] - 0.018).abs() < 1e-6);
-        assert!((imprint[(0, 0)] + 0.0063).abs() < 1e-6);
-    }
-
-    #[test]
     fn gray_is_no_difference() {
         let mut tile = Grid::filled(20, 20, [120.0; 3]);
         tile[(3, 4)] = [220.0, 120.0, 20.0];

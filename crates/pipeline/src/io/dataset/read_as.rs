@@ -104,16 +104,4 @@ mod tests {
         let error = of(dir.path()).unwrap_err().to_string();
         assert!(error.contains("swap-toes") && error.contains(READ_AS_FILE), "{error}");
     }
-
-    #[test]
-    fn a_reading_holds_for_every_pair_and_is_said() {
-        let demo = Dataset::demo();
-        let read = demo.clone().reading(vec![ReadAs::NegateTheta]);
-        let id = touch2touch_core::dataset::PairId(0);
-        let theta = |set: &Dataset| set.load(id).unwrap().grasp_from_object.unwrap().theta_rad;
-        assert!(theta(&demo) != 0.0 && theta(&read) == -theta(&demo));
-        assert_eq!((demo.problems.len(), read.problems.len()), (0, 1));
-        assert!(read.problems[0].what.contains("negate-theta"), "{:?}", read.problems);
-        assert!(read.reading(Vec::new()).problems.is_empty());
-    }
 }

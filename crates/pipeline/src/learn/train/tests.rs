@@ -49,30 +49,6 @@ fn pairs_kept_for_tests_are_always_left_out() {
 }
 
 #[test]
-fn a_plan_says_what_is_learned_from_and_warns_of_little() {
-    let tools = BTreeMap::from([("rod".to_owned(), 4), (NO_TOOL.to_owned(), 1)]);
-    let left_out = BTreeMap::from([(LeftOut::NotDone, 1), (LeftOut::Skip, 2)]);
-    let plan = TrainPlan { tools, predicted: 2, pairs: 3, held_out: [2, 1], left_out, ..TrainPlan::default() };
-    assert_eq!(
-        plan.lines(),
-        [
-            "to learn from: 5 masks of 3 pairs, 2 of them on predictions",
-            "by tool: no tool named 1, rod 4",
-            "left out for the score: 2 masks of 1 pair",
-            "no part: 1 pair begun and not marked \"done\"",
-            "no part: 2 pairs marked \"skip\"",
-        ]
-    );
-    assert!(plan.check().is_ok() && plan.warnings()[0].starts_with("5 masks are few"));
-    let alone = TrainPlan { held_out: [0, 0], ..plan };
-    assert!(alone.warnings()[1].starts_with("nothing is left out"));
-    let nothing = TrainPlan { tools: BTreeMap::new(), ..alone };
-    let err = nothing.check().unwrap_err();
-    assert!(err.why.contains("begun and not marked") && err.hint.is_some(), "{err}");
-    assert!(nothing.warnings().is_empty());
-}
-
-#[test]
 fn nothing_to_learn_from_has_its_reason_and_where_there_is_one_its_tick() {
     let of = |left_out: &[(LeftOut, usize)], for_tests, by_cad| {
         let left_out = left_out.iter().copied().collect();

@@ -227,19 +227,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn words_stay_words() {
-        assert_eq!(quoted("test_only/a-1"), "test_only/a-1");
-        for (word, shell) in [("a b", "'a b'"), ("", "''"), ("it's", "'it'\\''s'"), ("$(x)", "'$(x)'"), ("ä", "'ä'")]
-        {
-            assert_eq!(quoted(word), shell);
-        }
-        let words = Words::default().word("v").option("--a", -3).option("--b", 2).option_if("--c", None::<u8>);
-        assert_eq!(words.list(), ["v", "--a=-3", "--b", "2"]);
-        assert_eq!(parts_text(vec![CorrectionPart::Offset, CorrectionPart::Gain].into()), "offset,gain");
-        assert_eq!(millimeters(0.005), "5");
-    }
-
-    #[test]
     fn what_is_no_choice_is_refused_and_says_what_there_is() {
         assert_eq!("threshold".parse(), Ok(MaskChoice { source: MaskSource::Threshold, ..MaskChoice::default() }));
         for bad in ["unet:mm=3", "auto:probability=1.5", "threshold:mm=inf", "threshold:4", "dept", ""] {
