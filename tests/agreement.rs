@@ -88,7 +88,7 @@ fn how(action: Action) -> How {
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
         A::RankMasks => Verb(&["evaluate", "demo"]),
-        A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--latex", "a.tex"]),
+        A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--csv", "a.csv"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),
         A::FillHoles => Verb(&["label", "demo", "--pair", "a", "--clean", "fill_holes"]),

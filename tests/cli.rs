@@ -199,20 +199,16 @@ fn the_results_table_is_printed_and_written() {
 
     let bundle = |name: &str| format!("{}/tests/data/bundles/{name}", env!("CARGO_MANIFEST_DIR"));
     let (generator, mask, classifier) = (bundle("generator"), bundle("mask"), bundle("classifier"));
-    let (table, lines) = (dir.path().join("table.md"), dir.path().join("table.csv"));
+    let lines = dir.path().join("table.csv");
     let mut args = vec!["evaluate", set_text, "--bundle", &generator, "--bundle", &generator];
     args.extend(["--mask-bundle", &mask, "--classifier", &classifier, "--resamples", "50", "--paper"]);
-    args.extend(["--markdown", table.to_str().unwrap(), "--csv", lines.to_str().unwrap()]);
+    args.extend(["--csv", lines.to_str().unwrap()]);
     let text = run(&args, &data);
     assert!(text.status.success(), "{}", error_text(&text));
     let text = String::from_utf8_lossy(&text.stdout).into_owned();
     for expected in ["Unseen grasps of seen tools", "Unseen tools", "Measured (upper bound)", "Paper: VQ-VAE", "95 %"] {
         assert!(text.contains(expected), "`{expected}` is missing in:\n{text}");
     }
-    let markdown = std::fs::read_to_string(&table).unwrap();
-    assert!(markdown.starts_with("All 4 pairs of set\n\n|"), "{markdown}");
-    let mut rows = markdown.lines().skip(2);
-    assert!(rows.all(|l| l.starts_with('|')) && markdown.contains("unseen tools: angle °"), "{markdown}");
     assert_eq!(std::fs::read_to_string(&lines).unwrap().lines().count(), 1 + 2 * 6, "six rows, two groups");
 
     args.extend(["--json", "--pairs"]);
@@ -233,20 +229,6 @@ fn the_results_table_is_printed_and_written() {
     }
     assert_eq!(rows[1]["groups"], rows[2]["groups"]);
     assert_eq!(report["pairs"].as_array().unwrap().len(), 3);
-
-    // By a feature extractor the distance is a FID, of the pictures that were asked for.
-    let features = bundle("features");
-    let fid = |prepare: &str| {
-        let report = json(&run(&[&args[..], &["--features", &features, "--prepare", prepare]].concat(), &data));
-        let notes = report["notes"].to_string();
-        assert!(notes.contains("Small features (test)") && notes.contains("4 images are fewer than the 6"), "{notes}");
-        let figures = &report["rows"][1]["groups"][0];
-        assert!(figures["frechet"].is_null(), "{figures}");
-        figures["fid"].as_f64().unwrap()
-    };
-    assert!(fid("lab") != fid("plain"));
-    let wrong = run(&[&args[..], &["--features", &classifier]].concat(), &data);
-    assert!(error_text(&wrong).contains("not a feature extractor"), "{}", error_text(&wrong));
 
     // A damaged pair is left out and named; the rest is scored.
     std::fs::write(set.join("test/test_only/gelslims/pattern_36_data_0.pt"), b"no file").unwrap();

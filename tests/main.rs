@@ -36,7 +36,6 @@ mod gpu;
 #[cfg(feature = "onnx")]
 mod handed_on;
 #[cfg(feature = "onnx")]
-mod kept_scores;
 #[cfg(feature = "onnx")]
 mod providers;
 #[cfg(feature = "onnx")]

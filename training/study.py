@@ -36,18 +36,17 @@ def made(row, args, program, rows):
     if row.fit:
         place = Path(args.out) / "fitted" / row.test / (row.training.name() if row.training else "shipped")
         bundle = program.fitted(bundle, pairs, *row.fit, place / "_".join(map(str, (row.samples, *row.fit))))
-    alike = rows.alike(settings(row, args))
-    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps, args.features, map(rows.grasps, alike.values()))
+    answer, command = program.evaluate(bundle, data, row.shift, args.test_grasps)
     if not answer["complete"] or answer["skipped"]:
         raise Refused(f"not every grasp could be scored: {answer['skipped'][:3]}")
     facts = {"date": today(), "commit": commit(), "program": program.version(), "machine": machine(), "torch": torch.__version__,
              "command": command, "runtime": answer["runtime"], "seconds": round(answer["seconds"])}
     for figures in answer["rows"]:
         if figures["upper_bound"] and not rows.find(measured(row, args)):
-            rows.add({"settings": measured(row, args), "made": facts, "groups": figures["groups"]}, answer | {"differences": []}, {})
+            rows.add({"settings": measured(row, args), "made": facts, "groups": figures["groups"]}, answer, [])
         elif not figures["upper_bound"]:
             own = {"settings": settings(row, args), "made": facts | {"training": cost}, "groups": figures["groups"]}
-            rows.add(own, answer, alike)
+            rows.add(own, answer, rows.alike(own["settings"]))
 
 
 def settings(row, args):
@@ -63,7 +62,7 @@ def measured(row, args):
 
 
 def scoring(args):
-    return {"test_grasps": args.test_grasps, "features": Path(args.features).name if args.features else None}
+    return {"test_grasps": args.test_grasps}
 
 
 def parser():
@@ -76,7 +75,6 @@ def parser():
     parser.add_argument("--equal", type=int, default=20_000, help="samples of each training in the tables of conditions and ablations")
     parser.add_argument("--grasps", type=int, default=1500, help="grasps of the training shards of each condition, both fingers")
     parser.add_argument("--test-grasps", type=int, help="score only so many grasps of each tool (default: all 46)")
-    parser.add_argument("--features", help="bundle of `training.fid_features`: a FID in the place of the Fréchet distance")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--touch2touch", default="target/release/touch2touch", help="the program")
     return parser

@@ -9,6 +9,8 @@ import json
 import os
 from pathlib import Path
 
+from .study_paired import differences as less
+from .study_paired import generator
 from .study_runs import REFERENCE
 
 
@@ -38,21 +40,21 @@ class Rows:
         return self.place / f"{hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()[:16]}.json"
 
     def alike(self, settings):
-        """Rows that differ in one setting and whose grasps are here: settings by the name of the file."""
+        """Rows that differ in one setting and whose grasps are here: their settings."""
         known = (row["settings"] for row in self.read()["rows"])
-        return {self.grasps(other).stem: other for other in known if differ(other, settings) and self.grasps(other).exists()}
+        return [other for other in known if differ(other, settings) and self.grasps(other).exists()]
 
     def add(self, row, answer, alike):
-        """Puts a row into the file with what the answer says of its differences, and its grasps beside it."""
+        """Puts a row into the file with its differences from rows that are alike, and its grasps beside it."""
         self.place.mkdir(parents=True, exist_ok=True)
         file = self.read()
         rows = [r for r in file["rows"] if r["settings"] != row["settings"]] + [row]
         differences = [d for d in file["differences"] if row["settings"] not in (d["from"], d["from"] | d["to"])]
-        for found in answer["differences"]:
-            before = next((s for stem, s in alike.items() if found["from"].endswith(f"({stem})")), None)
-            if before:
-                key, = differ(before, row["settings"])
-                differences.append({"from": before, "to": {key: row["settings"][key]}, "groups": found["groups"]})
+        for before in alike:
+            key, = differ(before, row["settings"])
+            earlier = generator(json.loads(self.grasps(before).read_text()))
+            groups = less(earlier, generator(answer))
+            differences.append({"from": before, "to": {key: row["settings"][key]}, "groups": groups})
         text = '{"rows": [\n%s\n],\n"differences": [\n%s\n]}\n' % tuple(
             ",\n".join(json.dumps(item) for item in items) for items in (rows, differences))
         self.path.parent.mkdir(parents=True, exist_ok=True)

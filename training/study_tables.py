@@ -5,8 +5,7 @@ from benches.numbers import COLUMNS, GROUPS, group_of, markdown, number
 from . import study_runs
 from .study_runs import CONDITIONS, REFERENCE, SHIFTS, test_set
 
-# A FID is there where an extractor was named.
-SHOWN = [c for c in (*COLUMNS, ("FID", "fid", 0)) if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "fid", "angle_deg", "success_5", "success_10")]
+SHOWN = [c for c in COLUMNS if c[1] in ("psnr_db", "psnr_noise_free_db", "ssim", "frechet", "angle_deg", "success_5", "success_10")]
 # Columns of the paired differences.
 PAIRED = [c for c in SHOWN if c[1] in ("psnr_db", "ssim", "angle_deg", "success_5", "success_10")]
 

@@ -33,10 +33,9 @@ class Product(Program):
                      "--out", out)
         return out
 
-    def evaluate(self, bundle, data, shift, grasps, features, earlier):
-        """The verb's answer with every grasp and its differences from earlier answers, and the command that gave it."""
+    def evaluate(self, bundle, data, shift, grasps):
+        """The verb's answer with every grasp, and the command that gave it."""
         words = ["evaluate", data, "--bundle", bundle, "--mask-bundle", MODELS / "mask_unet", "--classifier",
-                 MODELS / "tool_classifier", "--shift", shift, "--pairs", *(("--grasps", grasps) if grasps else ()),
-                 *(("--features", features) if features else ())]
+                 MODELS / "tool_classifier", "--shift", shift, "--pairs", *(("--grasps", grasps) if grasps else ())]
         said = " ".join(map(str, words)).replace(str(self.place), "OUT").replace(str(MODELS), "assets/models")
-        return self.run(*words, *(word for file in earlier for word in ("--against", file))), said
+        return self.run(*words), said

@@ -189,7 +189,9 @@ fn can_use(state: &State, network: Network) -> Option<Command> {
 
 /// True where the measured imprints of all pairs can be scored now.
 fn can_rank(state: &State) -> bool {
-    results::scores_key(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none()
+    results::setup_of_all(state).is_some()
+        && export::can_draw(state)
+        && state.tasks.of_kind(TaskKind::Evaluate).is_none()
 }
 
 /// True where the pose tool is in hand and there is a tool to be moved.

@@ -113,7 +113,7 @@ macro_rules! actions {
             state => when(can_rank(state), EvaluateCommand::All);
         RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
-        ExportTable, Generate, "Export the results table…", "Writes the results table as CSV, Markdown, LaTeX and JSON", [],
+        ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
         CancelJobs, Generate, "Cancel", "Closes a form, gives up a stroke, rejects a proposal; then stops what is running", [plain(K::Escape)],
             state => cancel(state);
@@ -430,7 +430,7 @@ impl Action {
             Self::FitPairs => "adapt calibrate tune finetune train",
             Self::TrainMasks | Self::StartTraining => "unet learn finetune tune segmentation",
             Self::EvaluateDataset => "score metrics benchmark results table",
-            Self::ExportTable => "csv markdown json save results latex",
+            Self::ExportTable => "csv json save results",
             Self::CancelJobs => "stop abort interrupt",
             Self::NextShift => "depth offset gain millimeters scale",
             Self::Refit => "statistics mean deviation shift",

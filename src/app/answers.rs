@@ -13,7 +13,7 @@ use super::state::learn::Network;
 use super::state::results::{Computed, Request};
 use super::state::settings::Settings;
 use super::state::tasks::{Level, TaskKind, Ticket};
-use super::{evaluate, follow, labels, library, results, settings, tasks, workbench};
+use super::{follow, labels, library, results, settings, tasks, workbench};
 use touch2touch_pipeline::error::{TaskError, TaskErrorKind};
 use touch2touch_pipeline::job::Progress;
 use touch2touch_pipeline::steps::bundles::BundleInfo;
@@ -82,9 +82,6 @@ pub(super) fn step(state: &mut State, answer: Answer, effects: &mut Vec<Effect>)
             state.results.previews.insert(preview.recipe.touch, preview);
         }
         Answer::Progressed(ticket, progress) => {
-            if state.tasks.of_kind(TaskKind::Evaluate).is_some_and(|(running, _)| running == ticket) {
-                evaluate::progressed(state, &progress);
-            }
             if let Some(task) = state.tasks.running.get_mut(&ticket) {
                 task.progress = progress;
             }
@@ -157,10 +154,6 @@ fn failed_task(state: &mut State, ticket: Ticket, err: &TaskError) {
     if task.opening.is_some() {
         state.library.opening = None;
         state.library.failure = Some(err.clone());
-    }
-    if task.kind == TaskKind::Evaluate && !task.outdated {
-        // What was scored before it stopped is kept.
-        state.table.round += 1;
     }
     if err.is_cancelled() && !task.outdated {
         // Before anything was said nothing was done; what was left then is left no more.

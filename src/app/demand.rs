@@ -20,8 +20,6 @@ pub fn demands(state: &State) -> Vec<Request> {
     selection(&mut wants);
     results::want_versus(&mut wants);
     results::want_thumbnails(&mut wants);
-    results::want_scores(&mut wants);
-    results::want_table(&mut wants);
     results::want_doctor(&mut wants);
     neighbors(&mut wants);
     results::want_mask_plan(&mut wants);

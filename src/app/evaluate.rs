@@ -15,11 +15,8 @@ use super::state::tasks::{Level, TaskKind};
 use super::{results, tasks};
 use touch2touch_core::evaluation::Metric;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::job::{JobCx, Progress};
+use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
-
-/// The grasps after which the scores so far are looked up while all pairs are scored.
-const LOOKS: u64 = 24;
 
 /// A command to the results table.
 #[derive(Clone, Debug)]
@@ -60,7 +57,7 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             let what = "Export the table";
             let write = tasks::Write::new(Lane::Files, what, folder, move |folder, _, _| {
                 let folder = evaluate::export(&evaluation, published, &folder)?;
-                let line = format!("Wrote evaluation.csv, .md, .tex and .json to {}", folder.display());
+                let line = format!("Wrote evaluation.csv and .json to {}", folder.display());
                 Ok((line, folder))
             });
             tasks::start(state, what, write, effects);
@@ -83,18 +80,7 @@ fn start(state: &mut State, setup: Option<Setup>, what: &str, effects: &mut Vec<
     let (Some(setup), Some(open)) = (setup, &state.library.open) else { return };
     let source = open.source.clone();
     let title = format!("{what} {}", source.title());
-    if tasks::start(state, title, Score { source, setup }, effects).is_some() {
-        state.table.next_look = 0;
-    }
-}
-
-/// Has what was scored so far looked up now and then.
-pub(super) fn progressed(state: &mut State, progress: &Progress) {
-    let table = &mut state.table;
-    if progress.done >= table.next_look {
-        table.next_look = progress.done + (progress.total / LOOKS).max(1);
-        table.round += 1;
-    }
+    tasks::start(state, title, Score { source, setup }, effects);
 }
 
 /// Scores a data set.
@@ -125,6 +111,9 @@ impl Errand for Score {
         if !evaluation.setup.bundles.is_empty() {
             state.table.result = Some(evaluation.clone());
         }
-        state.table.round += 1;
+        if let Some(open) = &state.library.open {
+            state.table.take(evaluation, open.source.index());
+            state.reorder();
+        }
     }
 }

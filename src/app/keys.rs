@@ -20,10 +20,7 @@ pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
 pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
-pub use dataset::{
-    AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ScoresKey, TableKey, ThumbnailKey, ToolKey,
-    TrainPlanKey,
-};
+pub use dataset::{AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ThumbnailKey, ToolKey, TrainPlanKey};
 pub use imprint::{AmbiguityKey, ColorKey, FlagsKey, ImprintKey, MeanKey, MetersKey, PictureKey};
 pub use inspection::{Inspection, InspectionKey};
 pub use mask::{MaskKey, MaskVersion};

@@ -200,7 +200,7 @@ impl Errand for ReadTool {
         }
         if state.library.is_open(*seq) {
             state.tasks.failed.clear();
-            state.table.round += 1;
+            state.library.units_named += 1;
         }
     }
 }
@@ -324,7 +324,7 @@ fn show(state: &mut State, seq: DatasetSeq, place: Place, opened: Opened, effect
     let resumed = state.library.open.is_none() && last.place.as_ref() == Some(&place);
     state.results = Results::default();
     state.table.result = None;
-    state.table.looked_up = None;
+    state.table.scored = None;
     state.table.scores = Arc::default();
     state.learn = state.learn.emptied();
     // Somebody's own folder is said what it is, unless it was open when the window was closed.

@@ -66,7 +66,7 @@ pub(crate) enum Dock {
     Right(u8),
 }
 
-/// A demand: what is computed while a pane is on screen. Everything but [`Demand::Thumbnails`] and [`Demand::Scores`]
+/// A demand: what is computed while a pane is on screen. Everything but [`Demand::Thumbnails`] and [`Demand::Training`]
 /// is of the selected pair and begins with its tensors and labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Demand {
@@ -92,8 +92,6 @@ pub enum Demand {
     Steps,
     /// Small pictures of the pairs in the list.
     Thumbnails,
-    /// The scores that are kept of all pairs.
-    Scores,
     /// The plan of a training of the mask model: what it would learn from.
     Training,
 }
@@ -103,7 +101,7 @@ macro_rules! panes {
     ($with:ident) => {
         $with! {
             browser { Browser {
-                "Pairs", "The pairs of what is open", Form, needs [Thumbnails, Scores],
+                "Pairs", "The pairs of what is open", Form, needs [Thumbnails],
                 at [Inspect Left, Align Left, Label Left, Evaluate Left, Adapt Left]
             } }
             metrics { Metrics {
@@ -155,7 +153,7 @@ macro_rules! panes {
                 at [Adapt Top(1)]
             } }
             table {
-                Table { "All metrics", "The scores of all pairs by every source", Form, needs [Scores], at [Evaluate Top(1)] }
+                Table { "All metrics", "The scores of all pairs by every source", Form, needs [], at [Evaluate Top(1)] }
             }
             log { Log {
                 "Log", "What happened", Form, needs [],
@@ -211,7 +209,7 @@ macro_rules! define {
             pub fn needs(self) -> &'static [Demand] {
                 use ImprintSource::{Measured, Predicted};
                 use Demand::{
-                    Ambiguity, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene, Scores,
+                    Ambiguity, Comparison, Flags, Imprint, Masks, Pair, Poses, Scene,
                     Steps, Thumbnails, Training, Versus,
                 };
                 match self { $($( Self::$pane => &[$($need),*], )*)* }
@@ -260,7 +258,7 @@ impl Pane {
 
     /// True where it shows something of the selected pair.
     pub(crate) fn is_of_pair(self) -> bool {
-        let of_all = |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Scores | Demand::Training);
+        let of_all = |need: &Demand| matches!(need, Demand::Thumbnails | Demand::Training);
         self.needs().iter().any(|need| !of_all(need))
     }
 }

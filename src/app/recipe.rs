@@ -56,7 +56,7 @@ pub fn bundle(state: &State, kind: BundleKind) -> Result<&BundleInfo, Absent> {
     let (name, absent) = match kind {
         BundleKind::Generator => (state.settings.generate.bundle.as_deref(), Absent::NoGenerator),
         BundleKind::Mask => (state.settings.mask.bundle.as_deref(), Absent::NoMaskModel),
-        BundleKind::Classifier | BundleKind::Features => (None, Absent::NoClassifier),
+        BundleKind::Classifier => (None, Absent::NoClassifier),
     };
     let rig = state.rig();
     let others = state.library.bundles.iter().any(|bundle| bundle.kind == kind && !bundle.fits(&rig));

@@ -1,4 +1,4 @@
-//! [`ScoreTable`]: the scores that are kept of the pairs of a data set, as lists and pictures show them.
+//! [`ScoreTable`]: the scores of the pairs of a data set, as lists and pictures show them.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -77,15 +77,13 @@ impl SourceScores {
 
 impl ScoreTable {
     /// Of the pairs of an index, by name.
-    pub fn new(index: &Index, scores: Vec<Scores>) -> Self {
+    pub fn new(index: &Index, scores: &[Scores]) -> Self {
         let places: BTreeMap<&str, usize> = index.pairs.iter().map(|entry| entry.name.as_str()).zip(0..).collect();
-        let source = |scores: Scores| {
+        let source = |scores: &Scores| {
             let mut grasps = vec![None; index.pairs.len()];
-            for mut grasp in scores.grasps {
-                // Nobody looks at these, and they are most of it.
-                grasp.images.iter_mut().for_each(|image| image.features = Vec::new());
+            for grasp in &scores.grasps {
                 if let Some(place) = places.get(grasp.pair.as_str()) {
-                    grasps[*place] = Some(grasp);
+                    grasps[*place] = Some(grasp.clone());
                 }
             }
             let metrics = Metric::iter().filter_map(|metric| {
@@ -99,12 +97,7 @@ impl ScoreTable {
             let scored = grasps.iter().flatten().count();
             SourceScores { name, upper_bound, scored, grasps, metrics }
         };
-        Self { sources: scores.into_iter().map(source).filter(|source| source.scored > 0).collect() }
-    }
-
-    /// Bytes that it holds, about.
-    pub(in crate::app) fn bytes(&self) -> usize {
-        self.sources.iter().map(|source| source.grasps.len() * 768).sum::<usize>()
+        Self { sources: scores.iter().map(source).filter(|source| source.scored > 0).collect() }
     }
 
     /// The source of a name, or whose name has a word in it, whatever its case.

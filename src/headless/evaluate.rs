@@ -12,9 +12,8 @@ use super::{Common, Output, VerbResult};
 use touch2touch_core::diffusion::Sampler;
 use touch2touch_core::evaluation::{self, Row, paper_rows};
 use touch2touch_pipeline::infer::bundle::{Bundle, Found, Origin, find_all};
-use touch2touch_pipeline::infer::features::Preparation;
 use touch2touch_pipeline::io::atomic;
-use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Report, Setup, evaluate, export, rows};
+use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, csv, evaluate, export, rows};
 use touch2touch_pipeline::steps::models::Models;
 
 /// Arguments of `evaluate`.
@@ -31,13 +30,6 @@ pub(super) struct EvaluateArgs {
     /// The tool classifier's bundle (default: the first one found).
     #[arg(long)]
     classifier: Option<PathBuf>,
-    /// A feature extractor's bundle: the Fréchet distance is then a FID in its features, instead of those of the tool
-    /// classifier. `training/fid_features.py` makes one from the Inception weights that pytorch-fid uses.
-    #[arg(long, value_name = "DIR")]
-    features: Option<PathBuf>,
-    /// The pictures that it sees: `lab` (each imprint stretched on its own and compressed as a JPEG) or `plain`.
-    #[arg(long, value_parser = keyed::<Preparation>(), default_value = "lab", requires = "features")]
-    prepare: Preparation,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
@@ -46,7 +38,7 @@ pub(super) struct EvaluateArgs {
     /// both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
     fingers: FingerArg,
-    /// Neither look for predictions and figures that were made before (by the studio, too), nor keep those made now.
+    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
     #[arg(long)]
     no_cache: bool,
     /// Take only this many grasps of each tool, spread evenly.
@@ -71,22 +63,13 @@ pub(super) struct EvaluateArgs {
     /// Drawings for the 95 % intervals; 0 leaves them out.
     #[arg(long, default_value_t = Setup::default().resamples)]
     resamples: usize,
-    /// Add the paired differences from an earlier evaluation, a file of --json with --pairs or of --out; repeat for several.
-    #[arg(long, value_name = "FILE")]
-    against: Vec<PathBuf>,
     /// Add what the paper and the lab published on real data.
     #[arg(long)]
     paper: bool,
-    /// Write the table to this file as Markdown.
-    #[arg(long, value_name = "FILE")]
-    markdown: Option<PathBuf>,
     /// Write the figures and their intervals to this file, one line per method and group.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
-    /// Write the table to this file as a LaTeX document in the paper's form.
-    #[arg(long, value_name = "FILE")]
-    latex: Option<PathBuf>,
-    /// Write evaluation.csv, .md, .tex and .json (with every grasp) into this folder, as the studio's button does.
+    /// Write evaluation.csv and .json (with every grasp) into this folder, as the studio's button does.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Add the figures of every grasp to the JSON.
@@ -105,10 +88,7 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     let setup = setup(args, &dataset)?;
     let output = Output::new(args.common, "evaluating", 0);
     let models = Models::new(if args.no_cache { None } else { super::recipe::kept() });
-    let mut evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
-    for file in &args.against {
-        evaluation.against(file)?;
-    }
+    let evaluation = evaluate(&dataset, &setup, &models, &output.job())?;
     super::notes::say_found(&output, &dataset, &evaluation.findings);
     for skipped in &evaluation.skipped {
         let by = if skipped.method.is_empty() { String::new() } else { format!(" ({})", skipped.method) };
@@ -118,15 +98,8 @@ pub(super) fn run(args: &EvaluateArgs) -> VerbResult {
     if let Some(folder) = &args.out {
         export(&evaluation, args.paper, folder)?;
     }
-    let texts = [
-        (&args.markdown, evaluate::markdown(&evaluation, args.paper)),
-        (&args.csv, evaluate::csv(&evaluation, args.paper)),
-        (&args.latex, evaluate::latex(&evaluation, args.paper)),
-    ];
-    for (file, text) in texts {
-        if let Some(file) = file {
-            write(file, &text)?;
-        }
+    if let Some(file) = &args.csv {
+        write(file, &csv(&evaluation, args.paper))?;
     }
     let pairs = args.pairs.then_some(evaluation.scores.as_slice());
     let published = if args.paper { paper_rows() } else { Vec::new() };
@@ -142,7 +115,6 @@ fn write(file: &Path, text: &str) -> anyhow::Result<()> {
 
 fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
     let mut text = format!("{}\n\n{}", evaluation.size(), evaluation::text(rows));
-    text += &evaluation::differences_text(&evaluation.differences);
     text += &format!("- {}\n", evaluation.conventions);
     for note in &evaluation.notes {
         text += &format!("- {note}\n");
@@ -186,7 +158,6 @@ fn setup(args: &EvaluateArgs, dataset: &Dataset) -> anyhow::Result<Setup> {
     Ok(Setup {
         bundles: generators,
         classifier: first(&args.classifier, |b| b.tool_classifier().is_some()),
-        features: args.features.as_ref().map(|folder| (Origin::from(folder), args.prepare)),
         recipe: common(shift, &args.mask, mask_model, args.registration.one()?, args.runtime),
         steps: args.steps,
         seed: args.seed,

@@ -206,7 +206,6 @@ fn timeless(mut value: Value) -> Value {
 #[test]
 pub(super) fn a_random_recipe_gives_the_same_results_table_in_the_studio_and_by_the_verb() {
     let mut runner = TestRunner::deterministic();
-    // Kept scores of the one are not to be found by the other.
     let [home, other] = [0; 2].map(|_| tempfile::tempdir().unwrap());
     let lab = lab_folder(home.path());
     let mut rows = 0;

@@ -123,7 +123,7 @@ impl Stage {
                 ("DIR", "check") => repository().join("assets/models/generator_ldm").to_str().unwrap().to_owned(),
                 ("FITTED", "--out") => at(&format!("fitted {number}")),
                 ("FITTED", _) => self.small_bundle.to_str().unwrap().to_owned(),
-                ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.md", _) => at(&format!("{number} {word}")),
+                ("FILE" | "OUT" | "OUT.json" | "SHARDS" | "TABLE.csv", _) => at(&format!("{number} {word}")),
                 ("STILL.png", _) => at(&format!("{number} still.png")),
                 ("PY", _) => "/no/such/python".to_owned(),
                 (json, _) if json.starts_with("--json=") => format!("--json={}", at(&format!("{number} OUT.json"))),

@@ -5,12 +5,10 @@
 //! SSIM with the range of the tool's predictions; every figure per tool, then the mean over the tools. Where the source
 //! lost its scale, PSNR and SSIM are those of images stretched to 0..1 one by one, and their mean.
 //!
-//! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay. So are those of
-//! the [`Difference`] of two methods, whose grasps are drawn in pairs.
+//! The intervals are 95 % bootstrap intervals: the grasps are drawn again within each tool, the tools stay.
 
 mod columns;
 mod metric;
-mod paired;
 mod paper;
 mod write;
 
@@ -27,12 +25,11 @@ use super::metrics::AngleSummary;
 use super::sample::Scale;
 use super::verdict::Grade;
 
-use columns::{COLUMNS, FID, FRECHET, Of};
+use columns::{COLUMNS, Of};
 pub use columns::{Column, NOTES, TableMetrics, columns, conventions};
 pub use metric::{Condition, Metric};
-pub use paired::{Difference, GroupDifference, difference};
 pub use paper::paper_rows;
-pub use write::{csv, differences_text, latex, markdown, text};
+pub use write::{csv, text};
 
 /// The lab's peak of the PSNR, meters.
 pub const PEAK_M: f64 = 0.0225;
@@ -154,10 +151,6 @@ pub struct GraspScore {
     /// Reasons to look at its masks, of the measured imprints.
     #[serde(default)]
     pub doubt: Doubt,
-    /// Spread of predictions with different seeds: the mean over the pixels of their standard deviation, of the finger
-    /// with the most, meters; `None` where fewer than two are kept.
-    #[serde(default)]
-    pub seed_spread_m: Option<f64>,
 }
 
 fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
@@ -198,17 +191,6 @@ pub struct Row {
     pub upper_bound: bool,
     /// One per column group of the table.
     pub groups: Vec<TableMetrics>,
-}
-
-impl Row {
-    /// Takes the Fréchet distance for a FID: its features are those of an image network.
-    pub fn call_fid(&mut self) {
-        for group in &mut self.groups {
-            if let Some(distance) = group.figures.remove(FRECHET) {
-                group.figures.insert(FID, distance);
-            }
-        }
-    }
 }
 
 /// Notes on groups that have fewer images than the Fréchet distance has features.
@@ -258,7 +240,6 @@ fn figures(group: Group, grasps: &[&GraspScore], measured: &[&[f32]], resamples:
     let figure = |column: &Column| match &column.of {
         Of::Tool(of) => estimate(&tools, of, resamples),
         Of::Group(of) => of(grasps, measured).map(|value| Estimate { value, interval: None }),
-        Of::Published => None,
     };
     TableMetrics {
         group,
@@ -352,7 +333,6 @@ mod tests {
             position_error_m: Some(1e-3),
             verdict: Some(Grade::of_angle_error(angle_deg.to_radians())),
             doubt: Doubt::default(),
-            seed_spread_m: None,
         }
     }
 

@@ -6,7 +6,7 @@
 //! * [`runtime`]: what was found of that library.
 //! * [`generator`], [`mask`], [`classifier`]: what a bundle does, from a GelSlim difference to a decoder's picture, and
 //!   from a depth map to a contact mask or to the tool that made it.
-//! * [`kept_key`]: everything a generated result depends on; [`store`]: results on the disk, by it; [`sheets`]: small ones.
+//! * [`kept_key`]: everything a generated result depends on; [`store`]: results on the disk, by it.
 //!
 //! Without the feature `onnx` everything here compiles, bundles can be opened and checked, and running one is an
 //! error that says so.
@@ -14,7 +14,6 @@
 pub mod bundle;
 pub mod classifier;
 pub mod engine;
-pub mod features;
 pub mod generator;
 pub mod kept_key;
 #[cfg(feature = "onnx")]
@@ -25,5 +24,4 @@ mod provider;
 pub(crate) mod recipe_id;
 pub mod runtime;
 pub mod sandbox;
-pub mod sheets;
 pub mod store;

@@ -11,7 +11,7 @@ use touch2touch_core::rig::Rig;
 use touch2touch_pipeline::infer::bundle::Origin;
 use touch2touch_pipeline::learn::adapt::{AdaptSetup, Tuning, adapt as fit};
 use touch2touch_pipeline::learn::tuning::unfinished_folder;
-use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, evaluate as score, rows};
+use touch2touch_pipeline::scores::evaluate::{Evaluation, Report, Setup, evaluate as score};
 use touch2touch_pipeline::steps::bundles::{self as found, BundleKind};
 use touch2touch_pipeline::steps::recipe::Recipe as Whole;
 
@@ -55,17 +55,11 @@ impl Scores {
 
     /// The table for people.
     fn __str__(&self) -> String {
-        evaluation::text(&self.evaluation.rows) + &evaluation::differences_text(&self.evaluation.differences)
+        evaluation::text(&self.evaluation.rows)
     }
 
-    /// The table as Markdown.
-    #[pyo3(signature = (*, paper=false))]
-    fn markdown(&self, paper: bool) -> String {
-        evaluation::markdown(&rows(&self.evaluation, paper))
-    }
-
-    fn _repr_markdown_(&self) -> String {
-        self.markdown(false)
+    fn _repr_html_(&self) -> String {
+        format!("<pre>{}</pre>", self.__str__().replace('<', "&lt;"))
     }
 
     fn __repr__(&self) -> String {

@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::super::keys::{DatasetSeq, Key, PairKey, Revision};
-use super::super::scores::ScoreTable;
 use touch2touch_core::grid::DepthMap;
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::doctor::Fact;
@@ -12,7 +11,6 @@ use touch2touch_pipeline::export::import::Import;
 use touch2touch_pipeline::export::{ExportChoice, Plan};
 use touch2touch_pipeline::labels::{JournalHistory, PairLabels};
 use touch2touch_pipeline::learn::train::{TrainChoice, TrainPlan};
-use touch2touch_pipeline::scores::evaluate::Evaluation;
 use touch2touch_pipeline::steps::tool::NamedTool;
 
 impl Key for PairKey {
@@ -68,34 +66,6 @@ pub struct Read {
     pub(crate) labels: PairLabels,
     /// The gestures of earlier runs.
     pub(crate) told: JournalHistory,
-}
-
-/// Everything that decides which scores are there.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ScoresKey {
-    pub(crate) dataset: DatasetSeq,
-    /// Pairs that the data set has by now.
-    pub(crate) pairs: usize,
-    /// The setup of the scoring, as text.
-    pub(crate) setup: String,
-    /// The number of times that scores were computed or opened.
-    pub(crate) round: u64,
-}
-
-impl Key for ScoresKey {
-    type Value = ScoreTable;
-
-    fn bytes(table: &ScoreTable) -> usize {
-        table.bytes()
-    }
-}
-
-/// Everything that decides the results table of the scores that are kept.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct TableKey(pub(crate) ScoresKey);
-
-impl Key for TableKey {
-    type Value = Option<Arc<Evaluation>>;
 }
 
 /// The plan of an export, of what is drawn and marked now.
@@ -157,7 +127,7 @@ pub struct AboutKey {
     /// The last change of the document.
     pub revision: Revision,
     /// The number of times that scores or units of tools changed.
-    pub round: u64,
+    pub units_named: u64,
 }
 
 impl Key for AboutKey {

@@ -24,7 +24,7 @@ impl Computes for AboutKey {
 pub(crate) fn doctor_key(state: &State) -> Option<AboutKey> {
     let open = state.library.open.as_ref()?;
     let (pairs, revision) = (open.index().pairs.len(), Revision(state.document.last_revision));
-    Some(AboutKey { dataset: open.seq, pairs, revision, round: state.table.round })
+    Some(AboutKey { dataset: open.seq, pairs, revision, units_named: state.library.units_named })
 }
 
 /// Asks for them while the panel is looked at.

@@ -3,11 +3,11 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::super::keys::TableKey;
 use super::super::scores::{ScoreTable, SourceScores};
-use touch2touch_core::dataset::PairId;
-use touch2touch_core::evaluation::{Condition, Metric, Row, paper_rows};
+use touch2touch_core::dataset::{Index, PairId};
+use touch2touch_core::evaluation::{Condition, Metric, Row, Scores, paper_rows};
 use touch2touch_pipeline::scores::evaluate::Evaluation;
+use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// Grasps of each tool that the studio offers; `None` is all of them.
 pub(crate) const GRASPS: [Option<usize>; 5] = [Some(2), Some(4), Some(10), Some(20), None];
@@ -23,14 +23,10 @@ pub struct TableState {
     pub published: bool,
     /// The last table of the open data set.
     pub result: Option<Arc<Evaluation>>,
-    /// The recipe by which kept scores were looked up for it last.
-    pub(in crate::app) looked_up: Option<TableKey>,
-    /// The scores that are kept of the open data set.
+    /// The scores of the pairs of the open data set, as lists show them.
     pub scores: Arc<ScoreTable>,
-    /// The number of times that scores were computed: those kept are looked up again then.
-    pub(in crate::app) round: u64,
-    /// Grasps of the evaluation under way at which that is done next.
-    pub(in crate::app) next_look: u64,
+    /// The scores that these are made of, with the recipe that they have in common.
+    pub(in crate::app) scored: Option<(Recipe, Vec<Scores>)>,
     /// The score that the list is ordered by, as it was chosen.
     pub chosen: ScoreChoice,
 }
@@ -47,6 +43,28 @@ pub struct ScoreChoice {
 }
 
 impl TableState {
+    /// Takes the scores of an evaluation; earlier ones by the same recipe stay where it has none.
+    pub(in crate::app) fn take(&mut self, evaluation: &Evaluation, index: &Index) {
+        let recipe = evaluation.setup.recipe.clone();
+        let mut all = evaluation.scores.clone();
+        // Nobody looks at these, and they are most of it.
+        for scores in &mut all {
+            scores.measured_features = Vec::new();
+            scores.grasps.iter_mut().flat_map(|g| &mut g.images).for_each(|image| image.features = Vec::new());
+        }
+        for before in self.scored.take().filter(|(by, _)| *by == recipe).into_iter().flat_map(|(_, scores)| scores) {
+            match all.iter_mut().find(|scores| scores.method == before.method) {
+                Some(now) => {
+                    let known: BTreeSet<String> = now.grasps.iter().map(|grasp| grasp.pair.clone()).collect();
+                    now.grasps.extend(before.grasps.into_iter().filter(|grasp| !known.contains(&grasp.pair)));
+                }
+                None => all.push(before),
+            }
+        }
+        self.scores = Arc::new(ScoreTable::new(index, &all));
+        self.scored = Some((recipe, all));
+    }
+
     /// The source and the metric that the list is ordered by; `None` while nothing is scored.
     pub fn by(&self) -> Option<(&SourceScores, Metric)> {
         let sources = &self.scores.sources;

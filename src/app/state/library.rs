@@ -124,6 +124,8 @@ pub struct Library {
     /// Shows only pairs whose name, tool or note contains every word (any case). `tool:`, `is:` and `note:` narrow a word;
     /// `has:note` are pairs with one; `angle>5` is a condition on a score.
     pub filter: String,
+    /// Times that the unit of a CAD model was named: what is said of the data set is looked up again then.
+    pub(in crate::app) units_named: u64,
     /// Shows only this tool.
     pub tool: Option<String>,
     /// The order.

@@ -78,10 +78,6 @@ macro_rules! table {
         Ranking(RankingKey) in rankings, MIB;
         /// The steps of a recorded registration, made ready to be looked through.
         Inspection(InspectionKey) in inspections, 64 * MIB;
-        /// The scores that are kept of all pairs.
-        Scores(ScoresKey) in scores, 64 * MIB;
-        /// The results table of the scores that are kept.
-        Table(TableKey);
         /// A small picture of a pair's measured imprint (right finger, else left).
         Thumbnail(ThumbnailKey) in thumbnails, 32 * MIB;
         }

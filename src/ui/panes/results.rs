@@ -18,10 +18,6 @@ use touch2touch_core::evaluation::{Column, Group, Row, TableMetrics, columns};
 const ROW: f32 = 20.0;
 /// Share of the width that the method's name takes, in letters.
 const NAME: f32 = 30.0;
-/// A narrower pane leaves out the columns that can be missed, points; the tooltip of a row has them all.
-const NARROW: f32 = 900.0;
-/// The columns that can be missed.
-const MINOR: [&str; 2] = ["SSIM 22.5", "FID"];
 
 /// Nothing is kept between frames.
 pub(crate) type Memory = ();
@@ -114,8 +110,6 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
     let Some(result) = &cx.state.table.result else { return };
     let all = columns(rows);
-    let narrow = ui.available_width() < NARROW;
-    let shown: Vec<&Column> = all.iter().copied().filter(|c| !narrow || !MINOR.contains(&c.heading)).collect();
     ui.label(RichText::new(result.size()).color(cx.p.strong));
     ScrollArea::vertical().auto_shrink(false).id_salt("results").show(ui, |ui| {
         ui.spacing_mut().item_spacing.y = 0.0;
@@ -124,10 +118,10 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
         for group in groups {
             let figures: Vec<(&Row, &TableMetrics)> =
                 rows.iter().filter_map(|r| Some((r, r.groups.iter().find(|f| f.group == group)?))).collect();
-            heading(cx, ui, group, &shown);
-            let best = Best::of(&shown, &figures);
+            heading(cx, ui, group, &all);
+            let best = Best::of(&all, &figures);
             for (row, figures) in figures {
-                line(cx, ui, row, figures, (&shown, &all), &best);
+                line(cx, ui, row, figures, &all, &best);
             }
             ui.add_space(10.0);
         }
@@ -198,14 +192,7 @@ fn competes(row: &Row) -> bool {
     !row.published && !row.upper_bound
 }
 
-fn line(
-    cx: &Cx<'_>,
-    ui: &mut Ui,
-    row: &Row,
-    figures: &TableMetrics,
-    (shown, all): (&[&Column], &[&Column]),
-    best: &Best,
-) {
+fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &TableMetrics, shown: &[&Column], best: &Best) {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), ROW), Sense::hover());
     if response.hovered() {
         ui.painter().rect_filled(rect, 3.0, cx.p.control[0]);
@@ -243,7 +230,7 @@ fn line(
         put(*cell, &format!("{:.1$}", e.value, column.decimals), color);
     }
     let mut said = format!("{}: {} grasps, {} images", row.method, figures.grasps, figures.images);
-    for (column, e) in all.iter().filter_map(|c| Some((c, figures.get(c)?))) {
+    for (column, e) in shown.iter().filter_map(|c| Some((c, figures.get(c)?))) {
         let decimals = column.decimals;
         said += &format!("\n{} {:.decimals$}", column.heading, e.value);
         if let Some([low, high]) = e.interval {

@@ -283,7 +283,6 @@ fn evaluation() -> Evaluation {
         dataset: "Double".into(),
         rows: Vec::new(),
         groups: Vec::new(),
-        differences: Vec::new(),
         conventions: "",
         notes: Vec::new(),
         findings: Vec::new(),

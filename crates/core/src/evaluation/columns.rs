@@ -20,8 +20,6 @@ pub struct Column {
     pub decimals: usize,
     /// True where more of it is better.
     pub larger_is_better: bool,
-    /// Printed by the paper as well.
-    pub(super) in_paper: bool,
     /// The name in files.
     pub(super) key: &'static str,
     /// The figure of a group.
@@ -34,51 +32,29 @@ pub(super) enum Of {
     Tool(fn(&[&GraspScore]) -> Option<f64>),
     /// Of all grasps; beside them what the classifier sees of the measured imprints.
     Group(fn(&[&GraspScore], &[&[f32]]) -> Option<f64>),
-    /// Read in publications only.
-    Published,
 }
-
-/// Names in files of the Fréchet distance by our features, and by those of an image network.
-pub(super) const FRECHET: &str = "frechet";
-pub(super) const FID: &str = "fid";
 
 /// The columns of a group, in the paper's order.
 pub(super) static COLUMNS: &[Column] = &[
-    Column {
-        in_paper: true,
-        ..db("PSNR dB", "psnr_db", "Against the measured imprint, decibels; peak 22.5 mm", |tool| {
-            psnr(tool, |image| Some(image.error))
-        })
-    },
+    db("PSNR dB", "psnr_db", "Against the measured imprint, decibels; peak 22.5 mm", |tool| {
+        psnr(tool, |image| Some(image.error))
+    }),
     db(
         "clean dB",
         "psnr_noise_free_db",
         "PSNR against the simulator's imprint before camera noise, decibels",
         |tool| psnr(tool, |image| image.noise_free),
     ),
-    Column {
-        in_paper: true,
-        ..ssim("SSIM", "ssim", "Structural similarity; range of the tool's predictions (the lab's)", |tool| {
-            mean(images(tool).filter_map(|i| i.ssim))
-        })
-    },
+    ssim("SSIM", "ssim", "Structural similarity; range of the tool's predictions (the lab's)", |tool| {
+        mean(images(tool).filter_map(|i| i.ssim))
+    }),
     Column {
         heading: "FD",
-        key: FRECHET,
+        key: "frechet",
         tip: "Fréchet distance in the features of the tool classifier: not to be compared with a published FID",
         decimals: 2,
         larger_is_better: false,
-        in_paper: true,
         of: Of::Group(|grasps, measured| frechet_distance(&features(grasps), measured)),
-    },
-    Column {
-        heading: "FID",
-        key: FID,
-        tip: "Fréchet distance in the features of an image network: as published, or of the extractor that was named",
-        decimals: 1,
-        larger_is_better: false,
-        in_paper: true,
-        of: Of::Published,
     },
     Column {
         heading: "angle °",
@@ -86,28 +62,18 @@ pub(super) static COLUMNS: &[Column] = &[
         tip: "Mean error of the in-hand angle, degrees, of the grasps that have a pose",
         decimals: 1,
         larger_is_better: false,
-        in_paper: true,
         of: Of::Tool(|tool| angles(tool)?.mean_deg),
     },
-    Column {
-        in_paper: true,
-        ..percent("≤5° %", "success_5", "Share of grasps within 5 degrees, percent", |tool| {
-            Some(angles(tool)?.success_5)
-        })
-    },
-    Column {
-        in_paper: true,
-        ..percent("≤10° %", "success_10", "Share of grasps within 10 degrees, percent", |tool| {
-            Some(angles(tool)?.success_10)
-        })
-    },
+    percent("≤5° %", "success_5", "Share of grasps within 5 degrees, percent", |tool| Some(angles(tool)?.success_5)),
+    percent("≤10° %", "success_10", "Share of grasps within 10 degrees, percent", |tool| {
+        Some(angles(tool)?.success_10)
+    }),
     Column {
         heading: "place mm",
         key: "position_mm",
         tip: "Mean distance of the tool's estimated place in the hand from the true one, millimeters",
         decimals: 2,
         larger_is_better: false,
-        in_paper: false,
         of: Of::Tool(|tool| mean(tool.iter().filter_map(|g| g.position_error_m)).map(|m| m * 1e3)),
     },
     ssim("IoU", "mask_iou", "Intersection over union of contact masks with the simulator's true contact", |tool| {
@@ -129,7 +95,7 @@ fn features<'a>(grasps: &'a [&GraspScore]) -> Vec<&'a [f32]> {
 type OfTool = fn(&[&GraspScore]) -> Option<f64>;
 
 const fn db(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
-    Column { heading, tip, decimals: 1, larger_is_better: true, in_paper: false, key, of: Of::Tool(of) }
+    Column { heading, tip, decimals: 1, larger_is_better: true, key, of: Of::Tool(of) }
 }
 
 const fn ssim(heading: &'static str, key: &'static str, tip: &'static str, of: OfTool) -> Column {
@@ -177,7 +143,7 @@ fn by_column<S: Serializer>(figures: &BTreeMap<&'static str, Estimate>, to: S) -
         let figure = figures.get(column.key);
         match column.of {
             Of::Tool(_) => map.serialize_entry(column.key, &figure)?,
-            Of::Group(_) | Of::Published => map.serialize_entry(column.key, &figure.map(|e| e.value))?,
+            Of::Group(_) => map.serialize_entry(column.key, &figure.map(|e| e.value))?,
         }
     }
     map.end()
@@ -189,13 +155,12 @@ pub fn columns(rows: &[Row]) -> Vec<&'static Column> {
 }
 
 /// Notes on the meaning of the columns, a line each.
-pub const NOTES: [&str; 6] = [
+pub const NOTES: [&str; 5] = [
     "each figure per tool, then the mean over the tools; intervals: 95 %, bootstrap over the grasps",
     "clean: against the simulator's imprint before camera noise, which no generator can know; the row of the measured \
      imprints says how much that noise costs",
     "FD: Fréchet distance in the features of the tool classifier, predicted against measured imprints of the group; it \
      cannot be compared with a published FID, nor between groups of different size",
-    "FID: Fréchet distance in the features of an image network: published ones are of Inception",
     "angle: error of the in-hand angle from both fingers' contact; without a pose a grasp fails and is in no mean",
     "place: of the grasps that have a pose; IoU: of the contact masks of both fingers, against the simulator's true contact",
 ];

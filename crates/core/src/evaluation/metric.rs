@@ -30,8 +30,6 @@ pub enum Metric {
     Disagreement,
     /// Share of the pixels whose probability of contact is near one half, of the worse finger, 0..1.
     Unsure,
-    /// Distance between predictions with different seeds, meters.
-    SeedSpread,
 }
 
 /// A row of the table of metrics.
@@ -63,7 +61,6 @@ const PLAIN: Row = Row {
 };
 const PERCENT: Row = Row { unit: "%", factor: 100.0, decimals: 1, ..PLAIN };
 const DB: Row = Row { unit: "dB", decimals: 1, ..PLAIN };
-const MM: Row = Row { unit: "mm", factor: 1e3, decimals: 2, larger_is_better: false, ..PLAIN };
 
 /// The table.
 static ROWS: &[Row] = &[
@@ -136,15 +133,6 @@ static ROWS: &[Row] = &[
         larger_is_better: false,
         of: |grasp| grasp.doubt.unsure,
         ..PERCENT
-    },
-    Row {
-        metric: Metric::SeedSpread,
-        name: "Seed spread",
-        short: "seeds",
-        key: "spread",
-        tip: "Standard deviation between kept predictions with different seeds, mean over the pixels, mm",
-        of: |grasp| grasp.seed_spread_m,
-        ..MM
     },
 ];
 
@@ -310,6 +298,5 @@ mod tests {
         };
         assert_eq!(order(Metric::Angle, vec![0.0, 1.0, f64::NAN]), ["no pose", "57.3°", "0.0°"]);
         assert_eq!(order(Metric::Psnr, vec![30.0, 12.0]), ["12.0 dB", "30.0 dB"]);
-        assert_eq!(order(Metric::SeedSpread, vec![0.001, 0.002]), ["2.00 mm", "1.00 mm"]);
     }
 }

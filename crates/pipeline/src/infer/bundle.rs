@@ -70,19 +70,6 @@
 //! }
 //! ```
 //!
-//! ```json
-//! {
-//!   "format": "touch2touch-bundle",
-//!   "format_version": 2,
-//!   "kind": "image_features",
-//!   "name": "Inception of pytorch-fid",
-//!   "files": { "image_features": { "path": "inception.onnx", "sha256": "…" } },
-//!   "input": { "size": [299, 299] },
-//!   "output": { "features": 2048 },
-//!   "provenance": {}
-//! }
-//! ```
-//!
 //! `"window_px": [74.5, 74.0]` in a generator's `output` says that its picture has the center of the color sensor's window
 //! there, pixels of the raw imprint, for every pad: each picture is then moved to where the rig has the pad's window. Without
 //! it, or in a rig without windows, pictures stay where they are.
@@ -116,7 +103,6 @@
 //! | `decoder` | `latent` \[N, …latent shape\] | `image` \[N, channels, output height, width\], about -1 to 1 |
 //! | `mask_unet` | `imprint` \[N, 1, input height, width\], 0 to 1 | `logits` \[N, classes, input height, width\] |
 //! | `tool_classifier` | `imprint` \[N, 1, input height, width\], -1 to 1 | `logits` \[N, classes\], `features` \[N, features\] |
-//! | `image_features` | `image` \[N, 3, input height, width\], 0 to 1 | `features` \[N, features\] |
 
 pub(super) mod contract;
 mod find;
@@ -144,8 +130,8 @@ pub(crate) use fit::FitSpec;
 pub use fit::write as write_fit;
 pub use manifest::TimestepType;
 pub(crate) use manifest::{
-    BundleSpec, Cast, ClassifierInput, ClassifierSpec, FeaturesSpec, GeneratorInput, GeneratorSpec, InputScale,
-    MaskInput, MaskSpec, Unconditional,
+    BundleSpec, Cast, ClassifierInput, ClassifierSpec, GeneratorInput, GeneratorSpec, InputScale, MaskInput, MaskSpec,
+    Unconditional,
 };
 pub(crate) use origin::BundleFile;
 pub use origin::Origin;
@@ -174,8 +160,6 @@ pub enum Role {
     MaskUnet,
     /// Names the tool that made an imprint.
     ToolClassifier,
-    /// Describes a picture in numbers.
-    ImageFeatures,
 }
 
 impl Role {
@@ -187,7 +171,6 @@ impl Role {
             Role::Decoder => "decoder",
             Role::MaskUnet => "mask_unet",
             Role::ToolClassifier => "tool_classifier",
-            Role::ImageFeatures => "image_features",
         }
     }
 }
@@ -370,14 +353,6 @@ impl Bundle {
     pub fn tool_classifier(&self) -> Option<&ClassifierSpec> {
         match &self.spec {
             BundleSpec::ToolClassifier(spec) => Some(spec),
-            _ => None,
-        }
-    }
-
-    /// The feature extractor's description, if the bundle is one.
-    pub(crate) fn image_features(&self) -> Option<&FeaturesSpec> {
-        match &self.spec {
-            BundleSpec::ImageFeatures(spec) => Some(spec),
             _ => None,
         }
     }

@@ -14,7 +14,6 @@ use std::time::{Duration, SystemTime};
 use serde::{Deserialize, Serialize};
 
 use super::kept_key::KeptKey;
-use super::sheets;
 use crate::io::digest::sha256;
 use crate::io::{files, folders};
 use touch2touch_core::grid::Grid;
@@ -219,7 +218,7 @@ impl Store {
             let Ok(name) = entry.file_name().into_string() else { continue };
             let Some(meta) = entry.metadata().ok().filter(fs::Metadata::is_file) else { continue };
             let used = meta.modified().unwrap_or(SystemTime::UNIX_EPOCH);
-            if name.ends_with(SUFFIX) || name.ends_with(sheets::SUFFIX) {
+            if name.ends_with(SUFFIX) {
                 files.push(Found { name, bytes: meta.len(), used });
             } else if name.ends_with(".part") && used.elapsed().is_ok_and(|age| age > STRAY) {
                 fs::remove_file(entry.path()).ok();

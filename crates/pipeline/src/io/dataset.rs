@@ -308,16 +308,6 @@ impl Dataset {
         }
     }
 
-    /// All files that the figures of a pair depend on, besides its tool's: those of [`Dataset::pair_files`], and a stored
-    /// prediction that lies by them. None of a built-in pair.
-    pub(crate) fn scored_files(&self, id: PairId) -> Vec<PathBuf> {
-        let mut files = self.pair_files(id);
-        if let Source::Pictures(pictures) = &self.source {
-            files.extend(pictures.stored(id));
-        }
-        files
-    }
-
     /// The bubble picture on its own pixels (0..255, rotated by 180 degrees), laid upright from how the pair's pictures lay
     /// ([`touch2touch_core::sample::Sample::laid`]); `None` for other sources.
     ///

@@ -3,7 +3,6 @@
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 
-use image::codecs::jpeg::JpegEncoder;
 use image::{DynamicImage, ExtendedColorType, ImageDecoder as _, ImageFormat, ImageReader};
 
 use super::files;
@@ -258,18 +257,6 @@ pub fn write_rgba8(path: &Path, picture: &Grid<[u8; 4]>) -> Result<(), PictureEr
     encode(path, picture.as_slice().as_flattened(), picture.size(), ExtendedColorType::Rgba8)
 }
 
-/// Picture as it comes back from a JPEG file of a quality (1 to 100).
-///
-/// # Errors
-/// As encoder and decoder say; an empty picture has no file.
-pub(crate) fn through_jpeg(picture: &Grid<u8>, quality: u8) -> Result<Grid<u8>, image::ImageError> {
-    let [w, h] = picture.size().map(|n| n as u32);
-    let mut jpeg = Vec::new();
-    JpegEncoder::new_with_quality(&mut jpeg, quality).encode(picture.as_slice(), w, h, ExtendedColorType::L8)?;
-    let image = image::load_from_memory_with_format(&jpeg, ImageFormat::Jpeg)?.into_luma8();
-    Ok(grid(image.width(), image.height(), image.into_raw()))
-}
-
 /// A picture as the bytes of a PNG.
 ///
 /// # Errors
@@ -292,6 +279,7 @@ fn encode(path: &Path, bytes: &[u8], size: [usize; 2], kind: ExtendedColorType) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use image::codecs::jpeg::JpegEncoder;
 
     #[test]
     fn every_kind_survives_the_round_trip() {

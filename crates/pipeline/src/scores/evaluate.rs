@@ -2,11 +2,8 @@
 //! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
 //! studio's Evaluate pane both call [`evaluate`].
 
-mod against;
-mod apart;
 mod doubt;
 mod export;
-mod kept;
 mod load;
 mod methods;
 mod tool;
@@ -20,21 +17,19 @@ use crate::doubts;
 use crate::error::TaskError;
 use crate::infer::bundle::Origin;
 use crate::infer::engine::threads;
-use crate::infer::features::Preparation;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::steps::models;
 use crate::steps::recipe::Recipe;
-use kept::KeptScores;
 use methods::Models;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::diffusion::Sampler;
-use touch2touch_core::evaluation::{self, Difference, Group, Row, Scores};
+use touch2touch_core::evaluation::{self, Group, Row, Scores};
 use touch2touch_core::findings::{Finding, Findings};
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::Scale;
 
-pub use export::{Report, csv, export, latex, markdown, rows};
+pub use export::{Report, csv, export, rows};
 
 /// Name of the task in errors.
 const WHAT: &str = "Evaluate";
@@ -48,8 +43,6 @@ pub struct Setup {
     pub bundles: Vec<Origin>,
     /// The tool classifier; without it neither accuracy nor Fréchet distance.
     pub classifier: Option<Origin>,
-    /// Feature extractor of the Fréchet distance with the preparation of its pictures, instead of the classifier's features.
-    pub features: Option<(Origin, Preparation)>,
     /// Recipe that every method has in common: all but the generator and the imprint, which are the method's.
     #[serde(flatten)]
     pub recipe: Recipe,
@@ -77,7 +70,6 @@ impl Default for Setup {
         Self {
             bundles: Vec::new(),
             classifier: None,
-            features: None,
             recipe: Recipe::default(),
             steps: None,
             seed: None,
@@ -111,8 +103,6 @@ pub struct Evaluation {
     pub rows: Vec<Row>,
     /// The column groups.
     pub groups: Vec<Group>,
-    /// Each further generator less the first, on the same grasps; and all of them less those of [`Evaluation::against`].
-    pub differences: Vec<Difference>,
     /// Meaning of PSNR and SSIM.
     pub conventions: &'static str,
     /// Meaning of the columns, and reasons for what is missing.
@@ -138,8 +128,7 @@ pub struct Evaluation {
     pub scores: Vec<Scores>,
 }
 
-/// Scores every grasp of `dataset` by every method of `setup`. Figures that are kept beside `models` are not computed
-/// again, nor are predictions. Stops early when told to, with what was scored so far.
+/// Scores every grasp of `dataset` by every method of `setup`. Predictions that are kept are not made again. Stops early when told to, with what was scored so far.
 ///
 /// # Errors
 /// If a bundle cannot be used, nothing could be scored, or it was told to stop before anything was. Pairs and
@@ -150,72 +139,24 @@ pub fn evaluate(
     models: &models::Models,
     cx: &JobCx,
 ) -> Result<Evaluation, TaskError> {
+    let start = Instant::now();
     cx.progress(0, 0, "loading the models");
-    let sheets = models.sheets().clone();
-    let models = Models::open(setup, dataset, models)?;
+    let mut models = Models::open(setup, dataset, models)?;
     let work = load::plan(dataset, setup);
-    if work.iter().all(|tool| tool.ids.is_empty()) {
+    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
+    if total == 0 {
         return Err(TaskError::new(WHAT, "the data set has no pairs"));
     }
-    let book = KeptScores::open(dataset, setup, &models, &sheets, &work, false);
-    score(dataset, setup, models, (&work, &book), false, cx)
-}
-
-/// The table of the grasps whose figures are kept by every method that has any, without computing any; `None` where there
-/// are none. A generator of which nothing is kept gets no row.
-///
-/// # Errors
-/// If a bundle cannot be opened.
-pub fn kept(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Option<Evaluation>, TaskError> {
-    let opened = Models::open(setup, dataset, models)?;
-    let mut work = load::plan(dataset, setup);
-    let book = KeptScores::open(dataset, setup, &opened, models.sheets(), &work, true);
-    let ids = || work.iter().flat_map(|tool| tool.ids.iter().copied());
-    let first = opened.before_generators();
-    let known = |at: &usize| ids().any(|id| book.has(first + at, id));
-    let bundles: Vec<Origin> = (0..setup.bundles.len()).filter(known).map(|at| setup.bundles[at].clone()).collect();
-    if bundles.len() < setup.bundles.len() && !bundles.is_empty() {
-        return kept(dataset, &Setup { bundles, ..setup.clone() }, models);
-    }
-    if bundles.is_empty() || !ids().any(|id| book.is_whole(id)) {
-        return Ok(None);
-    }
-    let planned = ids().count();
-    work.iter_mut().for_each(|tool| tool.ids.retain(|id| book.is_whole(*id)));
-    let table = score(dataset, setup, opened, (&work, &book), true, &JobCx::unwatched())?;
-    Ok(Some(Evaluation { complete: table.scored == planned, ..table }))
-}
-
-/// Scores the grasps of `work` whose figures are not kept; `as_kept` leaves those that are as they are.
-fn score(
-    dataset: &Dataset,
-    setup: &Setup,
-    mut models: Models,
-    (work, book): (&[ToolWork], &KeptScores),
-    as_kept: bool,
-    cx: &JobCx,
-) -> Result<Evaluation, TaskError> {
-    let start = Instant::now();
-    let total: usize = work.iter().map(|tool| tool.ids.len()).sum();
-    let missing = |tool: &ToolWork| ToolWork {
-        tool: tool.tool.clone(),
-        ids: tool.ids.iter().copied().filter(|id| !book.is_whole(*id)).collect(),
-    };
-    let todo: Vec<ToolWork> = work.iter().map(missing).collect();
-    let fresh: usize = todo.iter().map(|tool| tool.ids.len()).sum();
-    if fresh > 0 {
-        models.load()?;
-    }
+    models.load()?;
     let mut skipped = Vec::new();
     let mut scores = models.empty_scores();
     let mut findings = Findings::default();
     findings.extend(dataset.problems.iter().cloned());
     findings.extend(doubts::notes(dataset));
-    let (mut done, mut scale) = (total - fresh, Scale::Measured);
-    let mut whole = work.iter();
-    load::ahead(dataset, setup, &todo, cx, |batch| {
+    let (mut done, mut scale) = (0, Scale::Measured);
+    load::ahead(dataset, setup, &work, cx, |batch| {
         let name = batch.work.tool.as_deref().unwrap_or("pictures");
-        let mut tool = tool::Tool::new(dataset, batch.work, book, &mut skipped);
+        let mut tool = tool::Tool::new(dataset, batch.work, &mut skipped);
         for cases in batch.cases {
             if cx.cancel.is_cancelled() {
                 break;
@@ -235,10 +176,7 @@ fn score(
             done += loaded;
             cx.progress(done as u64, total as u64, name);
         }
-        let ids = whole.next().map_or(&[][..], |tool| &tool.ids);
-        let mut again = |at: usize, ids: &[PairId]| tool::again(dataset, setup, &mut models.methods[at], ids, cx);
-        let again: Option<tool::MakeAgain<'_>> = if as_kept { None } else { Some(&mut again) };
-        let entries = tool.finish(ids, again, &mut scores, &mut skipped);
+        let entries = tool.finish(&mut scores, &mut skipped);
         // Of each grasp once, whatever the number of methods.
         let mut noted = BTreeSet::new();
         for (at, entry) in entries {
@@ -261,28 +199,15 @@ fn score(
     }
     cx.progress(total as u64, total as u64, "intervals");
     scores.retain(|s| !s.grasps.is_empty());
-    let mut rows: Vec<Row> = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
-    if setup.features.is_some() {
-        rows.iter_mut().for_each(Row::call_fid);
-    }
+    let rows: Vec<Row> = scores.iter().map(|s| evaluation::row(s, &groups, setup.resamples)).collect();
     let mut notes: Vec<String> = evaluation::NOTES.iter().map(|&n| n.to_owned()).collect();
     notes.append(&mut models.missing(setup, &dataset.rig, scale));
     notes.append(&mut models.masks_made_otherwise());
     notes.extend(evaluation::few_features(&scores, &groups));
-    let methods = 0..if as_kept { scores.len() } else { 0 };
-    let other_range: usize = methods
-        .map(|method| work.iter().map(|tool| tool::of_other_range(book, method, &tool.ids)).sum::<usize>())
-        .sum();
-    if other_range > 0 {
-        notes.push(format!(
-            "The SSIM of {other_range} grasps is in the range of another selection of pairs: evaluate again to have it in this one's"
-        ));
-    }
     Ok(Evaluation {
         dataset: dataset.title.clone(),
         rows,
         groups,
-        differences: against::among(&scores, setup.resamples),
         conventions: evaluation::conventions(scale),
         notes,
         findings: findings.into_list(),
@@ -295,27 +220,6 @@ fn score(
         seconds: start.elapsed().as_secs_f64(),
         scores,
     })
-}
-
-/// The figures that are kept of the grasps of `dataset` by the methods of `setup`, without computing any but how far kept
-/// predictions with different seeds are apart. Their lab SSIM is in the range of the tool's predictions at the time.
-///
-/// # Errors
-/// If a bundle cannot be opened.
-pub fn known(dataset: &Dataset, setup: &Setup, models: &models::Models) -> Result<Vec<Scores>, TaskError> {
-    let (all, sheets) = (models, models.sheets().clone());
-    let models = Models::open(setup, dataset, models)?;
-    let work = load::plan(dataset, setup);
-    let book = KeptScores::open(dataset, setup, &models, &sheets, &work, true);
-    let mut scores = models.empty_scores();
-    for (at, scores) in scores.iter_mut().enumerate() {
-        let mut entries: Vec<_> = work.iter().flat_map(|tool| book.of(at, &tool.ids)).collect();
-        if scores.upper_bound {
-            apart::put(&mut entries, dataset, setup, &models, all);
-        }
-        scores.grasps = entries.into_iter().map(|(_, entry)| entry.score).collect();
-    }
-    Ok(scores)
 }
 
 /// The pairs of one tool.

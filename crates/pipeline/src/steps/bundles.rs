@@ -70,8 +70,6 @@ pub enum BundleKind {
     Mask,
     /// Imprint to tool.
     Classifier,
-    /// Picture to features.
-    Features,
 }
 
 impl BundleKind {
@@ -81,7 +79,6 @@ impl BundleKind {
             Self::Generator => "generator",
             Self::Mask => "mask model",
             Self::Classifier => "tool classifier",
-            Self::Features => "feature extractor",
         }
     }
 }
@@ -96,7 +93,6 @@ impl BundleInfo {
                 BundleSpec::Generator(_) => BundleKind::Generator,
                 BundleSpec::MaskUnet(_) => BundleKind::Mask,
                 BundleSpec::ToolClassifier(_) => BundleKind::Classifier,
-                BundleSpec::ImageFeatures(_) => BundleKind::Features,
             },
             origin: bundle.origin().clone(),
             generator: bundle.generator().map(|spec| GeneratorInfo {

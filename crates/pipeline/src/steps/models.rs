@@ -13,8 +13,7 @@ use crate::infer::engine::{EngineChoice, resolve};
 use crate::infer::generator::{GenerateError, Generator, Item, Observer};
 use crate::infer::kept_key::{KeptKey, input_digest};
 use crate::infer::mask::{MaskError, MaskModel};
-use crate::infer::sheets::Sheets;
-use crate::infer::store::{Inputs, Store};
+use crate::infer::store::Store;
 use crate::io::caught::caught;
 use crate::job::{JobCx, PreviewPicture};
 use crate::steps::bundles::{BundleInfo, BundleKind, by_id};
@@ -60,8 +59,6 @@ type Loaded<T> = Option<((Arc<str>, EngineChoice), T)>;
 #[derive(Debug, Default)]
 pub struct Models {
     store: Option<Mutex<Store>>,
-    /// Scores beside the predictions.
-    sheets: Arc<Sheets>,
     generator: Mutex<Loaded<Generator>>,
     mask_model: Mutex<Loaded<MaskModel>>,
     outputs: Mutex<BTreeMap<Arc<str>, OutputChains>>,
@@ -80,11 +77,6 @@ pub fn outside_of_pools<T: Send>(job: impl FnOnce() -> T + Send) -> T {
     }
     let done = std::thread::scope(|scope| scope.spawn(job).join());
     done.unwrap_or_else(|panicked| std::panic::resume_unwind(panicked))
-}
-
-/// Folder of the sheets: that of the store, if it keeps anything.
-fn folder_of(store: &Store) -> Option<std::path::PathBuf> {
-    (store.budget() > 0).then(|| store.folder().to_owned())
 }
 
 /// Output of a bundle: ways to meters, steps to a color picture, and the size of its condition.
@@ -123,8 +115,7 @@ fn ready<T>(
 impl Models {
     /// Nothing is loaded yet. Predictions are kept in `store` and taken from it; `None` keeps none.
     pub fn new(store: Option<Store>) -> Self {
-        let sheets = Arc::new(Sheets::new(store.as_ref().and_then(folder_of)));
-        Self { store: store.map(Mutex::new), sheets, ..Self::default() }
+        Self { store: store.map(Mutex::new), ..Self::default() }
     }
 
     /// Further models, with the same kept predictions.
@@ -134,7 +125,7 @@ impl Models {
             let store = lock(store);
             Store::new(store.folder().to_owned(), store.budget())
         };
-        Self { store: self.store.as_ref().map(again).map(Mutex::new), sheets: self.sheets.clone(), ..Self::default() }
+        Self { store: self.store.as_ref().map(again).map(Mutex::new), ..Self::default() }
     }
 
     /// Forgets everything that was loaded: a bug may have left it half changed.
@@ -146,15 +137,8 @@ impl Models {
     /// Sets what kept predictions may take, bytes.
     pub fn keep_at_most(&self, bytes: u64) {
         if let Some(store) = &self.store {
-            let mut store = lock(store);
-            store.set_budget(bytes);
-            self.sheets.set_folder(folder_of(&store));
+            lock(store).set_budget(bytes);
         }
-    }
-
-    /// Scores that were computed before.
-    pub(crate) fn sheets(&self) -> &Arc<Sheets> {
-        &self.sheets
     }
 
     /// The ways to meters that a generator's bundle offers; none for another kind.
@@ -308,7 +292,7 @@ impl Models {
         match bundle.kind {
             BundleKind::Generator => outside_of_pools(generator),
             BundleKind::Mask => outside_of_pools(mask_model),
-            kind @ (BundleKind::Classifier | BundleKind::Features) => {
+            kind @ BundleKind::Classifier => {
                 Err(TaskError::new(format!("Open {}", bundle.name), format!("it is a {}", kind.name())))
             }
         }
@@ -363,11 +347,6 @@ impl Models {
             kept.push(KeptPrediction { engine, config: stored.recipe.config, prediction });
         }
         kept
-    }
-
-    /// Names of the predictions that are kept on the disk.
-    pub(crate) fn kept_inputs(&self) -> Inputs {
-        self.store.as_ref().map_or_else(Inputs::default, |store| lock(store).inputs())
     }
 
     /// Contact mask by the mask model for an imprint in meters, with what it is made of in the end. A pixel of at least

@@ -1,6 +1,6 @@
 //! Compares a graph's inputs and outputs with what the manifest promises.
 
-use super::manifest::{BundleSpec, ClassifierSpec, FeaturesSpec, GeneratorSpec, MaskSpec, TimestepType};
+use super::manifest::{BundleSpec, ClassifierSpec, GeneratorSpec, MaskSpec, TimestepType};
 use super::{Problems, Role};
 use crate::infer::onnx_header::{self, FLOAT32, INT64, Port};
 
@@ -68,10 +68,6 @@ pub(in crate::infer) fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<P
                 .collect();
             Some((vec![float("imprint", [1, height, width])], outputs))
         }
-        (Role::ImageFeatures, BundleSpec::ImageFeatures(FeaturesSpec { input, output })) => {
-            let [width, height] = input.size;
-            Some((vec![float("image", [3, height, width])], vec![float("features", [output.features])]))
-        }
         (_, BundleSpec::Generator(spec)) => {
             let GeneratorSpec { input, condition, latent, output, .. } = &**spec;
             let [width, height] = input.size;
@@ -90,7 +86,7 @@ pub(in crate::infer) fn promised(role: Role, spec: &BundleSpec) -> Option<(Vec<P
                     let [width, height] = output.size;
                     Some((vec![latent()], vec![float("image", [output.channels, height, width])]))
                 }
-                Role::MaskUnet | Role::ToolClassifier | Role::ImageFeatures => None,
+                Role::MaskUnet | Role::ToolClassifier => None,
             }
         }
         _ => None,

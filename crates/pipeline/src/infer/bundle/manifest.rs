@@ -1,7 +1,5 @@
 //! The manifest's keys, and what makes a manifest wrong.
 
-mod features;
-
 use std::collections::BTreeMap;
 
 use serde::de::DeserializeOwned;
@@ -17,8 +15,6 @@ use touch2touch_core::postprocess::{
 };
 use touch2touch_core::resample::Resampling;
 use touch2touch_core::rig::{Sensor, SensorKind, lab, share};
-
-pub(crate) use features::FeaturesSpec;
 
 const FORMAT: &str = "touch2touch-bundle";
 /// The newest version; the first declares no sensors, and means the lab's.
@@ -37,8 +33,6 @@ pub enum BundleSpec {
     MaskUnet(MaskSpec),
     /// Imprint to the tool that made it.
     ToolClassifier(ClassifierSpec),
-    /// Picture to features.
-    ImageFeatures(FeaturesSpec),
 }
 
 /// A latent-diffusion generator.
@@ -435,10 +429,9 @@ pub(super) fn parse(text: &[u8], problems: &mut Problems) -> Option<Manifest> {
         Some("generator") => (generator(&mut keys, problems), &[Role::ConditionEncoder, Role::Denoiser, Role::Decoder]),
         Some("mask_unet") => (mask(&mut keys, problems), &[Role::MaskUnet]),
         Some("tool_classifier") => (classifier(&mut keys, problems), &[Role::ToolClassifier]),
-        Some("image_features") => (features::parse(&mut keys, problems), &[Role::ImageFeatures]),
         other => {
             if let Some(other) = other {
-                let hint = "it must be \"generator\", \"mask_unet\", \"tool_classifier\" or \"image_features\"";
+                let hint = "it must be \"generator\", \"mask_unet\" or \"tool_classifier\"";
                 problems.add(format!("kind: \"{other}\" is unknown"), hint);
             }
             return None;

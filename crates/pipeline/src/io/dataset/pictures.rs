@@ -259,11 +259,6 @@ impl Pictures {
             .collect()
     }
 
-    /// The file of a stored prediction.
-    pub(super) fn stored(&self, id: PairId) -> Option<PathBuf> {
-        self.touch(id).ok()?.files[VQVAE].clone()
-    }
-
     /// A gray picture that lay this way in its file, upright.
     pub(super) fn tile(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         Ok(self.tile_and_note(id, kind, laid)?.map(|(tile, _)| tile))

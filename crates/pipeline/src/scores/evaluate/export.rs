@@ -44,22 +44,12 @@ impl Evaluation {
     }
 }
 
-/// The table as Markdown, its size above it.
-pub fn markdown(evaluation: &Evaluation, published: bool) -> String {
-    format!("{}\n\n{}", evaluation.size(), evaluation::markdown(&rows(evaluation, published)))
-}
-
-/// The table as LaTeX, its size in a comment above it.
-pub fn latex(evaluation: &Evaluation, published: bool) -> String {
-    format!("% {}\n{}", evaluation.size(), evaluation::latex(&rows(evaluation, published)))
-}
-
 /// The table as CSV, the pairs of the data set beside the grasps of a row.
 pub fn csv(evaluation: &Evaluation, published: bool) -> String {
     evaluation::csv(&rows(evaluation, published), evaluation.of)
 }
 
-/// Writes `evaluation.csv`, `.md`, `.tex` and `.json` (with every grasp) into a folder, which is made if missing; returns it.
+/// Writes `evaluation.csv` and `.json` (with every grasp) into a folder, which is made if missing; returns it.
 ///
 /// # Errors
 /// If one cannot be written.
@@ -72,12 +62,7 @@ pub fn export(evaluation: &Evaluation, published: bool, folder: &Path) -> Result
         pairs: Some(&evaluation.scores),
     };
     let json = serde_json::to_vec_pretty(&report).map_err(|err| fail(err.to_string()))?;
-    for (name, bytes) in [
-        ("evaluation.csv", csv(evaluation, published).into_bytes()),
-        ("evaluation.md", markdown(evaluation, published).into_bytes()),
-        ("evaluation.tex", latex(evaluation, published).into_bytes()),
-        ("evaluation.json", json),
-    ] {
+    for (name, bytes) in [("evaluation.csv", csv(evaluation, published).into_bytes()), ("evaluation.json", json)] {
         atomic::write_bytes(&folder.join(name), &bytes).map_err(|err| fail(err.to_string()))?;
     }
     Ok(folder.to_owned())

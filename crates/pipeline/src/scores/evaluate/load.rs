@@ -20,8 +20,6 @@ pub(super) struct LoadedPair {
     pub(super) id: PairId,
     pub(super) name: String,
     pub(super) group: Group,
-    /// True where its GelSlim picture is clipped; `None` where there is no picture.
-    pub(super) clipped: Option<bool>,
     pub(super) sample: Sample,
     /// Labels that people gave the pair, where they are to be taken.
     pub(super) labels: Option<PairLabels>,
@@ -43,19 +41,14 @@ pub(super) struct Batch<'a> {
 }
 
 /// Labels that people gave the pairs, where they are to be taken.
-pub(super) struct Labeled(Option<Labels>);
+struct Labeled(Option<Labels>);
 
 impl Labeled {
-    pub(super) fn of(dataset: &Dataset, setup: &Setup) -> Self {
+    fn of(dataset: &Dataset, setup: &Setup) -> Self {
         Self(setup.recipe.hand.then(|| Labels::of(dataset)))
     }
 
-    /// Nobody's.
-    pub(super) fn none() -> Self {
-        Self(None)
-    }
-
-    pub(super) fn load(&self, name: &str) -> Result<Option<PairLabels>, TaskError> {
+    fn load(&self, name: &str) -> Result<Option<PairLabels>, TaskError> {
         self.0.as_ref().map(|labels| labels.load(name)).transpose()
     }
 }
@@ -120,7 +113,7 @@ pub(super) fn ahead(dataset: &Dataset, setup: &Setup, work: &[ToolWork], cx: &Jo
 }
 
 /// Reads one pair.
-pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, Skipped> {
+fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<LoadedPair, Skipped> {
     let Some(entry) = dataset.index.get(id) else {
         return Err(Skipped { what: format!("pair {}", id.0), method: String::new(), why: "no such pair".into() });
     };
@@ -140,5 +133,5 @@ pub(super) fn load(dataset: &Dataset, labels: &Labeled, id: PairId) -> Result<Lo
         (None, None, None)
     };
     let group = Group::of(entry, dataset.kind == SourceKind::Demo, clipped);
-    Ok(LoadedPair { id, name: entry.name.clone(), group, clipped, sample, labels, tile, lab })
+    Ok(LoadedPair { id, name: entry.name.clone(), group, sample, labels, tile, lab })
 }

@@ -8,7 +8,6 @@ use crate::error::TaskError;
 use crate::infer::bundle::{Bundle, Origin};
 use crate::infer::classifier::ToolClassifier;
 use crate::infer::engine::{EngineChoice, resolve};
-use crate::infer::features::{FeatureExtractor, Preparation};
 use crate::io::dataset::{Dataset, SourceKind, imprint_from_tile};
 use crate::job::JobCx;
 use crate::labels::ImprintSource;
@@ -72,9 +71,6 @@ pub(super) struct Models {
     /// The classifier's bundle; the model once it was needed.
     classifier_bundle: Option<Bundle>,
     pub(super) classifier: Option<ToolClassifier>,
-    /// The feature extractor's bundle with the preparation of pictures; the model once it was needed.
-    features_bundle: Option<(Bundle, Preparation)>,
-    pub(super) extractor: Option<FeatureExtractor>,
     engine: String,
     /// Number of masks that were not made of the source that was asked, by row and reason.
     pub(super) made_otherwise: BTreeMap<(String, String), usize>,
@@ -90,11 +86,6 @@ fn found(origin: &Origin, kind: BundleKind) -> Result<BundleInfo, TaskError> {
 }
 
 impl Models {
-    /// Methods that come before the generators.
-    pub(super) fn before_generators(&self) -> usize {
-        self.methods.iter().take_while(|method| matches!(method, Method::Measured)).count()
-    }
-
     /// Finds everything that the setup names; [`Self::load`] loads it.
     pub(super) fn open(setup: &Setup, dataset: &Dataset, models: &models::Models) -> Result<Self, TaskError> {
         let mut methods = Vec::new();
@@ -127,19 +118,12 @@ impl Models {
             (**model).clone().of_kind(BundleKind::Mask, WHAT)?;
         }
         let classifier_bundle = setup.classifier.as_ref().filter(|_| !pictures).map(open).transpose()?;
-        let features = setup.features.as_ref().filter(|_| !pictures);
-        let features_bundle = features.map(|(origin, way)| Ok::<_, TaskError>((open(origin)?, *way))).transpose()?;
-        if let Some((bundle, _)) = &features_bundle {
-            BundleInfo::of(bundle).of_kind(BundleKind::Features, WHAT)?;
-        }
         Ok(Self {
             methods,
             masks: models.beside(),
             common: Recipe { mask_model, ..setup.recipe.clone() },
             classifier_bundle,
             classifier: None,
-            features_bundle,
-            extractor: None,
             engine,
             made_otherwise: BTreeMap::new(),
         })
@@ -159,10 +143,6 @@ impl Models {
             let opened = ToolClassifier::open(bundle, self.common.engine);
             self.classifier = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
         }
-        if let Some((bundle, way)) = &self.features_bundle {
-            let opened = FeatureExtractor::open(bundle, self.common.engine, *way);
-            self.extractor = Some(opened.map_err(|err| TaskError::from_error(WHAT, &err))?);
-        }
         Ok(())
     }
 
@@ -175,25 +155,6 @@ impl Models {
             measured_features: Vec::new(),
         };
         self.methods.iter().map(empty).collect()
-    }
-
-    /// The generators among the methods.
-    pub(super) fn generators(&self) -> Vec<BundleInfo> {
-        let bundle = |method: &Method| match method {
-            Method::Generator(method) => Some(method.bundle.clone()),
-            Method::Measured | Method::Stored => None,
-        };
-        self.methods.iter().filter_map(bundle).collect()
-    }
-
-    /// The identity of the classifier's bundle.
-    pub(super) fn classifier_hash(&self) -> Option<&str> {
-        self.classifier_bundle.as_ref().map(Bundle::hash)
-    }
-
-    /// The identity of the feature extractor's bundle, with the preparation of its pictures.
-    pub(super) fn features_key(&self) -> Option<(&str, Preparation)> {
-        self.features_bundle.as_ref().map(|(bundle, way)| (bundle.hash(), *way))
     }
 
     /// Recipe that every method has in common.
@@ -251,12 +212,8 @@ impl Models {
                 format!("contact masks: the deepest {:.1} % of each imprint", percent.get())
             }
         });
-        match (&self.features_bundle, &self.classifier_bundle) {
-            (Some((bundle, way)), _) => {
-                notes.push(format!("FID: features of {}; {}", bundle.name(), way.description()))
-            }
-            (None, None) => notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into()),
-            (None, Some(_)) => {}
+        if self.classifier_bundle.is_none() {
+            notes.push("no tool classifier: no tool accuracy and no Fréchet distance".into());
         }
         notes
     }

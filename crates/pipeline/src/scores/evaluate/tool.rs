@@ -1,19 +1,17 @@
 //! Scoring the grasps of one tool: image figures wait until all its predictions are there, because the lab's SSIM takes
 //! its range from them.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
 use super::doubt::doubt;
-use super::kept::{Entry, KeptScores};
-use super::load::{Labeled, LoadedPair, load};
+use super::load::LoadedPair;
 use super::methods::{Made, Method, Models};
-use super::{Setup, Skipped, ToolWork, apart};
+use super::{Setup, Skipped, ToolWork};
 use crate::compare::as_tile;
 use crate::error::TaskError;
 use crate::infer::classifier::ToolClassifier;
-use crate::infer::features::FeatureExtractor;
 use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
@@ -24,7 +22,7 @@ use crate::steps::recipe::Stage;
 use crate::steps::tool::load_tool;
 use touch2touch_core::catalog::pattern_of;
 use touch2touch_core::contact::{ContactMask, MaskBasis};
-use touch2touch_core::dataset::PairId;
+use touch2touch_core::dataset::Problem;
 use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
 use touch2touch_core::label::{Doubt, iou};
@@ -44,17 +42,24 @@ struct Image {
     truth: Option<Grid<f32>>,
     noise_free: Option<Grid<f32>>,
     mask_iou: Option<f64>,
-    /// Features, by the extractor where one was named, else by the tool classifier.
+    /// Features by the tool classifier.
     features: Vec<f32>,
 }
 
 /// A grasp that waits for its image figures.
 struct Pending {
-    id: PairId,
     entry: Entry,
     images: Vec<Image>,
-    /// True where something about it failed, so that it is tried again the next time.
-    failed: bool,
+}
+
+/// The figures of a grasp by a method, with what else is said of it.
+pub(super) struct Entry {
+    /// As in the table.
+    pub(super) score: GraspScore,
+    /// Oddities of the files.
+    pub(super) notes: Vec<Problem>,
+    /// Why masks are not of the source that was asked, with how many.
+    pub(super) otherwise: Vec<(String, usize)>,
 }
 
 /// Why masks of a touch are not of the source that was asked, and how many.
@@ -76,24 +81,13 @@ fn otherwise(estimate: &Estimate) -> Vec<(String, usize)> {
     otherwise
 }
 
-/// Has the extractor describe each image, where one was named, else the tool classifier.
-fn describe(
-    extractor: Option<&mut FeatureExtractor>,
-    classifier: Option<&mut ToolClassifier>,
-    images: &mut [Image],
-) -> Result<(), String> {
+/// Has the tool classifier describe each image, if there is one.
+fn describe(classifier: Option<&mut ToolClassifier>, images: &mut [Image]) -> Result<(), String> {
+    let Some(classifier) = classifier else { return Ok(()) };
     let pictures: Vec<&DepthMap> = images.iter().map(|i| &i.prediction).collect();
-    let found = match (extractor, classifier) {
-        (Some(extractor), _) => guarded(|| extractor.features(&pictures).map_err(|err| err.to_string()))
-            .map_err(|why| format!("feature extractor: {why}"))?,
-        (None, Some(classifier)) => guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string()))
-            .map_err(|why| format!("tool classifier: {why}"))?
-            .into_iter()
-            .map(|verdict| verdict.features)
-            .collect(),
-        (None, None) => return Ok(()),
-    };
-    images.iter_mut().zip(found).for_each(|(image, features)| image.features = features);
+    let found = guarded(|| classifier.classify(&pictures).map_err(|err| err.to_string()))
+        .map_err(|why| format!("tool classifier: {why}"))?;
+    images.iter_mut().zip(found).for_each(|(image, verdict)| image.features = verdict.features);
     Ok(())
 }
 
@@ -120,19 +114,15 @@ struct Masked<'a> {
 /// The grasps of one tool, by method.
 pub(super) struct Tool<'a> {
     dataset: &'a Dataset,
-    /// Known figures of the grasps.
-    book: &'a KeptScores,
     /// Name of the tool's pattern.
     pattern: Option<String>,
-    /// True where its CAD model could not be used: figures that are had without it are not kept.
-    broken: bool,
     model: Option<ToolModel>,
     pending: BTreeMap<usize, Vec<Pending>>,
 }
 
 impl<'a> Tool<'a> {
     /// Reads the CAD model, if there is anything to score.
-    pub(super) fn new(dataset: &'a Dataset, work: &ToolWork, book: &'a KeptScores, skipped: &mut Vec<Skipped>) -> Self {
+    pub(super) fn new(dataset: &'a Dataset, work: &ToolWork, skipped: &mut Vec<Skipped>) -> Self {
         let tool = &work.tool;
         let model = tool.as_deref().filter(|_| !work.ids.is_empty()).and_then(|name| {
             let skip = |err: TaskError| {
@@ -142,11 +132,10 @@ impl<'a> Tool<'a> {
             load_tool(dataset, name).map(|loaded| loaded.model).map_err(skip).ok()
         });
         let pattern = tool.as_deref().map(|name| pattern_of(name).to_owned());
-        let broken = tool.is_some() && !work.ids.is_empty() && model.is_none();
-        Self { dataset, book, pattern, broken, model, pending: BTreeMap::new() }
+        Self { dataset, pattern, model, pending: BTreeMap::new() }
     }
 
-    /// Takes some of its grasps through every method that they are not known by. `say` is told which.
+    /// Takes some of its grasps through every method. `say` is told which.
     pub(super) fn score(
         &mut self,
         cases: &[LoadedPair],
@@ -157,17 +146,15 @@ impl<'a> Tool<'a> {
         say: &mut dyn FnMut(&str),
     ) {
         let common = models.common().clone();
-        let Models { methods, masks: by_models, classifier, extractor, .. } = models;
+        let Models { methods, masks: by_models, classifier, .. } = models;
         for (at, method) in methods.iter_mut().enumerate() {
             say(method.name());
             let upper = matches!(method, Method::Measured);
             let recipe = method.posed(&common);
             let with_masks = recipe.mask_recipe().is_ok();
-            let cases: Vec<&LoadedPair> = cases.iter().filter(|case| !self.book.has(at, case.id)).collect();
+            let cases: Vec<&LoadedPair> = cases.iter().collect();
             let Some(made) = method.make(&cases, common.shift, cx) else { return };
-            let mut failed: BTreeSet<PairId> = BTreeSet::new();
             let mut skip = |case: &LoadedPair, why: String| {
-                failed.insert(case.id);
                 skipped.push(Skipped { what: case.name.clone(), method: method.name().to_owned(), why });
             };
             let labels = (PairLabels::default(), TaskError::new("Evaluate", "there is no CAD model"));
@@ -226,7 +213,7 @@ impl<'a> Tool<'a> {
                 }
                 if case.sample.scale == Scale::Measured
                     && made.colors.is_empty()
-                    && let Err(why) = describe(extractor.as_mut(), classifier.as_mut(), &mut images)
+                    && let Err(why) = describe(classifier.as_mut(), &mut images)
                 {
                     skip(case, why);
                 }
@@ -241,15 +228,9 @@ impl<'a> Tool<'a> {
                     position_error_m: judged.position_error_m,
                     verdict: judged.verdict,
                     doubt,
-                    seed_spread_m: None,
                 };
-                let inputs = if upper { apart::inputs(&case.sample) } else { Vec::new() };
-                let entry = Entry::new(score, case.clipped, case.sample.notes.clone(), otherwise, inputs);
-                let pending = Pending { id: case.id, entry, images, failed: false };
-                self.pending.entry(at).or_default().push(pending);
-            }
-            for pending in self.pending.get_mut(&at).into_iter().flatten() {
-                pending.failed |= self.broken || failed.contains(&pending.id);
+                let entry = Entry { score, notes: case.sample.notes.clone(), otherwise };
+                self.pending.entry(at).or_default().push(Pending { entry, images });
             }
         }
     }
@@ -290,50 +271,33 @@ impl<'a> Tool<'a> {
         })
     }
 
-    /// The image figures, now that all predictions of the tool are there; with what was known of `ids` before, in their
-    /// order. What is new is kept in the book. Without `again` what was known stays as it is.
-    pub(super) fn finish(
-        mut self,
-        ids: &[PairId],
-        mut again: Option<MakeAgain<'_>>,
-        scores: &mut [Scores],
-        skipped: &mut Vec<Skipped>,
-    ) -> Vec<(usize, Entry)> {
+    /// The image figures, now that all predictions of the tool are there.
+    pub(super) fn finish(mut self, scores: &mut [Scores], skipped: &mut Vec<Skipped>) -> Vec<(usize, Entry)> {
         let mut measured_features = Vec::new();
         let mut all = Vec::new();
         for (at, scores) in scores.iter_mut().enumerate() {
             let pending = self.pending.remove(&at).unwrap_or_default();
-            let known = self.book.of(at, ids);
-            let spans = known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten());
-            let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)).chain(spans));
-            let (mut kept, stale): (Vec<_>, Vec<_>) =
-                known.into_iter().partition(|(_, entry)| again.is_none() || entry.is_of_range(range));
-            // The lab's SSIM takes its range from all predictions of the tool: with others beside them it is another.
-            let mut fresh = again.as_mut().map_or_else(Vec::new, |again| redone(stale, range, at, again));
+            let range = width(pending.iter().flat_map(|p| &p.images).filter_map(|i| span(&i.prediction)));
             let done: Vec<_> = pending.into_par_iter().map(|pending| ended(pending, range)).collect();
+            let mut entries = Vec::new();
             for one in done {
                 match one {
-                    Ok((one, true)) => kept.push(one),
-                    Ok((one, false)) => fresh.push(one),
+                    Ok(entry) => entries.push(entry),
                     Err((what, why)) => skipped.push(Skipped { what, method: scores.method.clone(), why }),
                 }
             }
-            self.book.put(at, &fresh);
-            kept.append(&mut fresh);
-            let place: BTreeMap<PairId, usize> = ids.iter().copied().zip(0..).collect();
-            kept.sort_by_key(|(id, _)| place.get(id));
             // The measured imprints come first: what the others' features are compared with.
             if at == 0 {
-                measured_features = kept
+                measured_features = entries
                     .iter()
-                    .flat_map(|(_, e)| e.score.images.iter().map(move |i| (e.score.group, i.features.clone())))
+                    .flat_map(|e: &Entry| e.score.images.iter().map(move |i| (e.score.group, i.features.clone())))
                     .filter(|(_, f)| !f.is_empty())
                     .collect();
-            } else if !kept.is_empty() {
+            } else if !entries.is_empty() {
                 scores.measured_features.extend(measured_features.iter().cloned());
             }
-            scores.grasps.extend(kept.iter().map(|(_, entry)| entry.score.clone()));
-            all.extend(kept.into_iter().map(|(_, entry)| (at, entry)));
+            scores.grasps.extend(entries.iter().map(|entry| entry.score.clone()));
+            all.extend(entries.into_iter().map(|entry| (at, entry)));
         }
         all
     }
@@ -361,78 +325,15 @@ fn mask_iou(estimate: &Estimate, sample: &Sample) -> PerPad<f64> {
     found
 }
 
-/// Makes the images of some grasps by a method once more.
-pub(super) type MakeAgain<'a> = &'a mut dyn FnMut(usize, &[PairId]) -> Vec<Again>;
-
-/// The images of a grasp, made once more.
-pub(super) struct Again {
-    id: PairId,
-    images: Vec<Image>,
-}
-
-/// The images of some grasps by a method; those that fail now are left out.
-fn images_again(cases: &[&LoadedPair], method: &mut Method, setup: &Setup, cx: &JobCx) -> Vec<Again> {
-    let upper = matches!(method, Method::Measured);
-    let made = method.make(cases, setup.recipe.shift, cx).unwrap_or_default();
-    let one = |(case, made): (&&LoadedPair, Result<Made, String>)| {
-        let images = guarded(|| Ok(images(case, &made?, setup, upper))).ok()?;
-        Some(Again { id: case.id, images })
-    };
-    cases.iter().zip(made).filter_map(one).collect()
-}
-
-/// The images of some grasps by a method, made once more.
-pub(super) fn again(dataset: &Dataset, setup: &Setup, method: &mut Method, ids: &[PairId], cx: &JobCx) -> Vec<Again> {
-    // Images need no labels.
-    let unlabeled = Labeled::none();
-    let mut all = Vec::new();
-    for ids in ids.chunks(setup.batch.div_ceil(2).max(1)) {
-        if cx.cancel.is_cancelled() {
-            break;
-        }
-        let cases: Vec<LoadedPair> = ids.par_iter().filter_map(|&id| load(dataset, &unlabeled, id).ok()).collect();
-        all.extend(images_again(&cases.iter().collect::<Vec<_>>(), method, setup, cx));
-    }
-    all
-}
-
-/// Known figures with their SSIM in another range. A grasp whose images cannot be made any more is left out.
-fn redone(stale: Vec<(PairId, Entry)>, range: f64, at: usize, again: MakeAgain<'_>) -> Vec<(PairId, Entry)> {
-    if stale.is_empty() {
-        return Vec::new();
-    }
-    let ids: Vec<PairId> = stale.iter().map(|(id, _)| *id).collect();
-    let mut known: BTreeMap<PairId, Entry> = stale.into_iter().collect();
-    let matched: Vec<(PairId, Entry, Vec<Image>)> = again(at, &ids)
-        .into_iter()
-        .filter_map(|Again { id, images }| Some((id, known.remove(&id)?, images)))
-        .filter(|(_, entry, images)| entry.score.images.len() == images.len())
-        .collect();
-    let anew = |(id, mut entry, images): (PairId, Entry, Vec<Image>)| {
-        let found = guarded(|| Ok(images.into_iter().map(|i| finished(i, range)).collect()));
-        let found: Vec<ImageScore> = found.ok()?;
-        for (known, new) in entry.score.images.iter_mut().zip(found) {
-            known.ssim = new.ssim;
-        }
-        entry.range = range;
-        Some((id, entry))
-    };
-    matched.into_par_iter().filter_map(anew).collect()
-}
-
-/// A grasp with its image figures, and whether it is only for this table; else its pair and what failed.
-fn ended(pending: Pending, range: f64) -> Result<((PairId, Entry), bool), (String, String)> {
-    let Pending { id, mut entry, images, failed } = pending;
-    let assumed = entry.score.scale == Scale::Assumed;
-    entry.spans = images.iter().map(|image| span(&image.prediction)).collect();
-    entry.range = range;
+/// A grasp with its image figures; else its pair and what failed.
+fn ended(pending: Pending, range: f64) -> Result<Entry, (String, String)> {
+    let Pending { mut entry, images } = pending;
     // Stretched pictures have one range only.
-    let range = if assumed { 1.0 } else { range };
-    let scored = || Ok(images.into_iter().map(|i| finished(i, range)).collect());
-    match guarded(scored) {
+    let range = if entry.score.scale == Scale::Assumed { 1.0 } else { range };
+    match guarded(|| Ok(images.into_iter().map(|i| finished(i, range)).collect())) {
         Ok(images) => {
             entry.score.images = images;
-            Ok(((id, entry), failed))
+            Ok(entry)
         }
         Err(why) => Err((entry.score.pair, why)),
     }
@@ -491,13 +392,6 @@ fn span(image: &Grid<f32>) -> Option<[f32; 2]> {
     let finite = image.as_slice().iter().copied().filter(|v| v.is_finite());
     let [low, high] = finite.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)]);
     (low <= high).then_some([low, high])
-}
-
-/// How many of the known figures of some grasps of a tool have their SSIM in a range that is not that of these grasps.
-pub(super) fn of_other_range(book: &KeptScores, method: usize, ids: &[PairId]) -> usize {
-    let known = book.of(method, ids);
-    let range = width(known.iter().flat_map(|(_, entry)| entry.spans.iter().copied().flatten()));
-    known.iter().filter(|(_, entry)| !entry.is_of_range(range)).count()
 }
 
 /// Largest minus smallest value of some images.
