@@ -61,24 +61,3 @@ fn predictions_are_kept_and_found_again() {
     assert_eq!(text.matches("was not trained for guidance").count(), 1, "{text}");
     assert_eq!(generate(&["--guidance", "-1"]).status.code(), Some(2));
 }
-
-#[test]
-fn lengths_of_pictures_are_in_the_assumed_meters() {
-    use touch2touch_core::grid::Grid;
-    use touch2touch_pipeline::io::images;
-    let dir = tempfile::tempdir().unwrap();
-    let (home, set) = (dir.path().join("home"), dir.path().join("set"));
-    std::fs::create_dir(&set).unwrap();
-    let bundle = full_size_bundle(dir.path());
-    let gelslim = Grid::from_fn(128, 128, |x, y| [(x % 90) as f32 + 80.0, (y % 70) as f32 + 90.0, 120.0]);
-    images::write_rgb8(&set.join("a_gelslim.png"), &gelslim).unwrap();
-    images::write_gray8(&set.join("a_bubble.png"), &Grid::from_fn(128, 128, |x, y| (x + y) as u8)).unwrap();
-    let [set, out, bundle] = [&set, &dir.path().join("out"), &bundle].map(|p| p.to_str().unwrap().to_owned());
-    let args = ["generate", &set, "--out", &out, "--bundle", &bundle, "--runtime", "rten", "--json"];
-    let report = json(&run(&args, &home));
-    // Nothing in 0..255 is meant: the tile stands for -6.3 to 18.0 mm.
-    for part in ["seen", "invented"] {
-        let mae_m = report["pairs"][0][part]["mae_m"].as_f64().unwrap();
-        assert!(mae_m > 0.0 && mae_m < 0.06, "{part}: {mae_m} m");
-    }
-}

@@ -81,10 +81,6 @@ fn the_reverse_direction_goes_through_every_verb() {
     assert_eq!(pairs.len(), 2, "both fingers");
     for pair in pairs {
         assert!(pair["psnr_db"].as_f64().unwrap() > 0.0 && pair["ssim"].is_number(), "{pair}");
-        assert!(
-            pair["seen"].is_null() && pair["invented"].is_null(),
-            "there is no footprint in a color picture: {pair}"
-        );
     }
     assert!(found["convention"].as_str().unwrap().contains("left out"), "{}", found["convention"]);
     let pictures: Vec<PathBuf> = std::fs::read_dir(out).unwrap().map(|f| f.unwrap().path()).collect();

@@ -67,22 +67,11 @@ pub(super) struct CompareArgs {
 struct Figures {
     psnr_db: Option<f64>,
     ssim: Option<f64>,
-    /// Mean absolute difference, meters.
-    mae_m: Option<f64>,
-    /// Mean absolute difference where the GelSlim saw, and where the model made it up.
-    seen_mae_m: Option<f64>,
-    invented_mae_m: Option<f64>,
 }
 
 impl From<&Comparison> for Figures {
     fn from(found: &Comparison) -> Self {
-        Self {
-            psnr_db: found.psnr_db,
-            ssim: found.ssim,
-            mae_m: Some(found.mae_m).filter(|v| v.is_finite()),
-            seen_mae_m: found.split.and_then(|split| split.seen.mae),
-            invented_mae_m: found.split.and_then(|split| split.invented.mae),
-        }
+        Self { psnr_db: found.psnr_db, ssim: found.ssim }
     }
 }
 
@@ -229,22 +218,14 @@ fn write(out: &Path, finger: &str, error: &DepthMap) -> anyhow::Result<()> {
 
 fn text(report: &Report) -> String {
     let mut text = format!(
-        "{}\nA  {}\nB  {}\n\n{:<8} {:<6} {:>7} {:>7} {:>9} {:>9} {:>11}\n",
-        report.pair, report.a, report.b, "finger", "", "PSNR dB", "SSIM", "mean mm", "seen mm", "invented mm"
+        "{}\nA  {}\nB  {}\n\n{:<8} {:<6} {:>7} {:>7}\n",
+        report.pair, report.a, report.b, "finger", "", "PSNR dB", "SSIM"
     );
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| fixed(v, digits));
     for finger in &report.fingers {
         for (name, figures) in [("A", finger.a.as_ref()), ("B", finger.b.as_ref()), ("A - B", Some(&finger.a_b))] {
             let Some(of) = figures else { continue };
-            text += &format!(
-                "{:<8} {name:<6} {:>7} {:>7} {:>9} {:>9} {:>11}\n",
-                finger.finger,
-                number(of.psnr_db, 1),
-                number(of.ssim, 3),
-                number(of.mae_m.map(mm), 2),
-                number(of.seen_mae_m.map(mm), 2),
-                number(of.invented_mae_m.map(mm), 2)
-            );
+            text += &format!("{:<8} {name:<6} {:>7} {:>7}\n", finger.finger, number(of.psnr_db, 1), number(of.ssim, 3));
         }
     }
     if let Some(poses) = &report.poses {

@@ -29,11 +29,6 @@ fn statistics_are_written_once_and_serve_their_bundle_only() {
     let done = run(&[&generate[..], &QUICK, &refit].concat(), dir.path());
     assert!(done.status.success(), "{}", error_text(&done));
     let pair = &json(&done)["pairs"][0];
-    for part in ["seen", "invented"] {
-        for key in ["pixels", "psnr_db", "ssim", "mae_m", "bias_m"] {
-            assert!(pair[part][key].is_number(), "{part} {key}: {pair}");
-        }
-    }
     assert!(pair["ambiguity"]["kind"].is_string());
 
     // Another bundle's statistics are refused, and both are named.

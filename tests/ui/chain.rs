@@ -1,4 +1,4 @@
-//! The depth chain: its flags, the refit, the parts seen and invented, and the warning of a bare shaft.
+//! The depth chain: the refit.
 
 use touch2touch::app::command::PredictCommand;
 use touch2touch::app::keys::ShiftMode;

@@ -5,7 +5,7 @@ use serde::Serialize;
 use touch2touch_core::ambiguity::{Ambiguity, TouchKind};
 use touch2touch_core::evaluation;
 use touch2touch_core::findings::Finding;
-use touch2touch_core::metrics::{self, Unstretched};
+use touch2touch_core::metrics::Unstretched;
 use touch2touch_core::rig::Text;
 use touch2touch_core::sample::Scale;
 use touch2touch_pipeline::compare::Comparison;
@@ -38,11 +38,6 @@ pub(super) struct Pair {
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
     pub(super) vqvae: Option<Stored>,
-    /// The figures apart for what the GelSlim saw and for what lies outside its footprint; errors in meters.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) seen: Option<metrics::PixelMetrics>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) invented: Option<metrics::PixelMetrics>,
     /// Verdict on whether the GelSlim image tells where on the tool it is.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub(super) ambiguity: Option<Ambiguity>,
@@ -64,11 +59,6 @@ pub(super) struct Mean {
     pub(super) unstretched: Option<Unstretched>,
     #[serde(flatten)]
     pub(super) vqvae: Option<Stored>,
-    /// Means over the pairs: inside the GelSlim's footprint, and outside.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) seen: Option<PartMean>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(super) invented: Option<PartMean>,
     /// Pairs whose GelSlim image leaves the place along a bare shaft open.
     pub(super) ambiguous: usize,
     pub(super) seconds: Option<f64>,
@@ -103,28 +93,6 @@ fn unstretched_mean(all: impl Iterator<Item = Unstretched>) -> Option<Unstretche
     })
 }
 
-/// Means of the figures of one part.
-#[derive(Debug, Serialize)]
-pub(super) struct PartMean {
-    pub(super) psnr_db: Option<f64>,
-    pub(super) ssim: Option<f64>,
-    pub(super) mae_m: Option<f64>,
-    pub(super) bias_m: Option<f64>,
-}
-
-impl PartMean {
-    fn of(pairs: &[Pair], part: fn(&Pair) -> Option<metrics::PixelMetrics>) -> Option<Self> {
-        let all: Vec<metrics::PixelMetrics> = pairs.iter().filter_map(part).collect();
-        let of = |get: fn(&metrics::PixelMetrics) -> Option<f64>| evaluation::mean(all.iter().filter_map(get));
-        (!all.is_empty()).then(|| Self {
-            psnr_db: of(|f| f.psnr_db),
-            ssim: of(|f| f.ssim),
-            mae_m: of(|f| f.mae),
-            bias_m: of(|f| f.bias),
-        })
-    }
-}
-
 /// The answer.
 #[derive(Debug, Serialize)]
 pub(super) struct Report {
@@ -154,8 +122,6 @@ pub(super) fn convention(scale: Scale) -> &'static str {
 
 pub(super) fn take(pair: &mut Pair, found: &Comparison) {
     (pair.psnr_db, pair.ssim, pair.unstretched) = (found.psnr_db, found.ssim, found.unstretched);
-    pair.seen = found.split.map(|s| s.seen);
-    pair.invented = found.split.map(|s| s.invented);
 }
 
 pub(super) fn mean(pairs: &[Pair]) -> Mean {
@@ -167,8 +133,6 @@ pub(super) fn mean(pairs: &[Pair]) -> Mean {
         vqvae_ssim: of(|p| p.vqvae_ssim),
         unstretched: unstretched_mean(pairs.iter().filter_map(|p| p.unstretched)),
         vqvae: unstretched_mean(pairs.iter().filter_map(|p| Some(p.vqvae?.0))).map(Stored),
-        seen: PartMean::of(pairs, |p| p.seen),
-        invented: PartMean::of(pairs, |p| p.invented),
         ambiguous: pairs.iter().filter(|p| p.ambiguity.is_some_and(|a| a.kind == TouchKind::BareShaft)).count(),
         seconds: of(|p| Some(p.seconds)),
     }
@@ -179,17 +143,14 @@ pub(super) fn text(report: &Report) -> String {
     let pairs = &report.pairs;
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
-        "{:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}\n",
-        "pair", "PSNR dB", "SSIM", "seen dB", "inv. dB", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
+        "{:<44} {:>8} {:>6} {:>12} {:>10} {:>8}\n",
+        "pair", "PSNR dB", "SSIM", "VQ-VAE dB", "VQ-VAE SSIM", "seconds"
     );
     let mut line = |name: &str, p: &Mean, note: &str| {
-        let part = |part: &Option<PartMean>| number(part.as_ref().and_then(|p| p.psnr_db), 1);
         text += &format!(
-            "{name:<44} {:>8} {:>6} {:>8} {:>8} {:>12} {:>10} {:>8}{note}\n",
+            "{name:<44} {:>8} {:>6} {:>12} {:>10} {:>8}{note}\n",
             number(p.psnr_db, 1),
             number(p.ssim, 3),
-            part(&p.seen),
-            part(&p.invented),
             number(p.vqvae_psnr_db, 1),
             number(p.vqvae_ssim, 3),
             number(p.seconds, 2)
@@ -202,7 +163,7 @@ pub(super) fn text(report: &Report) -> String {
     }
     line("mean", &report.mean, "");
     text + &format!(
-        "{}\n{}; seen = inside the GelSlim's footprint, inv. = invented outside it\n{} of {} GelSlim images are ambiguous \
+        "{}\n{}\n{} of {} GelSlim images are ambiguous \
          (bare shaft); {} steps, seed {}, {} on {}\n",
         unstretched_text(&report.mean),
         report.convention,

@@ -17,7 +17,6 @@ use touch2touch_core::postprocess::Severity;
 use touch2touch_core::sample::Scale;
 use touch2touch_core::units;
 use touch2touch_core::verdict::Grade;
-use touch2touch_pipeline::compare::Comparison;
 use touch2touch_pipeline::labels::ImprintOf;
 use touch2touch_pipeline::steps::pose::PoseResult;
 
@@ -219,7 +218,6 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                 ] {
                     line(0.0).show(ui, (name, cx.p.weak), &[(number, cx.p.strong)]);
                 }
-                parts(cx, ui, c);
                 if let Some(warning) = results::ambiguity(cx.state, finger).and_then(|a| a.warning()) {
                     ui.add(Label::new(RichText::new(warning).size(SMALL).color(cx.p.caution)).wrap());
                 }
@@ -235,31 +233,6 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
     }
-}
-
-/// Figures apart for what the GelSlim saw and for what the model made up.
-fn parts(cx: &Cx<'_>, ui: &mut Ui, c: &Comparison) {
-    let Some(split) = c.split else { return };
-    let number = |v: Option<f64>, digits: usize| v.map_or("–".to_owned(), |v| units::fixed(v, digits));
-    let spacing = std::mem::replace(&mut ui.spacing_mut().item_spacing.y, 0.0);
-    let width = ((ui.available_width() - 60.0) / 4.0).clamp(34.0, 64.0);
-    let heads = ["dB", "SSIM", "err mm", "bias mm"].map(|h| (h.to_owned(), cx.p.weak));
-    line(width).show(ui, ("", cx.p.weak), &heads);
-    for (name, f, tip) in [
-        ("Seen", split.seen, "Inside the dashed window: the GelSlim saw this part. err: mean |error|"),
-        ("Invented", split.invented, "Outside the dashed window: the model made this part up. err: mean |error|"),
-    ] {
-        let numbers = [
-            number(f.psnr_db, 1),
-            number(f.ssim, 3),
-            number(f.mae.map(units::mm), 2),
-            number(f.bias.map(units::mm), 2),
-        ]
-        .map(|text| (text, cx.p.strong));
-        let tip = format!("{tip}. {} pixels; bias is predicted minus measured", f.pixels);
-        line(width).show(ui, (name, cx.p.text), &numbers).on_hover_text(tip);
-    }
-    ui.spacing_mut().item_spacing.y = spacing;
 }
 
 /// Lines with `column` points from one number to the next.

@@ -314,10 +314,6 @@ fn difference(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, finger: PadId) -> O
     let text = format!("{} minus {}, {finger_text}", versus.a.label(), versus.b.label());
     output.caption(Align2::LEFT_TOP, &text, light);
     output.caption(Align2::RIGHT_TOP, scale_note(cx.state), crate::ui::parts::theme::DARK.caution);
-    let part = |mae: Option<f64>| mae.map_or("–".to_owned(), units::text_mm);
-    let split = compared.split.map(|s| format!(": seen {}, invented {}", part(s.seen.mae), part(s.invented.mae)));
-    let text = format!("mean {}{}", units::text_mm(compared.mae_m), split.unwrap_or_default());
-    output.caption(Align2::RIGHT_BOTTOM, &text, light);
     histogram
 }
 

@@ -32,11 +32,7 @@ fn subject() -> impl Strategy<Value = Subject> {
 
 /// A comparison in the words of the verb.
 fn figures(found: &Comparison) -> Value {
-    let part = |get: fn(&touch2touch_core::metrics::Split) -> Option<f64>| found.split.as_ref().and_then(get);
-    serde_json::json!({
-        "psnr_db": found.psnr_db, "ssim": found.ssim, "mae_m": Some(found.mae_m).filter(|v| v.is_finite()),
-        "seen_mae_m": part(|split| split.seen.mae), "invented_mae_m": part(|split| split.invented.mae),
-    })
+    serde_json::json!({ "psnr_db": found.psnr_db, "ssim": found.ssim })
 }
 
 #[test]
@@ -91,6 +87,6 @@ pub(in crate::agreement) fn any_two_imprints_differ_by_the_same_in_the_pane_and_
         }
         counts.push(count);
     }
-    compared(&counts, 10);
+    compared(&counts, 4);
     assert!(poses >= 8, "{poses}");
 }

@@ -14,27 +14,19 @@ use touch2touch_pipeline::steps::pose::PoseResult;
 
 /// A column of the figures.
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Metric6 {
+enum Figure {
     Psnr,
     Ssim,
-    Mean,
-    Seen,
-    Invented,
     Angle,
 }
 
-impl Metric6 {
-    const ALL: [Self; 6] = [Self::Psnr, Self::Ssim, Self::Mean, Self::Seen, Self::Invented, Self::Angle];
-    /// Figures where there is little room.
-    const FEW: [Self; 4] = [Self::Psnr, Self::Mean, Self::Seen, Self::Angle];
+impl Figure {
+    const ALL: [Self; 3] = [Self::Psnr, Self::Ssim, Self::Angle];
 
     fn name(self) -> &'static str {
         match self {
             Self::Psnr => "PSNR dB",
             Self::Ssim => "SSIM",
-            Self::Mean => "mean mm",
-            Self::Seen => "seen mm",
-            Self::Invented => "invented mm",
             Self::Angle => "angle °",
         }
     }
@@ -43,25 +35,17 @@ impl Metric6 {
         match self {
             Self::Psnr => "PSNR against the measurement (last row: A against B), as in the metrics",
             Self::Ssim => "Structural similarity against the measurement (last row: of A and B)",
-            Self::Mean => "Mean absolute difference from the measurement (last row: of A and B)",
-            Self::Seen => "The same where the GelSlim saw",
-            Self::Invented => "The same where the model made it up",
             Self::Angle => "The registered angle, in brackets its error where the truth is known (last row: A minus B)",
         }
     }
 
     fn text(self, comparison: Option<&Comparison>, angle: &str) -> String {
-        let split = comparison.and_then(|comparison| comparison.split);
         let number = |v: Option<f64>, digits: usize| {
             v.filter(|v| v.is_finite()).map_or("–".to_owned(), |v| units::fixed(v, digits))
         };
-        let mm = |v: Option<f64>| number(v.map(units::mm), 2);
         match self {
             Self::Psnr => number(comparison.and_then(|comparison| comparison.psnr_db), 1),
             Self::Ssim => number(comparison.and_then(|comparison| comparison.ssim), 3),
-            Self::Mean => mm(comparison.map(|comparison| comparison.mae_m)),
-            Self::Seen => mm(split.and_then(|split| split.seen.mae)),
-            Self::Invented => mm(split.and_then(|split| split.invented.mae)),
             Self::Angle => angle.to_owned(),
         }
     }
@@ -75,7 +59,7 @@ const NAMES: f32 = 34.0;
 pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
     let state = cx.state;
     let finger = state.selection.finger;
-    let columns = if ui.available_width() < 400.0 { &Metric6::FEW[..] } else { &Metric6::ALL[..] };
+    let columns = Figure::ALL;
     let (area, _) = ui.allocate_exact_size(vec2(ui.available_width(), 4.0 * ROW), Sense::hover());
     let width = ((area.width() - NAMES) / columns.len() as f32).min(92.0);
     let painter = ui.painter_at(area);
