@@ -8,7 +8,7 @@ use touch2touch::app::results;
 use touch2touch::app::settings::prefer;
 use touch2touch::app::settings::{MaskSource, Workspace};
 use touch2touch::app::state::State;
-use touch2touch::app::workbench::{ManualTry, SceneTool, WorkbenchCommand};
+use touch2touch::app::workbench::{ManualTry, SceneTool};
 use touch2touch_core::manual::{PoseAxis, PoseDifference, STEP_M, STEP_RAD};
 use touch2touch_core::rig::lab;
 use touch2touch_pipeline::io::dataset::Dataset;
