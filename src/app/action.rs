@@ -53,25 +53,25 @@ impl Group {
 macro_rules! actions {
     ($with:ident) => {
         $with! {
-        OpenFolder, File, "Open folder…", "Opens a folder with the lab's files or with images", [ctrl(K::O), ctrl_shift(K::O)],
+        OpenFolder, File, "Open folder…", "Opens a folder of the lab's files or of image pairs", [ctrl(K::O), ctrl_shift(K::O)],
             _ => ui(UiRequest::PickFolder);
         OpenDemo, File, "Open the demo", "Opens the built-in simulated data", [],
             _ => does(LibraryCommand::Open(Place::Demo));
-        Follow, File, "Follow the folder", "Shows and predicts each touch that arrives in the open folder, or stops", [ctrl_shift(K::F)],
+        Follow, File, "Follow the folder", "Shows and predicts each new touch in the open folder; again to stop", [ctrl_shift(K::F)],
             state => follow(state);
         Reload, File, "Reload", "Reads the open data set again", [plain(K::F5)],
             state => opened(state, LibraryCommand::Reload);
-        AboutData, File, "About this data", "Says what the open data set is, what the models are worth on it, and what would better that", [],
+        AboutData, File, "About this data", "What is in this data set, how well the models do on it, and what would help", [],
             state => opened(state, DoctorCommand::Show(!state.doctor.shown));
-        Save, File, "Save now", "Writes labels and preferences now; they are also saved after every change", [ctrl(K::S)],
+        Save, File, "Save now", "Saves labels and preferences now; this also happens after every change", [ctrl(K::S)],
             _ => does(LabelsCommand::Save);
-        ExportMeasured, File, "Export the measured pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the measured imprint", [],
+        ExportMeasured, File, "Export the measured pair…", "Writes point cloud (PLY), pose (JSON) and CAD model in the hand (STL), from the measured imprint", [],
             state => export(state, ImprintSource::Measured);
-        ExportPredicted, File, "Export the predicted pair…", "Writes cloud (PLY), pose (JSON) and aligned mesh (STL) of the predicted imprint", [],
+        ExportPredicted, File, "Export the predicted pair…", "Writes point cloud (PLY), pose (JSON) and CAD model in the hand (STL), from the predicted imprint", [],
             state => export(state, ImprintSource::Predicted);
-        ExportMasks, File, "Export masks…", "Writes the masks as a folder that the UNet training reads, or as PNG alone", [ctrl(K::E)],
+        ExportMasks, File, "Export masks…", "Writes masks as a folder for UNet training, or as PNG only", [ctrl(K::E)],
             state => opened(state, ExportCommand::AskMasks(true));
-        ImportMasks, File, "Import masks…", "Takes masks over from a folder of PNG files, named as an export names them; hand work stays", [],
+        ImportMasks, File, "Import masks…", "Reads masks from a folder of PNG files with the names of an export; what you drew stays", [],
             state => opened(state, ViewCommand::Ui(UiRequest::PickMasks));
 
         PreviousPair, Navigate, "Previous pair", "Shows the previous pair of the list", [plain(K::A), plain(K::PageUp)],
@@ -88,20 +88,20 @@ macro_rules! actions {
             state => listed(state, LibraryCommand::Last);
         NextUnfinished, Navigate, "Next unfinished", "Shows the next pair that is neither done nor skipped", [shift(K::N)],
             state => listed(state, LibraryCommand::NextUnfinished);
-        NextWorst, Navigate, "Next worst", "Shows the pair that is worst by the chosen score, then the next worse one", [plain(K::N)],
+        NextWorst, Navigate, "Next worst", "Shows the worst pair by the chosen score, then the second worst, and so on", [plain(K::N)],
             state => listed(state, LibraryCommand::NextWorst).filter(|_| state.table.by().is_some());
-        OtherFinger, Navigate, "Other finger", "Makes the other finger the active one", [plain(K::U)],
+        OtherFinger, Navigate, "Other finger", "Switches to the other finger", [plain(K::U)],
             state => does(ViewCommand::SelectFinger(state.other_finger()));
         BothFingers, Navigate, "Both fingers", "Shows both fingers, or only the active one", [shift(K::U)],
             state => does(ViewCommand::ShowBothFingers(!state.selection.both_fingers));
-        FindPair, Navigate, "Filter pairs", "Moves the keyboard to the filter of the list", [ctrl(K::F)],
+        FindPair, Navigate, "Filter pairs", "Goes to the filter of the list", [ctrl(K::F)],
             state => when(state.selection.panes.contains(&Pane::Browser), ViewCommand::Ui(UiRequest::FocusFilter));
 
         Generate, Generate, "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", [ctrl(K::G)],
             state => when(results::can_generate(state).is_ok(), PredictCommand::Generate);
-        GenerateNewSeed, Generate, "Generate with a new seed", "Draws another seed, then generates", [ctrl_shift(K::G)],
+        GenerateNewSeed, Generate, "Generate with a new seed", "Draws a new seed and generates", [ctrl_shift(K::G)],
             state => when(results::can_generate(state).is_ok(), PredictCommand::GenerateNewSeed);
-        LockSeed, Generate, "Lock the seed", "Keeps the seed when generating again, or draws a new one each time", [ctrl(K::L)],
+        LockSeed, Generate, "Lock the seed", "Keeps the seed, or draws a new one each time you generate", [ctrl(K::L)],
             _ => does(prefer(|s| s.generate.seed_locked ^= true));
         FitPairs, Generate, "Fit to my pairs", "Fits the generator to the open pairs, and says what it is worth on pairs that were left out", [],
             state => when(learn::can_start(state, Network::Generator), LearnCommand::Start(Network::Generator));
@@ -111,38 +111,38 @@ macro_rules! actions {
             state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
             state => when(can_rank(state), EvaluateCommand::All);
-        RankMasks, Generate, "Rank by uncertainty", "Asks the mask model about every measured imprint and registers its pose, so that the most uncertain masks come first; runs no generator", [],
+        RankMasks, Generate, "Rank by uncertainty", "Sorts the pairs by how unsure the mask model is, most unsure first", [],
             state => when(can_rank(state), EvaluateCommand::Rank);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
-        CancelJobs, Generate, "Cancel", "Closes a form, gives up a stroke, rejects a proposal; then stops what is running", [plain(K::Escape)],
+        CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain(K::Escape)],
             state => cancel(state);
-        NextShift, Generate, "Next range mapping", "Goes through raw, paper shift, exact inverse and the refit", [shift(K::P)],
+        NextShift, Generate, "Next depth scale", "Cycles through the depth scales: uncorrected, as in the paper, calibrated, matched to this data set", [shift(K::P)],
             state => next_shift(state);
-        Refit, Generate, "Refit on this data set", "Computes shift statistics of this data set's predictions and measurements, and uses them", [],
+        Refit, Generate, "Match depths to this data set", "Matches the mean and deviation of predicted depths to the measurements of this data set (refit)", [],
             state => when(results::can_generate(state).is_ok(), PredictCommand::Refit);
 
-        Brush, Mask, "Brush", "Adds to the mask while the button is down", [plain(K::Num1), plain(K::B)],
+        Brush, Mask, "Brush", "Paints the mask; the right button erases", [plain(K::Num1), plain(K::B)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Brush));
-        Eraser, Mask, "Eraser", "Removes from the mask while the button is down", [plain(K::Num2), plain(K::E)],
+        Eraser, Mask, "Eraser", "Erases the mask", [plain(K::Num2), plain(K::E)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Eraser));
-        Lasso, Mask, "Lasso", "Adds what a drawn line encloses; the right button removes", [plain(K::L)],
+        Lasso, Mask, "Lasso", "Adds the area you outline; the right button removes it", [plain(K::L)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Lasso));
-        Polygon, Mask, "Polygon", "Adds what lines between clicks enclose; Enter or the first corner closes it, Backspace takes a corner back, the right button removes", [plain(K::P)],
+        Polygon, Mask, "Polygon", "Adds the area between the corners you click; Enter or the first corner closes it, Backspace takes a corner back, the right button removes", [plain(K::P)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Polygon));
         RectangleTool, Mask, "Rectangle", "Adds a rectangle; the right button removes", [plain(K::R)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Rectangle));
-        Wand, Mask, "Wand", "Adds what is connected with the point and about as deep; drag to the right for more", [plain(K::M)],
+        Wand, Mask, "Wand", "Adds the connected area of about the same depth; drag right for more", [plain(K::M)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Wand));
-        PanTool, Mask, "Move the image", "The pointer moves the image instead of drawing", [plain(K::Num8)],
+        PanTool, Mask, "Move the image", "Dragging moves the image instead of drawing", [plain(K::Num8)],
             _ => does(prefer(|s| s.mask.tool = MaskTool::Pan));
-        PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the points of the 3D views, or the pointer turns the views again", [alt(K::B)],
+        PaintIn3d, Mask, "Draw in 3D", "Mask tools draw on the 3D views; off: dragging turns the view", [alt(K::B)],
             state => toggle(state, SceneTool::Paint);
-        PaintLayers, Mask, "Draw through all layers", "Drawings in 3D reach all points under them, also hidden ones, or only the front-most", [alt(K::L)],
+        PaintLayers, Mask, "Draw through all layers", "Drawing in 3D also marks hidden points; off: only those in front", [alt(K::L)],
             _ => does(prefer(|s| s.mask.layers = s.mask.layers.other()));
-        PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels that count neither as contact nor as free of it, or paint contact again", [shift(K::B)],
+        PaintIgnore, Mask, "Paint ignored pixels", "Tools mark pixels to ignore, neither contact nor free; off: they paint contact", [shift(K::B)],
             _ => does(paint(Paint::Ignore));
-        LastTool, Mask, "Last tool", "Goes back to the tool before", [plain(K::Q)],
+        LastTool, Mask, "Last tool", "Goes back to the previous tool", [plain(K::Q)],
             _ => does(prefer(|s| s.mask.tool = s.mask.last_tool));
         BrushSmaller, Mask, "Smaller brush", "Makes the brush smaller", [plain(K::OpenBracket)],
             _ => does(prefer(|s| s.mask.radius_px /= BRUSH_STEP));
@@ -152,25 +152,25 @@ macro_rules! actions {
             state => clean_up(state, CleanKind::FillHoles);
         LargestIsland, Mask, "Largest island", "Keeps only the largest connected part of the mask", [plain(K::K)],
             state => clean_up(state, CleanKind::LargestIsland);
-        SmoothMask, Mask, "Smooth the mask", "Makes each pixel what most around it are, within the clean-up size", [],
+        SmoothMask, Mask, "Smooth the mask", "Smooths the outline, within the clean-up size", [],
             state => clean_up(state, CleanKind::Smooth);
-        GrowMask, Mask, "Grow the mask", "Adds what lies within the clean-up size", [],
+        GrowMask, Mask, "Grow the mask", "Grows the mask by the clean-up size", [],
             state => clean_up(state, CleanKind::Grow);
-        ShrinkMask, Mask, "Shrink the mask", "Removes what lies within the clean-up size of the outside", [],
+        ShrinkMask, Mask, "Shrink the mask", "Shrinks the mask by the clean-up size", [],
             state => clean_up(state, CleanKind::Shrink);
-        AdoptAutomatic, Mask, "Threshold to mask", "Makes the mask of the chosen automatic source the corrected one", [plain(K::T)],
+        AdoptAutomatic, Mask, "Copy the automatic mask", "Takes the automatic mask as a start for editing", [plain(K::T)],
             state => editable(state, LabelsCommand::AdoptAutomatic);
-        Propose, Mask, "Propose a mask", "Shows the mask of the chosen source over the one in force, to accept or to let through by brush; nothing changes before", [plain(K::G)],
+        Propose, Mask, "Propose a mask", "Shows a suggested mask over the current one, to accept as a whole or by brush; nothing changes until then", [plain(K::G)],
             state => of_pair(state, ViewCommand::Propose(!state.selection.proposing));
-        NextProposal, Mask, "Next proposal source", "Goes through what proposes masks: the automatic source, CAD distance, strokes", [shift(K::G)],
+        NextProposal, Mask, "Next proposal source", "Cycles through the sources of suggestions: automatic, CAD distance, strokes", [shift(K::G)],
             _ => does(prefer(|s| s.mask.proposal = next_of(&s.mask.proposal)));
-        LetThrough, Mask, "Let the proposal through", "Tools let what is proposed through where they paint, or paint contact again", [shift(K::L)],
+        LetThrough, Mask, "Let the proposal through", "Tools accept the suggestion where they paint; off: they paint contact", [shift(K::L)],
             state => does(paint(Paint::LetThrough)).filter(|_| state.settings.mask.paint == Paint::LetThrough || results::proposes(state));
-        ResetMask, Mask, "Remove the correction", "Goes back to the automatic mask", [shift(K::T)],
+        ResetMask, Mask, "Back to the automatic mask", "Removes what you drew", [shift(K::T)],
             state => editable(state, LabelsCommand::ResetMask).filter(|_| is_corrected(state));
-        Undo, Mask, "Undo", "Takes back the last change of what is on screen, or the last corner of the open polygon", [ctrl(K::Z)],
+        Undo, Mask, "Undo", "Undoes the last change to what is on screen, or the last polygon corner", [ctrl(K::Z)],
             state => undo(state);
-        Redo, Mask, "Redo", "Does it again", [ctrl_shift(K::Z), ctrl(K::Y)],
+        Redo, Mask, "Redo", "Redoes what was undone", [ctrl_shift(K::Z), ctrl(K::Y)],
             state => when(state.history.next_redo(state.pair_name(), &results::mask_places(state)).is_some(), LabelsCommand::Redo);
         TrainMasks, Mask, "Train mask model…", "Shows from how many corrected masks the mask model would learn, and trains it in the background", [],
             _ => does(LearnCommand::Show(Network::Masks));
@@ -178,30 +178,30 @@ macro_rules! actions {
             state => when(learn::can_start(state, Network::Masks), LearnCommand::Start(Network::Masks));
         UseTrained, Mask, "Use the trained mask model", "Makes automatic masks with the model that was trained on these pairs", [],
             state => can_use(state, Network::Masks);
-        MaskVisible, Mask, "Show the mask", "Draws the mask over the images, or not", [plain(K::S)],
+        MaskVisible, Mask, "Show the mask", "Shows or hides the mask over the images", [plain(K::S)],
             _ => does(prefer(|s| s.mask_visible ^= true));
-        MaskOutline, Mask, "Mask as outline", "Draws only the outline of the mask", [shift(K::S)],
+        MaskOutline, Mask, "Mask as outline", "Shows only the outline of the mask", [shift(K::S)],
             _ => does(prefer(|s| s.mask_outline ^= true));
         MaskFainter, Mask, "Mask fainter", "Makes the mask more transparent", [plain(K::Minus)],
             _ => does(prefer(|s| s.mask_opacity -= OPACITY_STEP));
         MaskStronger, Mask, "Mask stronger", "Makes the mask less transparent", [plain(K::Equals)],
             _ => does(prefer(|s| s.mask_opacity += OPACITY_STEP));
-        DoneAndNext, Mask, "Done and next", "Marks the pair as done, accepts the automatic masks on screen that nobody corrected, and shows the next unfinished one", [ctrl(K::Enter)],
+        DoneAndNext, Mask, "Done and next", "Marks the pair done, with the masks on screen, and goes to the next unfinished one", [ctrl(K::Enter)],
             state => editable(state, LibraryCommand::DoneAndNext);
-        Flag, Mask, "Flag", "Marks the pair as questionable", [plain(K::Exclamationmark)],
+        Flag, Mask, "Flag", "Marks the pair as doubtful", [plain(K::Exclamationmark)],
             state => editable(state, LabelsCommand::SetReview(Review::Flagged));
         Skip, Mask, "Skip", "Leaves the pair out", [ctrl(K::Backspace)],
             state => editable(state, LabelsCommand::SetReview(Review::Skip));
-        MarkTodo, Mask, "Back to todo", "Takes the review state back", [],
+        MarkTodo, Mask, "Back to todo", "Clears the review state", [],
             state => editable(state, LabelsCommand::SetReview(Review::Todo));
 
-        RunPose, Pose, "Compute again", "Tries again what could not be computed", [ctrl(K::R)],
+        RunPose, Pose, "Try again", "Computes again what failed", [ctrl(K::R)],
             state => of_pair(state, TasksCommand::Retry);
-        TryTools, Pose, "Try all tools", "Registers every CAD model of the data set to this pair and ranks them: which tool is it?", [],
+        TryTools, Pose, "Try all tools", "Fits every CAD model of the data set to this pair and ranks them: which tool is it?", [],
             state => of_pair(state, WorkbenchCommand::TryTools(true));
-        AcceptMeasuredPose, Pose, "Accept the measured pose", "Stores the pose of the measured imprint with the pair", [],
+        AcceptMeasuredPose, Pose, "Accept the measured pose", "Saves the pose of the measured imprint with the pair", [],
             state => accept(state, ImprintSource::Measured);
-        AcceptPredictedPose, Pose, "Accept the predicted pose", "Stores the pose of the predicted imprint with the pair", [],
+        AcceptPredictedPose, Pose, "Accept the predicted pose", "Saves the pose of the predicted imprint with the pair", [],
             state => accept(state, ImprintSource::Predicted);
         PoseTool, Pose, "Pose tool", "Moves the tool by hand in the 3D panes: arrow keys, or the handles", [plain(K::Z)],
             state => toggle(state, SceneTool::Pose);
@@ -217,38 +217,38 @@ macro_rules! actions {
             state => nudge(state, PoseAxis::Theta, -1.0);
         TurnRight, Pose, "Turn +", "Turns the tool by 0.5° about x; with Shift 5°, with Ctrl 0.05°", [alt(K::ArrowRight), alt_shift(K::ArrowRight), ctrl_shift(K::ArrowRight)],
             state => nudge(state, PoseAxis::Theta, 1.0);
-        IcpFromHere, Pose, "Start ICP from here", "Registers from the pose set by hand, with the chosen registration", [shift(K::Z)],
+        IcpFromHere, Pose, "Register from here", "Registers again, starting from the pose set by hand", [shift(K::Z)],
             state => when(in_hand(state), WorkbenchCommand::StartIcp);
-        Accept, Pose, "Accept", "Closes the open polygon, makes the proposal that is shown the mask, or stores the pose set by hand with the pair", [plain(K::Enter)],
+        Accept, Pose, "Accept", "Closes the polygon, accepts the suggested mask, or saves the pose set by hand", [plain(K::Enter)],
             state => accept_shown(state);
-        RevertHand, Pose, "Revert the pose by hand", "Gives the pose set by hand up", [],
+        RevertHand, Pose, "Drop the pose by hand", "Goes back to the registered pose", [],
             state => when(state.workbench.hand.is_some(), WorkbenchCommand::RevertHand);
-        MeasureDistance, Pose, "Measure distance", "Measures between two points clicked in 3D", [plain(K::Y)],
+        MeasureDistance, Pose, "Measure distance", "Distance between two points you click in 3D", [plain(K::Y)],
             state => toggle(state, SceneTool::Distance);
-        MeasureAngle, Pose, "Measure angle", "Measures the angle at the second of three points clicked in 3D", [shift(K::Y)],
+        MeasureAngle, Pose, "Measure angle", "Angle at the second of three points you click in 3D", [shift(K::Y)],
             state => toggle(state, SceneTool::Angle);
-        StepBack, Pose, "Previous step", "Shows the step before in the time machine", [plain(K::Comma)],
+        StepBack, Pose, "Previous step", "Previous step of the registration", [plain(K::Comma)],
             state => inspect(state, |s| s.at > 0, InspectCommand::By(-1));
-        StepForward, Pose, "Next step", "Shows the next step in the time machine", [plain(K::Period)],
+        StepForward, Pose, "Next step", "Next step of the registration", [plain(K::Period)],
             state => inspect(state, |s| !s.is_last(), InspectCommand::By(1));
-        FirstStep, Pose, "First step", "Shows the pose that the registration began at", [shift(K::Comma)],
+        FirstStep, Pose, "First step", "Where the registration started", [shift(K::Comma)],
             state => inspect(state, |s| s.at > 0, InspectCommand::Begin);
-        LastStep, Pose, "Last step", "Shows the pose that the registration ended at", [shift(K::Period)],
+        LastStep, Pose, "Last step", "Where the registration ended", [shift(K::Period)],
             state => inspect(state, |s| !s.is_last(), InspectCommand::End);
-        PlaySteps, Pose, "Play the steps", "Lets the steps go by, or stops; with the pointer in the time machine or a 3D view", [plain(K::Space)],
+        PlaySteps, Pose, "Play the steps", "Plays the registration, or pauses; with the pointer in the time machine or a 3D view", [plain(K::Space)],
             state => inspect(state, |s| s.inspection.num_steps(s.run) > 1, InspectCommand::Play(!state.inspect.playing));
-        PinStep, Pose, "Pin this step", "Keeps the step for comparison with another", [plain(K::J)],
+        PinStep, Pose, "Compare this step", "Keeps this step on screen to compare others with it", [plain(K::J)],
             state => inspect(state, |_| true, InspectCommand::Pin);
-        OwnStarts, Pose, "All own starts", "Back from a single start to those of the registration", [],
+        OwnStarts, Pose, "All starts", "Back from a single start to all that the registration tries", [],
             state => when(state.inspect.start.is_some(), InspectCommand::Start(None));
-        Correspondences, Pose, "Correspondences", "Draws lines from contact points to where they are pulled, or not", [],
+        Correspondences, Pose, "Show pull lines", "Lines from contact points to where they are pulled on the tool", [],
             state => inspect(state, |_| true, InspectCommand::Lines(!state.inspect.lines));
-        NextPoseEngine, Pose, "Other registration", "Goes through the registrations", [],
+        NextPoseEngine, Pose, "Next registration", "Cycles through the registration methods", [],
             _ => does(prefer(|s| s.registration = next_of(&s.registration.with_own_gate())));
 
-        LockRange, View, "Lock the color range", "Keeps the colors from pair to pair, or fits them to each", [plain(K::O)],
+        LockRange, View, "Lock the color range", "Same colors in every pair; off: fitted to each", [plain(K::O)],
             _ => does(prefer(|s| s.range.locked ^= true));
-        RangeOnce, View, "Fit the color range once", "Sets the color range from what is shown", [plain(K::C)],
+        RangeOnce, View, "Fit the color range", "Fits the colors to what is shown", [plain(K::C)],
             state => of_pair(state, SettingsCommand::RangeFromShown);
         ResetRange, View, "Reset the color range", "Sets the color range to 0 to 18 mm", [shift(K::C)],
             _ => does(prefer(|s| s.range = ColorRange::default()));
@@ -264,57 +264,57 @@ macro_rules! actions {
             _ => ui(UiRequest::Camera(CameraPreset::Back));
         CameraBottom, View, "View from below", "Looks along the tool from its tip", [ctrl(K::Num6)],
             _ => ui(UiRequest::Camera(CameraPreset::Bottom));
-        CameraOblique, View, "Oblique view", "Looks from above a corner, as a view begins", [ctrl(K::Num7)],
+        CameraOblique, View, "Oblique view", "The view at the start: from above a corner", [ctrl(K::Num7)],
             _ => ui(UiRequest::Camera(CameraPreset::Oblique));
         CameraTop, View, "View from the top", "Looks along the tool", [ctrl(K::Num4)],
             _ => ui(UiRequest::Camera(CameraPreset::Top));
-        Distances, View, "Distance to the CAD", "Colors CAD and contact points in 3D by their signed distance in mm, or no longer", [plain(K::V)],
+        Distances, View, "Distance to the CAD", "Colors CAD model and contact points in 3D by their distance, in mm", [plain(K::V)],
             state => distances(state);
-        NextLayer, View, "Next paint", "Goes through what contact points are painted with in 3D: one color, residuals, why one was left out, distance, lines", [shift(K::V)],
+        NextLayer, View, "Next coloring", "Cycles through the colorings of the contact points: plain, residual, pixels used, distance, pull lines", [shift(K::V)],
             state => does(WorkbenchCommand::SetLayer(next_of(&state.workbench.layer)));
-        NextSides, View, "Other 3D side", "Goes through both 3D views, the measured one alone and the predicted one alone", [],
+        NextSides, View, "Next 3D side", "Cycles through both 3D views, measured only, predicted only", [],
             state => next_sides(state);
-        NextGel, View, "Other GelSlim image", "Goes through the difference, the image during the touch and the one without contact", [],
+        NextGel, View, "Next GelSlim image", "Cycles through the difference, the image in contact and the one without", [],
             _ => does(prefer(|s| s.gel = next_of(&s.gel)));
-        BothClouds, View, "Both clouds", "Shows measured and predicted cloud in each 3D view", [],
+        BothClouds, View, "Both clouds", "Shows measured and predicted points in each 3D view", [],
             state => does(WorkbenchCommand::SetBothClouds(!state.workbench.both_clouds));
-        CompareMode, View, "Next comparison", "Goes through side by side, wipe, difference and 3D in the Compare pane", [shift(K::F)],
+        CompareMode, View, "Next comparison", "Cycles through side by side, wipe, difference and 3D in Compare", [shift(K::F)],
             _ => does(prefer(|s| s.versus_mut().mode = next_of(&s.versus_mut().mode)));
-        SwapCompared, View, "Swap A and B", "Puts B in the place of A in the Compare pane, and A in that of B", [shift(K::R)],
+        SwapCompared, View, "Swap A and B", "Swaps A and B in Compare", [shift(K::R)],
             _ => does(prefer(|s| *s.versus_mut() = s.versus_mut().clone().swapped()));
-        WindowOnly, View, "GelSlim's window only", "Draws in 3D only what the GelSlims see, or all of it", [plain(K::W)],
+        WindowOnly, View, "GelSlim window only", "Draws in 3D only what the GelSlims see", [plain(K::W)],
             _ => does(prefer(|s| s.scene.only_window ^= true));
         MembraneSurface, View, "Membrane as a surface", "Draws the membrane in 3D as a surface, or as points", [],
             _ => does(prefer(|s| swap_membrane(&mut s.scene)));
-        EyeDome, View, "Depth shading", "Darkens in 3D what lies behind its neighbors (eye-dome lighting), or not", [],
+        EyeDome, View, "Depth shading", "Darkens what lies behind its neighbors (eye-dome lighting)", [],
             _ => does(prefer(|s| s.scene.eye_dome ^= true));
-        Parallel, View, "Parallel projection", "Looks at 3D along parallel lines, or in perspective", [plain(K::I)],
+        Parallel, View, "Parallel projection", "No perspective in 3D", [plain(K::I)],
             _ => does(prefer(|s| s.scene.orthographic ^= true));
-        CopyCamera, View, "Copy the camera", "Copies where the 3D view under the pointer looks from; Ctrl+V over a 3D view takes it over", [],
+        CopyCamera, View, "Copy the camera", "Copies the viewpoint of the 3D view under the pointer; Ctrl+V over another applies it", [],
             _ => ui(UiRequest::CopyCamera);
         LinkCameras, View, "Link cameras", "Moves both 3D views together", [],
             _ => does(prefer(|s| s.cameras_linked ^= true));
-        Footprint, View, "GelSlim window", "Draws the GelSlim's window on bubble images", [],
+        Footprint, View, "GelSlim window", "Outlines what the GelSlim sees, on bubble images", [],
             _ => does(prefer(|s| s.footprint_visible ^= true));
-        SwitchTheme, View, "Dark or light", "Switches between the dark and the light theme", [],
+        SwitchTheme, View, "Dark theme", "Switches between the dark and the light theme", [],
             _ => does(prefer(|s| s.theme = next_of(&s.theme)));
-        InspectWorkspace, View, "Inspect", "Truth and prediction side by side", [],
+        InspectWorkspace, View, "Inspect", "Measured and predicted side by side", [],
             _ => does(prefer(|s| s.workspace = Workspace::Inspect));
-        AlignWorkspace, View, "Align", "The cloud on the CAD model", [],
+        AlignWorkspace, View, "Align", "Contact points on the CAD model", [],
             _ => does(prefer(|s| s.workspace = Workspace::Align));
-        LabelWorkspace, View, "Label", "Correcting masks", [],
+        LabelWorkspace, View, "Label", "Edit contact masks and review pairs", [],
             _ => does(prefer(|s| s.workspace = Workspace::Label));
-        EvaluateWorkspace, View, "Evaluate", "The metrics", [],
+        EvaluateWorkspace, View, "Evaluate", "Scores and tables", [],
             _ => does(prefer(|s| s.workspace = Workspace::Evaluate));
         AdaptWorkspace, View, "Adapt", "Generator and mask model made better on your own sensors", [],
             _ => does(prefer(|s| s.workspace = Workspace::Adapt));
-        ResetWorkspace, View, "Reset workspace", "Puts the panes back where they were", [],
+        ResetWorkspace, View, "Reset workspace", "Puts the panes of this workspace back to the default layout", [],
             _ => ui(UiRequest::ResetWorkspace);
-        MaximizePane, View, "Maximize pane", "Lets one pane fill the window", [plain(K::Backtick)],
+        MaximizePane, View, "Maximize pane", "Makes one pane fill the window", [plain(K::Backtick)],
             _ => ui(UiRequest::ToggleMaximized);
         Fullscreen, View, "Full screen", "Fills the screen", [plain(K::F11)],
             _ => ui(UiRequest::ToggleFullscreen);
-        Screenshot, View, "Screenshot", "Saves a picture of the window with the user's pictures", [plain(K::F12)],
+        Screenshot, View, "Screenshot", "Saves a picture of the window to your Pictures folder", [plain(K::F12)],
             _ => ui(UiRequest::Screenshot);
         SavePane, View, "Save this pane", "Saves a picture of the pane under the pointer, with its bar and unit", [shift(K::F12)],
             _ => ui(UiRequest::PanePicture { copied: false });
@@ -323,7 +323,7 @@ macro_rules! actions {
         CopyHovered, View, "Copy the hovered value", "Copies the number under the pointer", [ctrl(K::C)],
             state => when(state.selection.hover.is_some(), ViewCommand::Ui(UiRequest::CopyHovered));
 
-        Palette, Help, "Command palette", "Finds anything that can be done", [ctrl(K::P), ctrl(K::K)],
+        Palette, Help, "Command palette", "Finds any action, pane, pair or tool", [ctrl(K::P), ctrl(K::K)],
             state => does(ViewCommand::SetPalette(!state.selection.palette));
         ShortcutSheet, Help, "Shortcuts", "Shows the keys of all actions, and changes them", [plain(K::Questionmark), plain(K::F1)],
             state => does(ViewCommand::SetShortcutSheet(!state.selection.shortcut_sheet));
@@ -485,7 +485,7 @@ mod tests {
 
     #[test]
     fn keys_are_said_behind_texts_and_within() {
-        assert_eq!(Action::Redo.help(), "Does it again (Ctrl+Shift+Z)");
+        assert_eq!(Action::Redo.help(), "Redoes what was undone (Ctrl+Shift+Z)");
         assert_eq!(with_keys("[[redo]], [[open_demo]] or [[fit]]."), "Ctrl+Shift+Z, Open the demo or 0.");
         assert_eq!(with_keys("Nothing to fill"), "Nothing to fill");
         assert_eq!((Action::CameraTop.key_text().as_str(), Action::OpenDemo.key_text().as_str()), ("Ctrl+4", ""));

@@ -212,7 +212,7 @@ impl Errand for ReadOtherwise {
 
     fn ended((seq, file, list): &Self::End, state: &mut State, effects: &mut Vec<Effect>) {
         let text = match list.as_str() {
-            "" => "The data are read as they are stored".to_owned(),
+            "" => "The data are read as stored".to_owned(),
             list => format!("The data are read with {list}"),
         };
         state.log.saved(text, file.clone());

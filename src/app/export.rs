@@ -86,7 +86,7 @@ fn write(state: &mut State, output: Output, file: PathBuf, effects: &mut Vec<Eff
         }
         Output::Pair(source) => {
             let Some(pair) = pair_export(state, source) else {
-                let err = TaskError::new("Export the pair", format!("there is no {} cloud of it", source.key()));
+                let err = TaskError::new("Export the pair", format!("it has no {} points", source.key()));
                 return state.log.error(&err.with_hint("Show it in 3D first."));
             };
             let write = Write::new(Lane::Compute, "Export the pair", file, move |folder, _, _| {

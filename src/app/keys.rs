@@ -31,6 +31,7 @@ pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKe
 pub use versus::{CloudDifferenceKey, VersusKey};
 
 use touch2touch_core::dataset::PairId;
+use touch2touch_core::postprocess::CorrectionParts;
 use touch2touch_core::rig::PadId;
 
 /// The key of a result. Equal keys have equal results.
@@ -73,23 +74,29 @@ pub struct TouchKey {
     pub finger: PadId,
 }
 
-/// The tooltip of a range mapping.
+/// The name on screen of a way from the decoder's numbers to depth; files and verbs keep their keys.
+pub(crate) fn shift_name(mode: ShiftMode) -> &'static str {
+    match mode {
+        ShiftMode::Raw => "Uncorrected (raw)",
+        ShiftMode::PaperShift => "As in the paper (paper shift)",
+        ShiftMode::ExactInverse => "Calibrated (exact inverse)",
+        ShiftMode::Parts(CorrectionParts::NONE) => "Calibrated, without the fit",
+        ShiftMode::Parts(_) => "Calibrated, parts of the fit",
+        ShiftMode::Refit(_) => "Matched to this data set (refit)",
+    }
+}
+
+/// The tooltip of a depth scale.
 pub(crate) fn shift_tooltip(mode: ShiftMode) -> &'static str {
     match mode {
         ShiftMode::Raw => {
-            "The prediction as the released script saves it: its range is mapped twice, so depths come out as \
-             (depth + max) / 2, far too deep"
+            "As the released script saves it. Its range is mapped twice, so depths come out far too deep: (depth + max) / 2"
         }
-        ShiftMode::PaperShift => {
-            "The raw values with mean and deviation matched to the training statistics, as in the paper"
-        }
+        ShiftMode::PaperShift => "Mean and deviation matched to those of the training data, as in the paper",
         ShiftMode::ExactInverse => {
-            "The raw values with the doubled mapping undone: 2 * value - max, the depth itself; of a fitted \
-             model, with its fit"
+            "True depth: the doubled mapping is undone (2 * value - max), and a fitted model's fit is applied"
         }
-        ShiftMode::Parts(_) => "The exact inverse with only some parts of the model's fit to a rig",
-        ShiftMode::Refit(_) => {
-            "The raw values with mean and deviation matched to this data set's own predictions and measurements"
-        }
+        ShiftMode::Parts(_) => "True depth, with only some parts of the model's fit to your sensors",
+        ShiftMode::Refit(_) => "Mean and deviation matched to the measurements of this data set",
     }
 }

@@ -147,7 +147,7 @@ pub(super) fn check_editable(state: &mut State, what: &str) -> bool {
     }
     let err = match state.document.blocked(&name) {
         Some(err) => TaskError { what: what.into(), ..err.clone() },
-        None => TaskError::new(what, "the stored labels of this pair are still being read").with_hint("Try again."),
+        None => TaskError::new(what, "the labels of this pair are still loading").with_hint("Try again."),
     };
     state.log.error(&err);
     false
@@ -251,7 +251,7 @@ pub(super) fn end_stroke(state: &mut State, effects: &mut Vec<Effect>) {
     if state.document.has_open_polygon() {
         cancel_stroke(state);
         let hint = "Enter or a click on its first corner closes a polygon.".to_owned();
-        return state.log.push(Level::Warning, "The open polygon was given up", None, Some(hint));
+        return state.log.push(Level::Warning, "The open polygon was dropped", None, Some(hint));
     }
     finish(state, effects);
 }
@@ -262,7 +262,7 @@ fn close(state: &mut State, effects: &mut Vec<Effect>) {
         redraw(state, 0);
         finish(state, effects);
     } else {
-        let hint = "Click the next corner, or give it up with Escape.".to_owned();
+        let hint = "Click the next corner, or drop it with Esc.".to_owned();
         state.log.push(Level::Warning, "A polygon has at least three corners", None, Some(hint));
     }
 }
@@ -372,7 +372,7 @@ fn change_mask(state: &mut State, place: &MaskPlace, edit: LabelEdit<'_>, effect
 }
 
 fn adopt_automatic(state: &mut State, effects: &mut Vec<Effect>) {
-    const WHAT: &str = "Threshold to mask";
+    const WHAT: &str = "Copy the automatic mask";
     end_stroke(state, effects);
     if !check_editable(state, WHAT) {
         return;
@@ -422,7 +422,7 @@ fn accept_proposal(state: &mut State, effects: &mut Vec<Effect>) {
     let over_drawn = state.settings.mask.over_drawn;
     let accept = LabelEdit::AcceptProposal { place: place.clone(), proposal: &proposal, over_drawn };
     if !change_mask(state, &place, accept, effects) {
-        state.log.info(format!("{WHAT}: the mask is so already"));
+        state.log.info(format!("{WHAT}: nothing to change"));
     }
 }
 
@@ -431,7 +431,7 @@ fn reset(state: &mut State, effects: &mut Vec<Effect>) {
     let finger = state.selection.finger;
     let source = results::worked_on(state, finger);
     let Some(place) = results::mask_place(state, source, finger) else { return };
-    if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Remove the correction") {
+    if results::drawn_mask(state, source, finger).is_some() && check_editable(state, "Back to the automatic mask") {
         change_mask(state, &place, LabelEdit::Remove(place.clone()), effects);
     }
 }
@@ -458,7 +458,7 @@ pub(super) fn set_review(state: &mut State, review: Review, effects: &mut Vec<Ef
 pub(super) fn says_open_polygon(state: &mut State) -> bool {
     let open = state.document.has_open_polygon();
     if open {
-        let hint = "Close it with Enter or a click on its first corner, or give it up with Escape.".to_owned();
+        let hint = "Close it with Enter or a click on its first corner, or drop it with Esc.".to_owned();
         state.log.push(Level::Warning, "A polygon is still open: nothing was marked", None, Some(hint));
     }
     open
@@ -537,7 +537,7 @@ fn redo(state: &mut State, effects: &mut Vec<Effect>) {
 }
 
 fn travelled(state: &mut State, act: Act, pair: &str, name: Option<Cow<'static, str>>, effects: &mut Vec<Effect>) {
-    let how = if act == Act::Undo { "Undone" } else { "Done again" };
+    let how = if act == Act::Undo { "Undone" } else { "Redone" };
     match name {
         Some(name) => {
             // What the last change did is said no more: it may be what was taken back.

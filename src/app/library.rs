@@ -188,14 +188,14 @@ impl Errand for ReadTool {
 
     /// Has what failed for it tried again.
     fn ended((seq, set): &Self::End, state: &mut State, _: &mut Vec<Effect>) {
-        let done = format!("{} is read in {}", set.tool, set.unit.name());
+        let done = format!("{} is now read in {}", set.tool, set.unit.name());
         match &set.not_written {
             None => state.log.saved(format!("{done}: unit.txt says {}", set.word), set.file.clone()),
             Some(why) => state.log.push(
                 Level::Warning,
-                format!("{done} as long as this data set is open: unit.txt could not be written"),
+                format!("{done} until this data set is closed: unit.txt could not be written"),
                 Some(why.clone()),
-                Some("Copy the data set to where you may write, or ask who may".to_owned()),
+                Some("Copy the data set to a folder you can write to".to_owned()),
             ),
         }
         if state.library.is_open(*seq) {
@@ -252,7 +252,7 @@ fn select_next_unfinished(state: &mut State, effects: &mut Vec<Effect>) {
 fn select_unfinished(state: &mut State, next: Option<PairId>, effects: &mut Vec<Effect>) {
     match next {
         Some(pair) => select(state, pair, effects),
-        None => state.log.info("Every pair of the list is done or skipped"),
+        None => state.log.info("All pairs of the list are done or skipped"),
     }
 }
 
@@ -300,8 +300,8 @@ pub(super) fn say_notes(state: &mut State) {
     }
     let name = state.pair_name().to_owned();
     for note in &sample.notes {
-        let detail = format!("{} ({})", note.what, note.file.display());
-        state.log.push(Level::Warning, format!("{name} is odd"), Some(detail), Some(note.hint.clone()));
+        let detail = note.file.display().to_string();
+        state.log.push(Level::Warning, format!("{name}: {}", note.what), Some(detail), Some(note.hint.clone()));
     }
 }
 
@@ -389,8 +389,8 @@ pub(super) fn found(state: &mut State, bundles: Vec<BundleInfo>, problems: Vec<T
     }
     let lacks = |kind| bundles.iter().all(|bundle| bundle.kind != kind);
     for (kind, text) in [
-        (BundleKind::Generator, "No generator was found: nothing can be predicted"),
-        (BundleKind::Mask, "No mask model was found: the mask source \"UNet\" is not available"),
+        (BundleKind::Generator, "No generator found: nothing can be predicted"),
+        (BundleKind::Mask, "No mask model found: masks come from a threshold"),
     ] {
         if lacks(kind) {
             let hint = "Put its folder into assets/models beside the program, or name a folder with bundles in \

@@ -105,20 +105,20 @@ macro_rules! panes {
                 at [Inspect Left, Align Left, Label Left, Evaluate Left, Adapt Left]
             } }
             metrics { Metrics {
-                "Metrics", "The metrics of this pair", Form, needs [Comparison, Ambiguity, Flags, Poses],
+                "Metrics", "Pose and image scores of this pair", Form, needs [Comparison, Ambiguity, Flags, Poses],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             generate { Generate {
-                "Generate", "Predicts the Soft Bubble imprint", Form, needs [Pair],
+                "Generate", "Predicts the Soft Bubble imprint from the GelSlim image", Form, needs [Pair],
                 at [Inspect Right(1), Align Right(2), Evaluate Right(1)]
             } }
             scene { Scene {
-                "3D", "Measured and predicted surface on the CAD model, grasp frame", Scene, needs [Scene],
+                "3D", "Measured and predicted contact on the CAD model", Scene, needs [Scene],
                 at [Inspect Bottom(2), Align Top(1), Label Bottom(2), Evaluate Right(1)]
             } }
             images {
                 GelSlim {
-                    "GelSlim", "The GelSlim image: touched minus untouched, during the touch, or without contact",
+                    "GelSlim", "The GelSlim image: difference, in contact, or without contact",
                     Color, needs [Pair], at [Inspect Top(1), Label Bottom(1)]
                 }
                 Measured {
@@ -133,15 +133,15 @@ macro_rules! panes {
                 }
             }
             versus { Compare {
-                    "Compare", "Any two imprints of the touch against each other: subtracted, side by side, wiped, in 3D",
+                    "Compare", "Any two imprints of this touch: side by side, wipe, difference, 3D",
                     Versus, needs [Versus], at [Inspect Bottom(1), Align Top(2), Evaluate Bottom(3), Adapt Bottom(3)]
             } }
             timemachine { TimeMachine {
-                "Time machine", "The steps of a registration, forwards and backwards",
+                "Time machine", "The registration step by step",
                 Steps, needs [Steps], at [Align Bottom(1)]
             } }
             masks {
-                Masks { "Mask", "Corrects the contact mask", Form, needs [Masks], at [Label Right(1)] }
+                Masks { "Mask", "Edit the contact mask", Form, needs [Masks], at [Label Right(1)] }
             }
             results { Results {
                 "Results", "The paper's results table of the open data set", Form, needs [],
@@ -156,11 +156,11 @@ macro_rules! panes {
                 Table { "All metrics", "The scores of all pairs by every source", Form, needs [], at [Evaluate Top(1)] }
             }
             log { Log {
-                "Log", "What happened", Form, needs [],
+                "Log", "Messages so far", Form, needs [],
                 at [Inspect Right(2), Align Right(2), Label Right(2), Evaluate Right(1), Adapt Right(1)]
             } }
             settings_pane {
-                Settings { "Preferences", "What is kept between runs: look, runtime, kept predictions", Form, needs [], at [Inspect Right(1)] }
+                Settings { "Preferences", "Appearance, model engine, disk space for predictions", Form, needs [], at [Inspect Right(1)] }
             }
         }
     };

@@ -312,26 +312,26 @@ impl Absent {
         match self {
             Self::NothingOpen => "No data set is open. Drop a folder here, or open the demo.",
             Self::NothingSelected => "No pair is selected.",
-            Self::NoFinger => "This source has no such finger.",
+            Self::NoFinger => "These data have no such finger.",
             Self::NoGelSlim => "This finger has no GelSlim image.",
-            Self::NoInput => "This finger has no image of the sensor that the model starts from.",
-            Self::PredictsColor => "The prediction is a color picture: no depth, and so no contact, points or pose.",
-            Self::OtherSensors => "No generator fits the sensors of this data set: the list of models says why.",
-            Self::OnlyDifference => "This source only has the difference image.",
+            Self::NoInput => "This finger has no image that the model could start from.",
+            Self::PredictsColor => "The prediction is a color image: no depth, so no contact, points or pose.",
+            Self::OtherSensors => "No generator fits the sensors of this data set; see the list of models.",
+            Self::OnlyDifference => "These data only have the difference image.",
             Self::NoBubble => "This finger has no measured imprint.",
             Self::NoPrediction => "No prediction yet.",
-            Self::NoCamera => "This source has no depth camera: without it there are no points in space and no pose.",
-            Self::NoTool => "This source does not say which tool it was: no CAD model, no pose.",
-            Self::NoTruth => "The true pose of this pair is not known.",
-            Self::NotSimulated => "Only simulated data knows the true contact.",
+            Self::NoCamera => "No depth camera in these data: no 3D points, no pose.",
+            Self::NoTool => "Tool unknown: no CAD model, no pose.",
+            Self::NoTruth => "True pose unknown.",
+            Self::NotSimulated => "The true contact is known for simulated data only.",
             Self::NoMaskModel => "No mask model was found.",
             Self::NoGenerator => "No generator was found.",
-            Self::NoSuchGenerator => "The model that was chosen here is not there any more: choose another.",
+            Self::NoSuchGenerator => "The chosen model is gone; choose another.",
             Self::NoClassifier => "No tool classifier was found.",
             Self::NoContact => "The mask has too few contact points for a pose.",
-            Self::NoHandPose => "No pose was set by hand: move the tool with the pose tool first.",
+            Self::NoHandPose => "No pose set by hand yet: move the tool with the pose tool.",
             Self::NoStrokes => {
-                "Nothing to grow from: paint a short stroke of contact, and with the right button one that is free."
+                "Nothing to grow from: paint a short stroke on the contact, and one with the right button beside it."
             }
         }
     }

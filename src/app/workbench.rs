@@ -141,15 +141,17 @@ pub(super) fn refresh_cost(state: &mut State) {
 }
 
 fn start_icp(state: &mut State, effects: &mut Vec<Effect>) {
-    const WHAT: &str = "Start ICP from here";
+    const WHAT: &str = "Register from here";
     if state.workbench.tool != SceneTool::Pose {
         return;
     }
     let Some(mut hand) = hold(state) else {
-        return state.log.error(&TaskError::new(WHAT, "there is no tool to be moved"));
+        return state.log.error(&TaskError::new(WHAT, "no tool to move"));
     };
     let Ok(Some(pose)) = results::pose_key(state, hand.source) else {
-        return state.log.error(&TaskError::new(WHAT, "the contact points are not there yet").with_hint("Try again."));
+        return state
+            .log
+            .error(&TaskError::new(WHAT, "the contact points are still being computed").with_hint("Try again."));
     };
     let (source, start) = (hand.source, hand.pose);
     let key = RunKey { pose, start: Some(start.into()) };

@@ -59,7 +59,7 @@ fn a_stroke_starts_from_the_mask_shown_and_is_saved_when_it_ends() {
     let drawn = mask(&bench, lab::RIGHT);
     assert!(drawn[(12, 2)] && drawn[(14, 2)] && drawn[(4, 4)]);
     let in_force = results::mask_in_force(&bench.state, MEASURED, lab::RIGHT).unwrap();
-    assert_eq!(in_force.label, "By hand, from Threshold 5.00 mm");
+    assert_eq!(in_force.label, "edited by you, from Threshold 5.00 mm");
     bench.settle();
     let saved = bench.services.source.labels.lock().unwrap()["tool_a/data_0"].clone();
     assert_eq!(*saved.measured(lab::RIGHT).unwrap().mask, drawn);
@@ -290,8 +290,8 @@ fn a_mask_belongs_to_one_imprint() {
     let label = |bench: &Bench, source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().label;
     stroke(&mut bench, lab::RIGHT, [12.0, 2.0], [14.0, 2.0]);
     bench.settle();
-    assert!(label(&bench, MEASURED).starts_with("By hand"));
-    assert!(!label(&bench, ImprintSource::Predicted).starts_with("By hand"), "painted on another picture");
+    assert!(label(&bench, MEASURED).contains("by you"));
+    assert!(!label(&bench, ImprintSource::Predicted).contains("by you"), "painted on another picture");
     let in_force =
         |bench: &Bench, source| results::mask_in_force(&bench.state, source, lab::RIGHT).unwrap().mask.clone();
     let measured = in_force(&bench, MEASURED);
@@ -299,12 +299,12 @@ fn a_mask_belongs_to_one_imprint() {
     bench.send(LabelsCommand::BeginStroke { finger: lab::RIGHT, source, at_px: [12.0, 2.0], erase: false });
     bench.send(LabelsCommand::EndStroke);
     let changed = in_force(&bench, source);
-    assert!(label(&bench, source).starts_with("By hand"));
+    assert!(label(&bench, source).contains("by you"));
     assert_eq!(in_force(&bench, MEASURED), measured);
     // Another prediction has none, and undo does not reach the one that is not on screen.
     bench.send(PredictCommand::GenerateNewSeed);
     bench.settle();
-    assert!(!label(&bench, ImprintSource::Predicted).starts_with("By hand"));
+    assert!(!label(&bench, ImprintSource::Predicted).contains("by you"));
     for _ in 0..9 {
         bench.send(LabelsCommand::Undo);
     }

@@ -124,7 +124,7 @@ fn a_key_flickers_a_line_wipes_and_both_values_are_read() {
     // The status bar has both values.
     rig.harness.event(Event::PointerMoved(place.center()));
     rig.harness.run();
-    let read = rig.harness.get_all_by_label_contains("A - B ").count();
+    let read = rig.harness.get_all_by_label_contains("A minus B ").count();
     assert!(read > 0, "both values and their difference");
 
     press(&mut rig, Modifiers::SHIFT, Key::F);

@@ -31,16 +31,14 @@ fn a_folder_of_ones_own_says_what_it_is_and_esc_puts_that_away() {
     let data = folder.path().join("grasps");
     write_dataset(&data, 2);
     let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data.clone()), true) else { return };
-    for line in
-        ["4 pairs in the lab's files", "2 tools: ", "2 of 2 can be used in meters", "true poses known", "4 todo"]
-    {
+    for line in ["4 pairs in the lab's files", "2 tools: ", "2 of 2 usable in meters", "true poses known", "4 todo"] {
         rig.harness.get_by_label_contains(line);
     }
     // The models were tried because it was looked at.
     let worth = rig.harness.state().state().doctor.worth.clone().expect("the models were tried");
     assert!(worth.fit.is_some() && worth.masks.is_some_and(|masks| masks.grasps == 4), "{worth:?}");
     rig.harness.get_by_label_contains(" dB, pose ");
-    rig.harness.get_by_label_contains("with masks from CAD, pose ");
+    rig.harness.get_by_label_contains("with masks from CAD, angle error ");
     rig.shoot("about-simulated");
     // It takes no keyboard: the list is still gone through.
     let before = rig.harness.state().state().selection.pair;
@@ -58,7 +56,7 @@ fn a_folder_of_ones_own_says_what_it_is_and_esc_puts_that_away() {
     assert!(fitted != range && fitted.max_m > 0.001 && fitted.max_m < 0.03 && fitted.locked, "{fitted:?}");
     // Every pair, on demand.
     assert!(rig.harness.state().state().doctor.examined.is_none());
-    rig.harness.get_by_label("Examine 4 pairs").click();
+    rig.harness.get_by_label("Check all 4 pairs").click();
     rig.harness.step();
     rig.settle();
     let examined = rig.harness.state().state().doctor.examined.clone().unwrap();
@@ -129,6 +127,6 @@ fn data_that_are_read_wrongly_are_read_rightly_by_a_click() {
     rig.settle();
     assert!(!data.join(READ_AS_FILE).exists());
     // It was opened again, and the panel is still there.
-    rig.harness.get_by_label_contains("none at a glance");
+    rig.harness.get_by_label_contains("none obvious");
     assert!(rig.harness.query_by_label("Read as stored").is_none());
 }

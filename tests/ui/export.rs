@@ -70,7 +70,7 @@ fn cloud_pose_and_mesh_are_exported_and_the_command_is_copied_from_the_menu_of_a
     assert_eq!(names.len(), 3, "{names:?}");
     assert!(names.iter().zip(["cloud.ply", "mesh.stl", "pose.json"]).all(|(name, end)| name.ends_with(end)));
     rig.clicks(&["Menu of 3D"]);
-    rig.harness.get_by_label("Copy the command").click();
+    rig.harness.get_by_label("Copy as command line").click();
     rig.harness.step();
     let copied = rig.copied().expect("the command is on the clipboard");
     let state = rig.harness.state().state();

@@ -77,7 +77,7 @@ fn scrub_by_keys_pin_two_and_compare() {
     assert_eq!((a.at, b.at), (last, 0));
     // Both columns and their difference are on screen.
     assert!(rig.harness.get_all_by_label_contains("Angle °").next().is_some());
-    rig.harness.get_by_label("Let pin A go").click();
+    rig.harness.get_by_label("Remove step A").click();
     rig.harness.step();
     rig.settle();
     assert!(rig.harness.state().state().inspect.pins_of(rig.harness.state().state().pair_key())[0].is_none());

@@ -96,10 +96,10 @@ fn browse_generate_shift_paint_undo() {
     let touch = state.touch_key(lab::RIGHT).unwrap();
     assert_eq!(state.results.made[&touch].len(), 2, "the first result is kept");
 
-    // Another range mapping, by its button.
+    // Another depth scale, by its button.
     let exact = results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
-    rig.click("Range mapping");
-    rig.click("Paper shift");
+    rig.click("Depth scale");
+    rig.click("As in the paper (paper shift)");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);
     assert_ne!(*results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap(), exact);

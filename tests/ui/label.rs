@@ -400,7 +400,7 @@ fn masks_are_exported_as_pictures_and_imported_again_by_clicks() {
     assert_ne!(rig.mask(lab::RIGHT), drawn);
     rig.clicks(&["Open", "Import masks…"]);
     rig.take_to(&folder);
-    rig.harness.get_by_label("Form of the masks: PNG");
+    rig.harness.get_by_label("Format: PNG");
     rig.harness.get_by_label("1 mask new");
     rig.shoot("import-masks");
     rig.clicks(&["Import these masks"]);

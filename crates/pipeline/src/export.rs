@@ -14,7 +14,7 @@ use strum::{EnumIter, EnumString, IntoStaticStr};
 
 use crate::error::TaskError;
 use crate::io::dataset::Dataset;
-use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure, PARTS};
+use crate::io::exchange::{self, Content, ExportConfig, ExportEntry, ExportReport, Format, LoadFailure};
 use crate::job::JobCx;
 use crate::labels::{DrawnMask, Labels, PairLabels, Review};
 use touch2touch_core::dataset::{PairId, Split};
@@ -174,11 +174,11 @@ impl Plan {
             if self.by_hand < self.total() { format!(", {} drawn by hand", self.by_hand) } else { String::new() };
         let held_out = match self.held_out {
             0 => String::new(),
-            n => format!(", of them {} that the data set keeps for tests", counted(n, "pair")),
+            n => format!(" ({} reserved for tests)", counted(n, "pair")),
         };
         let mut lines = vec![
             format!("{}{by_hand}", counted(self.total(), "mask")),
-            format!("{train} to {}, {val} to {}, {test} to {}{held_out}", PARTS[0], PARTS[1], PARTS[2]),
+            format!("{train} training, {val} validation, {test} test{held_out}"),
         ];
         lines.extend(self.left_out.iter().map(|(why, n)| format!("left out: {} {}", counted(*n, "pair"), why.text())));
         lines

@@ -89,16 +89,16 @@ impl Inspection {
     /// The continuation after a step, in words: the reason to stop at the last one.
     pub fn what_next(&self, run: usize, at: usize) -> String {
         let (Some(here), last) = (self.step(run, at), self.num_steps(run).saturating_sub(1)) else {
-            return "no step was recorded".into();
+            return "no steps were recorded".into();
         };
         if at >= last {
             return self.report().runs.get(run).map_or_else(|| self.report().stop.to_string(), |r| r.stop.to_string());
         }
         match self.step(run, at + 1) {
             Some(next) if next.kernel_m != here.kernel_m => {
-                format!("this kernel is done; the next is {:.2} mm wide", next.kernel_m * 1e3)
+                format!("narrows to points within {:.2} mm", next.kernel_m * 1e3)
             }
-            Some(next) if next.points != here.points => format!("goes on with {} points", next.points),
+            Some(next) if next.points != here.points => format!("continues with {} points", next.points),
             _ => "still moving".into(),
         }
     }

@@ -157,7 +157,7 @@ pub fn mask_in_force(
 ) -> Result<MaskInForce<'_>, Lookup<'_, Arc<Mask>>> {
     if let Some(hand) = drawn_mask(state, source, finger) {
         let base = hand.base();
-        let label = if base.is_empty() { "By hand".into() } else { format!("By hand, from {base}") };
+        let label = if base.is_empty() { "drawn by you".into() } else { format!("edited by you, from {base}") };
         return Ok(MaskInForce { mask: &hand.mask, version: MaskVersion::Hand(hand.revision), label });
     }
     let lookup = automatic_mask(state, source, finger);

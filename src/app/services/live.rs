@@ -348,20 +348,20 @@ impl LiveServices {
                 let problem = (!refused.is_empty()).then(|| {
                     let why = format!("{} ({})", refused.join("; "), file.display());
                     let kept = match std::fs::copy(&file, &bad) {
-                        Ok(_) => format!("The file as it was is kept as {}", bad.display()),
-                        Err(err) => format!("The file as it was could not be kept: {err}"),
+                        Ok(_) => format!("Old file: {}", bad.display()),
+                        Err(err) => format!("The old file could not be kept: {err}"),
                     };
-                    TaskError::new("Some preferences have their defaults", why).with_hint(kept)
+                    TaskError::new("Some preferences could not be read and were reset", why).with_hint(kept)
                 });
                 (settings.validated(), problem)
             }
             Err(why) => {
                 let kept = match std::fs::rename(&file, &bad) {
-                    Ok(()) => format!("They are kept in {}.", bad.display()),
-                    Err(err) => format!("They could not be set aside: {err}."),
+                    Ok(()) => format!("Old file: {}", bad.display()),
+                    Err(err) => format!("The old file could not be kept: {err}."),
                 };
                 let why = format!("{why} ({})", file.display());
-                let problem = TaskError::new("The preferences were set to their defaults", why).with_hint(kept);
+                let problem = TaskError::new("Preferences could not be read and were reset", why).with_hint(kept);
                 (Settings::default(), Some(problem))
             }
         }

@@ -218,7 +218,7 @@ impl Library {
 
     /// The name of the model that made a prediction.
     pub(crate) fn model_name(&self, bundle: &str) -> &str {
-        self.bundle(bundle).map_or("a model that is not there any more", |bundle| &*bundle.name)
+        self.bundle(bundle).map_or("a model that is gone", |bundle| &*bundle.name)
     }
 
     /// The making of a prediction, in the words that stand beside it wherever it is shown: `model · 2 steps · seed 42`.

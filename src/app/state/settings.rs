@@ -246,8 +246,8 @@ impl GelView {
     /// The tooltip.
     pub fn tooltip(self) -> &'static str {
         match self {
-            Self::Difference => "Touched minus untouched, around mid gray: what the generator sees",
-            Self::Raw => "The image during the touch, rotated to line up with the bubble",
+            Self::Difference => "Contact minus no contact, around mid gray: what the generator sees",
+            Self::Raw => "The image in contact, rotated to line up with the bubble",
             Self::Reference => "The image without contact, rotated to line up with the bubble",
         }
     }
@@ -516,17 +516,17 @@ impl MaskTool {
         let row = |name, action, draws, hint| ToolRow { name, action, draws, hint };
         let brush = Some(DrawTool::Brush { radius_px: mask.radius_px });
         let wand = Some(DrawTool::Wand { tolerance_m: mask.wand_m });
-        let corner = "Corner by corner; Enter or the first closes it";
+        let corner = "Click the corners; Enter or the first corner closes it";
         match self {
             Self::Brush => row("Brush", Action::Brush, brush, ""),
             Self::Eraser => row("Eraser", Action::Eraser, brush, ""),
-            Self::Lasso => row("Lasso", Action::Lasso, Some(DrawTool::Lasso), "Around it in one line"),
+            Self::Lasso => row("Lasso", Action::Lasso, Some(DrawTool::Lasso), "Outline it in one stroke"),
             Self::Polygon => row("Polygon", Action::Polygon, Some(DrawTool::Polygon), corner),
             Self::Rectangle => {
                 row("Rectangle", Action::RectangleTool, Some(DrawTool::Rectangle), "From corner to corner")
             }
             Self::Wand => row("Wand", Action::Wand, wand, ""),
-            Self::Pan => row("Pan", Action::PanTool, None, "Moves the picture, draws nothing"),
+            Self::Pan => row("Pan", Action::PanTool, None, "Drag to move the image"),
         }
     }
 }

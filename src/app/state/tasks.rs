@@ -42,7 +42,7 @@ macro_rules! kinds {
 kinds! {
     /// A data set is opened.
     Open, "Open", Files,
-        "Stop; the data set before stays";
+        "Stop; the previous data set stays open";
     /// A tool's CAD file is read in another unit.
     ReadTool, "Read the tool", Files,
         "Stop; the tool stays as it is";
@@ -53,23 +53,23 @@ kinds! {
     Generate, "Generate", Models,
         "Stop generating; what is shown stays";
     /// Shift statistics are made.
-    Refit, "Shift statistics", Models,
-        "Stop computing shift statistics";
+    Refit, "Match depths", Models,
+        "Stop matching depths";
     /// Something is written to a place that a person named.
     Write, "Write", Files,
-        "Stop; what was written until then stays";
+        "Stop; what is already written stays";
     /// Masks are taken over that lie in a form of other programs.
     Import, "Import masks", Files,
-        "Stop; the masks that were taken over stay";
+        "Stop; masks imported so far stay";
     /// A data set is scored.
     Evaluate, "Evaluate", Batch,
-        "Stop, and show what was scored until then";
+        "Stop, and show the scores so far";
     /// The models are tried on a sample of a data set.
     TryModels, "Try the models", Batch,
-        "Stop; the models are not tried on a sample of these pairs";
+        "Stop trying the models";
     /// Every pair of a data set is examined.
-    Examine, "Examine the pairs", Batch,
-        "Stop; pairs that were not examined are not told of";
+    Examine, "Check the pairs", Batch,
+        "Stop; the other pairs are not checked";
     /// A generator is fitted to pairs, or a mask model trained.
     Learn, "Adapt a model", Batch,
         "Stop; the same goes on from here when it is asked for again";

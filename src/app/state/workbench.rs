@@ -32,9 +32,9 @@ impl Layer {
         match self {
             Self::None => "None",
             Self::Residuals => "Residuals",
-            Self::Reasons => "Reasons",
+            Self::Reasons => "Pixels used",
             Self::Distance => "Distance",
-            Self::Correspondences => "Lines",
+            Self::Correspondences => "Pull lines",
         }
     }
 
@@ -43,9 +43,9 @@ impl Layer {
         match self {
             Self::None => "Contact points in one color",
             Self::Residuals => "Contact points colored by their distance to the model, in millimeters",
-            Self::Reasons => "Contact points colored by what became of them in the registration",
+            Self::Reasons => "Contact points colored by whether and why the registration used them",
             Self::Distance => {
-                "Contact points and the model's surface colored by their signed distance, in millimeters: blue inside, red outside"
+                "Contact points and CAD surface colored by their distance in mm: blue inside, red outside"
             }
             Self::Correspondences => "Lines from contact points to the model",
         }

@@ -72,7 +72,7 @@ fn title(cx: &Cx<'_>, ui: &mut Ui) {
     };
     let label = egui::Label::new(RichText::new(&title).color(cx.p.strong)).truncate();
     ui.add(label)
-        .on_hover_text(format!("{title}. The menu Open has others, and says what this is; or drop a folder here"));
+        .on_hover_text(format!("{title}. Use Open for others and for a summary of this one, or drop a folder here"));
 }
 
 fn filter_row(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
@@ -148,11 +148,11 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "The score that the list shows, and is sorted and filtered by";
+        let tip = "Score to show, sort and filter by";
         response.response.accessible_name("Score").on_hover_text(tip);
-        let text = if chosen.best_first { "best" } else { "worst" };
+        let text = if chosen.best_first { "Best first" } else { "Worst first" };
         let button = egui::Button::new(RichText::new(text).size(SMALL)).selected(sorted);
-        let tip = "Which come first; N shows the next worst. A click turns the order round";
+        let tip = "Sorts by the score; click again to reverse. N shows the next worst pair";
         if ui.add_sized([direction, 18.0], button).accessible_name("Order of the scores").on_hover_text(tip).clicked() {
             // The first click sorts, the next ones turn round.
             next = Some(ScoreChoice { best_first: sorted && !chosen.best_first, ..chosen.clone() });
@@ -167,7 +167,7 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "Whose score: the measured imprints' (what no generator can beat), or a generator's";
+        let tip = "Score of the measured imprints (the upper bound) or of a generator";
         response.response.accessible_name("Source of the score").on_hover_text(tip);
     }
     if let Some(next) = next {
@@ -216,7 +216,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
             ) {
                 cx.act(Action::OpenDemo);
             }
-        } else if empty::show(ui, "Nothing passes the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
+        } else if empty::show(ui, "No pair matches the filter", "", Some(("Clear the filter", "Shows all pairs"))) {
             cx.push(LibraryCommand::SetFilter(String::new()));
             cx.push(LibraryCommand::SetToolFilter(None));
         }
@@ -267,7 +267,7 @@ pub(crate) fn predict_all(cx: &mut Cx<'_>, ui: &mut Ui, scored: usize) {
     let total = cx.state.library.pairs().len();
     ui.horizontal_wrapped(|ui| match cx.state.tasks.of_kind(TaskKind::Evaluate) {
         Some((_, task)) => {
-            let text = format!("scoring: {} of {}", task.progress.done, task.progress.total);
+            let text = format!("scoring {} of {}", task.progress.done, task.progress.total);
             ui.label(RichText::new(text).size(SMALL).color(cx.p.accent));
         }
         None => {

@@ -7,7 +7,7 @@ use strum::IntoEnumIterator as _;
 
 use crate::app::action::Action;
 use crate::app::command::{Pane, PredictCommand};
-use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_tooltip};
+use crate::app::keys::{PredictionKey, Preset, Sampler, ShiftMode, VersusKey, shift_name, shift_tooltip};
 use crate::app::settings::{GenerateSettings, STEPS};
 use crate::ui::parts::cx::Cx;
 use crate::ui::parts::theme::{SMALL, caption, section, value};
@@ -86,7 +86,7 @@ fn model(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
                 }
             }
         });
-        response.response.accessible_name("Model").on_hover_text("The model bundle that generates");
+        response.response.accessible_name("Model").on_hover_text("The model that predicts imprints");
     });
     for problem in &cx.state.library.bundle_problems {
         ui.label(RichText::new(problem.to_string()).size(SMALL).color(cx.p.wrong));
@@ -104,7 +104,7 @@ fn presets(cx: &Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
             }
         }
         if new.preset.is_none() {
-            ui.label(caption("own numbers", cx.p));
+            ui.label(caption("custom", cx.p));
         }
     });
 }
@@ -120,12 +120,12 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
                 ui.selectable_value(&mut new.sampler, sampler, sampler_name(sampler));
             }
         });
-        response.response.accessible_name("Sampler").on_hover_text("The way from noise to an image");
+        response.response.accessible_name("Sampler").on_hover_text("Algorithm that turns noise into an image");
         ui.label(RichText::new("eta").color(cx.p.weak));
         let drag = egui::DragValue::new(&mut new.eta).speed(0.01).range(0.0..=1.0).fixed_decimals(2);
         reset(
             ui.add(drag).accessible_name("Eta"),
-            "DDIM's share of fresh noise, 0 to 1; 0 is deterministic",
+            "Fresh noise that DDIM adds at each step, 0 to 1; 0 is deterministic",
             "0.00",
             || {
                 new.eta = GenerateSettings::default().eta;
@@ -138,18 +138,13 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
         let recommended = bundle.and_then(|bundle| bundle.generator.as_ref()).map_or(10, |g| g.defaults.steps);
         reset(ui.add(drag).accessible_name("Steps"), tip, &recommended.to_string(), || new.steps = recommended);
         let both = ui.checkbox(&mut new.both_fingers, "both fingers");
-        both.on_hover_text("Generate for both fingers: the pose needs both. Off: only the active finger");
+        both.on_hover_text("Predict both fingers, as the pose needs; off: only the active one");
     });
     row(ui, cx.p.weak, "Seed", |ui| {
         let drag = egui::DragValue::new(&mut new.seed).speed(1.0);
-        reset(
-            ui.add(drag).accessible_name("Seed"),
-            "Seed of the noise: the same seed gives the same prediction",
-            "42",
-            || {
-                new.seed = GenerateSettings::default().seed;
-            },
-        );
+        reset(ui.add(drag).accessible_name("Seed"), "The same seed gives the same prediction", "42", || {
+            new.seed = GenerateSettings::default().seed;
+        });
         let lock = ui.add(egui::Button::selectable(new.seed_locked, "Lock")).accessible_name("Lock the seed");
         if lock.on_hover_text(Action::LockSeed.help()).clicked() {
             new.seed_locked = !new.seed_locked;
@@ -160,17 +155,17 @@ fn numbers(cx: &mut Cx<'_>, ui: &mut Ui, new: &mut GenerateSettings) {
         row(ui, cx.p.weak, "Guidance", |ui| {
             let range = *GUIDANCE.start()..=*GUIDANCE.end();
             let drag = egui::DragValue::new(&mut new.guidance).speed(0.05).range(range).fixed_decimals(1);
-            let tip = "How strongly the touch decides: above 1 more than the model alone would let it";
+            let tip = "How closely the prediction follows the GelSlim image; above 1: more closely than the model was trained to";
             reset(ui.add(drag).accessible_name("Guidance"), tip, "1.0", || new.guidance = 1.0);
         });
     }
     row(ui, cx.p.weak, "Preview", |ui| {
         let drag = egui::DragValue::new(&mut new.preview_every).speed(0.1).range(0..=100);
-        let tip = "A picture on the way after so many steps, and after the first; 0 shows only the result";
+        let tip = "Shows an intermediate picture after every so many steps; 0 shows only the result";
         reset(ui.add(drag.prefix("every ").suffix(" steps")).accessible_name("Preview"), tip, "4", || {
             new.preview_every = GenerateSettings::default().preview_every;
         });
-        let by_itself = ui.checkbox(&mut new.by_itself, "by itself");
+        let by_itself = ui.checkbox(&mut new.by_itself, "automatically");
         by_itself.on_hover_text(
             "The pair on screen is predicted without a click where that takes less than a second on this machine, by \
              what earlier predictions took. Default on",
@@ -227,9 +222,9 @@ fn preset_name(preset: Preset) -> &'static str {
 /// Tooltip of a preset: what it does with this bundle.
 fn preset_help(preset: Preset, bundle: Option<&BundleInfo>) -> String {
     let what = match preset {
-        Preset::Fast => "For looking through a data set: about the mean of all plausible imprints",
-        Preset::Default => "What the model's bundle recommends",
-        Preset::Sharp => "The sharpest picture: as many steps as still change anything",
+        Preset::Fast => "For browsing: close to the mean of all plausible imprints",
+        Preset::Default => "What the model recommends",
+        Preset::Sharp => "Sharpest: more steps would change nothing. Sharper is not always closer to the measurement",
     };
     match bundle.and_then(|bundle| bundle.generator.as_ref()) {
         Some(g) => {
@@ -252,21 +247,21 @@ fn sampler_name(sampler: Sampler) -> &'static str {
 /// Choice of the way to meters.
 fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
     let current = cx.state.settings.shift;
-    row(ui, cx.p.weak, "Range", |ui| {
+    row(ui, cx.p.weak, "Depth scale", |ui| {
         let combo = egui::ComboBox::from_id_salt("mapping").width(ui.available_width() - 8.0);
-        let response = combo.selected_text(current.label()).truncate().show_ui(ui, |ui| {
+        let response = combo.selected_text(shift_name(current)).truncate().show_ui(ui, |ui| {
             // The refit is there once its statistics are; until then the button brings them.
             for mode in ShiftMode::iter().chain(cx.state.settings.refit.map(ShiftMode::Refit)) {
-                if ui.selectable_label(mode == current, mode.label()).on_hover_text(shift_tooltip(mode)).clicked() {
+                if ui.selectable_label(mode == current, shift_name(mode)).on_hover_text(shift_tooltip(mode)).clicked() {
                     cx.push(prefer(move |s| s.shift = mode));
                 }
             }
             if cx.state.settings.refit.is_none() {
-                cx.action_button(ui, Action::Refit, "Refit on this data set…");
+                cx.action_button(ui, Action::Refit, "Match to this data set…");
             }
         });
-        let tip = format!("Range mapping: how the decoder's numbers become meters. {}", shift_tooltip(current));
-        response.response.accessible_name("Range mapping").on_hover_text(tip);
+        let tip = format!("How the model's output becomes millimeters. {}", shift_tooltip(current));
+        response.response.accessible_name("Depth scale").on_hover_text(tip);
     });
 }
 
@@ -320,8 +315,8 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             false => format!("{:.1} s", p.seconds),
         });
         let took = prediction.map_or(String::new(), |p| match p.kept {
-            true => format!("Made earlier in {:.1} s and kept on the disk", p.seconds),
-            false => format!("Made in {:.2} s", p.seconds),
+            true => format!("Predicted earlier ({:.1} s), read from disk", p.seconds),
+            false => format!("Predicted in {:.2} s", p.seconds),
         });
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
@@ -335,7 +330,7 @@ fn results(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.label(caption(seconds, cx.p)).on_hover_text(took);
             let reuse = ui.add(egui::Button::new(RichText::new("Use").size(SMALL)).min_size(vec2(30.0, 18.0)));
             let reuse = reuse.accessible_name(format!("Use seed {}", recipe.config.seed));
-            if reuse.on_hover_text("Take the seed, the sampler and its numbers for the next run").clicked() {
+            if reuse.on_hover_text("Use these settings from now on").clicked() {
                 let config = recipe.config;
                 cx.push(prefer(move |s| {
                     s.generate = GenerateSettings {

@@ -75,17 +75,13 @@ pub(crate) fn scale_note(state: &State) -> &'static str {
 fn source_note(state: &State) -> String {
     let reading = results::sample(state).ready().and_then(|s| s.reading);
     let laid = reading.filter(|read| read.turn != Turn::default() || !read.is_sure()).map(|read| {
-        let sure = if read.is_sure() { "sure" } else { "NOT sure" };
-        format!(
-            "laid upright, the file is {} ({sure}: {:.0} % clearer than the next way)",
-            read.turn,
-            100.0 * read.margin
-        )
+        let sure = if read.is_sure() { "" } else { " (not sure)" };
+        format!("file {}, shown upright{sure}", read.turn)
     });
     let fitted = recipe::bundle(state, BundleKind::Generator)
         .ok()
         .and_then(|bundle| bundle.misgiving(results::sample(state).ready()?));
-    let fitted = fitted.map(|_| "the model was fitted to other data".to_owned());
+    let fitted = fitted.map(|_| "model fitted to other data".to_owned());
     [scale_note(state).to_owned(), laid.unwrap_or_default(), fitted.unwrap_or_default()]
         .into_iter()
         .filter(|s| !s.is_empty())
@@ -242,9 +238,9 @@ pub(crate) fn failed(cx: &mut Cx<'_>, ui: &mut Ui, err: &TaskError) {
 /// Buttons that read a CAD file in the units that fit it, where that is what failed; `place` tells them apart.
 pub(crate) fn unit_buttons(cx: &mut Cx<'_>, ui: &mut Ui, offer: &UnitOffer, place: &str) {
     for (unit, length) in &offer.units {
-        let says = offer.says.as_ref().map_or(String::new(), |says| format!(", which says {says} now"));
+        let says = offer.says.as_ref().map_or(String::new(), |says| format!(", which now says {says}"));
         let tip = format!(
-            "{} is then {length} long. Writes unit.txt beside its STL{says}: it is for all models of that folder",
+            "Makes {} {length} long. Writes unit.txt beside the STL{says}; it holds for all models of that folder",
             offer.tool
         );
         let button = Button::new(RichText::new(format!("Read it as {}", unit.name())).size(SMALL));
@@ -285,7 +281,7 @@ pub(crate) fn absent_text(cx: &mut Cx<'_>, ui: &mut Ui, absent: Absent) {
             },
             what,
         ),
-        Absent::NoGenerator => ("Put a model bundle into assets/models, or choose one in Generate.", what),
+        Absent::NoGenerator => ("Choose a model in Generate, or put one into assets/models.", what),
         _ => ("", what),
     };
     let text = button.map(|a: Action| (a.behind(a.name()), a));

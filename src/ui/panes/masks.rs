@@ -50,9 +50,9 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
             said(cx, ui);
             review(cx, ui);
             source::show(cx, ui);
-            fold(ui, "Clean up", "Clean up the mask by one click", |ui| clean_ups(cx, ui));
+            fold(ui, "Clean up", "One-click clean-ups of the mask", |ui| clean_ups(cx, ui));
             note(cx, ui, memory);
-            fold(ui, "More", "What is shown, drawing in 3D, whose mask is corrected", |ui| {
+            fold(ui, "More", "Overlays, drawing in 3D, which mask is edited", |ui| {
                 overlay(cx, ui);
                 opacity(cx, ui);
                 in_3d(cx, ui);
@@ -131,7 +131,7 @@ fn in_3d(cx: &mut Cx<'_>, ui: &mut Ui) {
         let now = cx.state.settings.mask.layers;
         for (layers, text) in [(Layers::Front, "front-most"), (Layers::All, "all layers")] {
             let button = ui.add(egui::Button::selectable(now == layers, text));
-            let tip = format!("Drawings in 3D reach {}", layers.name());
+            let tip = format!("Drawing in 3D marks {}", layers.name());
             if button.on_hover_text(Action::PaintLayers.behind(&tip)).clicked() && now != layers {
                 cx.act(Action::PaintLayers);
             }
@@ -224,8 +224,7 @@ fn slider_mm(ui: &mut Ui, name: &str, meters: &mut f32, range: std::ops::RangeIn
 fn wand(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut new = cx.state.settings.mask.clone();
     ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(30.0);
-    let tip = "By how much the depth may differ from the point clicked; dragging to the right doubles it, to the left \
-               halves it";
+    let tip = "How much the depth may differ from that of the clicked point; drag right to double it, left to halve it";
     if slider_mm(ui, "Wand tolerance", &mut new.wand_m, 0.01..=5.0, tip) {
         cx.push(prefer(move |s| s.mask = new.clone()));
     }
@@ -236,23 +235,22 @@ fn correct(cx: &mut Cx<'_>, ui: &mut Ui) {
     let finger = cx.state.selection.finger;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        ui.label(section(&format!("Correct, {}", cx.state.finger_name(finger)), cx.p));
+        ui.label(section(&format!("Edit, {}", cx.state.finger_name(finger)), cx.p));
         let worked_on = results::worked_on(cx.state, finger);
         for source in ImprintSource::iter() {
             let there = results::imprint(cx.state, source, finger).ready().is_some();
             let button = ui.add_enabled(there, egui::Button::selectable(worked_on == source, source.name()));
             let button = button.accessible_name(format!("Correct the {} imprint's mask", source.key()));
-            let tip =
-                "The imprint that the buttons below work on: the last one painted on. Each imprint has its own mask";
-            if button.on_hover_text(tip).on_disabled_hover_text("There is no such imprint yet").clicked() {
+            let tip = "The imprint whose mask the buttons below change: the last one you painted on";
+            if button.on_hover_text(tip).on_disabled_hover_text("No such imprint yet").clicked() {
                 cx.push(ViewCommand::SelectImprint(source));
             }
         }
     });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        cx.action_button(ui, Action::AdoptAutomatic, "Take automatic");
-        cx.action_button(ui, Action::ResetMask, "Remove");
+        cx.action_button(ui, Action::AdoptAutomatic, "Copy automatic");
+        cx.action_button(ui, Action::ResetMask, "Reset");
     });
 }
 
@@ -266,11 +264,12 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
     let (text, color) = match (now, before) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
-            let mut text = format!("{}: angle {:+.2}° to {}", changed.name, (to - from).to_degrees(), deg(to));
+            let change = units::wrap_angle(to - from).to_degrees();
+            let mut text = format!("Angle {} → {} ({change:+.1}°)", deg(from), deg(to));
             let mut color = cx.p.text;
             if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
                 let [before, now] = [from, to].map(deg);
-                text += &format!("; error {before} to {now}");
+                text += &format!(", error {before} → {now}");
                 color = match before == now {
                     true => cx.p.text,
                     false if to < from => cx.p.good,
@@ -278,7 +277,7 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
                 };
             }
             if provisional.is_some() {
-                text += "; being proved…";
+                text += ", checking…";
             }
             (text, color)
         }
@@ -287,7 +286,7 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
         (Lookup::Absent(_), _) | (Lookup::Ready(_), None) => return,
     };
     let label = egui::Label::new(RichText::new(text).size(SMALL).color(color)).wrap();
-    ui.add(label).on_hover_text("What the last change of the mask did to the registered angle");
+    ui.add(label).on_hover_text(format!("Effect of the last change ({}) on the angle", changed.name));
 }
 
 /// `saved 12:03:11`, or what is not saved yet.
@@ -298,8 +297,7 @@ pub(crate) fn save_state(cx: &Cx<'_>, ui: &mut Ui) {
         crate::ui::parts::saved::text(&cx.shared.saved, &cx.state.document, cx.state.pair_name(), cx.p)
     };
     if !text.is_empty() {
-        ui.label(RichText::new(text).size(SMALL).color(color))
-            .on_hover_text("Labels are written after every change, to a file beside the old one that then replaces it");
+        ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text("Labels are saved after every change");
     }
 }
 
@@ -322,7 +320,7 @@ fn clean_ups(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().slider_width = (ui.available_width() - 76.0).max(40.0);
         let slider = egui::Slider::new(&mut new.clean_mm, CLEAN_MM).logarithmic(true).fixed_decimals(2).suffix(" mm");
         let slider = ui.add(slider).accessible_name("Clean-up size");
-        let tip = "Radius of Smooth, Grow and Shrink. Less than a pixel changes nothing";
+        let tip = "Radius of Smooth, Grow and Shrink; below one pixel nothing changes";
         if slider.on_hover_text(tip).changed() {
             cx.push(prefer(move |s| s.mask = new.clone()));
         }
@@ -347,7 +345,7 @@ fn review(cx: &mut Cx<'_>, ui: &mut Ui) {
             });
             response.response.accessible_name("Review state").on_hover_text("The review state of this pair");
         });
-        cx.action_button(ui, Action::DoneAndNext, "Done, next");
+        cx.action_button(ui, Action::DoneAndNext, "Done and next");
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| save_state(cx, ui));
     });
 }
@@ -376,7 +374,7 @@ fn note(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory) {
         memory.typing = false;
         cx.push(LabelsCommand::SetNote(memory.pair.clone(), memory.note.clone()));
     }
-    let tip = "What is to be said about this pair. The list shows a mark and finds pairs by the words of their notes";
+    let tip = "A note about this pair. The list marks pairs with notes, and its filter searches them";
     response.on_hover_text(tip);
 }
 

@@ -45,7 +45,7 @@ fn pair(cx: &Cx<'_>, ui: &mut Ui) {
         ui.label(caption(tool, cx.p));
         if !note.is_empty() {
             ui.label(RichText::new(note).size(SMALL).color(cx.p.caution))
-                .on_hover_text("The source lost its scale: every length of this pair is an assumption");
+                .on_hover_text("Pictures carry no scale: every length of this pair is assumed");
         }
     });
 }
@@ -59,8 +59,7 @@ fn tools(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
                 let text = format!("{:3.0} %  {}", 100.0 * candidate.chance, candidate.tool);
                 let color = if candidate.tool == own { cx.p.text } else { cx.p.weak };
                 ui.label(RichText::new(text).size(SMALL).color(color)).on_hover_text(format!(
-                    "Chance that it is this tool if it is one of the {} of the data set, by what its model explains of contact and \
-                     membrane; at {}",
+                    "Probability that it is this tool, given that it is one of the {} of this data set; best angle {}",
                     all.len(),
                     units::text_deg(candidate.report.lab_angle_rad())
                 ));
@@ -117,7 +116,7 @@ fn pose(cx: &mut Cx<'_>, ui: &mut Ui) {
 
 /// The angle with its standard deviation, and at the right how far it is off where the truth is known.
 fn angle(cx: &Cx<'_>, ui: &mut Ui, pose: &PoseResult) {
-    ui.label(value(pose.angle_text(), cx.p)).on_hover_text("Angle of the tool in the hand, and its standard deviation");
+    ui.label(value(pose.angle_text(), cx.p)).on_hover_text("Angle of the tool in the hand ± standard deviation");
     if let (Some(truth), Some(error)) = (pose.truth_rad, pose.error_rad) {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let text = RichText::new(format!("off by {}", units::text_deg(error))).size(SMALL);
@@ -147,22 +146,22 @@ fn place(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, pose: &PoseResult)
     }
     let label = ui.label(value(text, cx.p).size(SMALL));
     label.on_hover_text(format!(
-        "Place of the object's origin in the grasp frame.\n{}, {}",
+        "Position of the tool's origin in the grasp frame.\n{}, {}",
         scene::pose_details(pose),
         scene::pose_time(pose)
     ));
     let elsewhere = results::accepted_elsewhere(cx.state);
     if source == ImprintSource::Predicted && !elsewhere.is_empty() {
         let of: Vec<String> = elsewhere.into_iter().map(ImprintOf::text).collect();
-        ui.label(caption("another prediction has an accepted pose", cx.p)).on_hover_text(of.join("\n"));
+        ui.label(caption("another prediction has a pose by hand", cx.p)).on_hover_text(of.join("\n"));
     }
     let Some(hand) = results::by_hand(cx.state, source) else { return };
     let angle = units::text_deg(hand.inverse().theta_rad);
     let error = results::truth(cx.state).map(|truth| PoseDifference::between(hand, truth).angle_rad);
     let error = error.map_or(String::new(), |error| format!(" (error {})", units::text_deg(error)));
     ui.horizontal(|ui| {
-        ui.label(RichText::new(format!("Accepted by hand: {angle}{error}")).size(SMALL).color(cx.p.good));
-        let tip = with_keys("The registered pose counts again ([[undo]] brings it back)");
+        ui.label(RichText::new(format!("Pose by hand: {angle}{error}")).size(SMALL).color(cx.p.good));
+        let tip = with_keys("Goes back to the registered pose ([[undo]] undoes this)");
         let withdraw = ui.small_button("Withdraw").on_hover_text(tip);
         if withdraw.accessible_name(format!("Withdraw the pose by hand, {}", source.name().to_lowercase())).clicked() {
             cx.push(LabelsCommand::AcceptPose(source, false));
@@ -183,7 +182,7 @@ fn absent_short(absent: Absent) -> &'static str {
 
 fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(4.0);
-    ui.label(section("Prediction against truth", cx.p)).on_hover_text(
+    ui.label(section("Predicted vs measured", cx.p)).on_hover_text(
         "PSNR and SSIM of the imprints in meters with the lab's peak of 22.5 mm as range; where the source lost its \
          scale, both images are scaled to 0..1 one by one (min-max)",
     );
@@ -195,7 +194,7 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
             let text = RichText::new(cx.state.library.made_with(recipe)).size(SMALL).color(color);
             let label = ui.add(Label::new(text).wrap());
             if outdated {
-                label.on_hover_text("The settings in force would make another prediction");
+                label.on_hover_text("The current settings would give another prediction");
             }
         }
         match results::comparison(cx.state, finger) {
@@ -208,13 +207,13 @@ fn comparison(cx: &mut Cx<'_>, ui: &mut Ui) {
                     ui.label(caption(format!("{} finger", cx.state.finger_name(finger)), cx.p));
                 }
                 let (psnr, ssim) = match c.scale {
-                    Scale::Measured => ("PSNR (peak 22.5 mm)", "SSIM (range 22.5 mm)"),
-                    Scale::Assumed => ("PSNR (min-max 0..1)", "SSIM (min-max 0..1)"),
+                    Scale::Measured => ("PSNR", "SSIM"),
+                    Scale::Assumed => ("PSNR (rescaled)", "SSIM (rescaled)"),
                 };
                 for (name, number) in [
                     (psnr, number(c.psnr_db, 1, " dB")),
                     (ssim, number(c.ssim, 3, "")),
-                    ("Mean |error|", units::text_mm(c.mae_m)),
+                    ("Mean error", units::text_mm(c.mae_m)),
                 ] {
                     line(0.0).show(ui, (name, cx.p.weak), &[(number, cx.p.strong)]);
                 }

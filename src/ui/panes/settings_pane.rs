@@ -31,7 +31,7 @@ pub(crate) fn person(cx: &mut Cx<'_>, ui: &mut Ui) {
         let hint = system_person().unwrap_or_default();
         let edit = egui::TextEdit::singleline(&mut name).hint_text(hint).desired_width(f32::INFINITY);
         let edit = ui.add(edit).accessible_name("Your name");
-        if edit.on_hover_text("Stands with every mask and in the journal of every pair").changed() {
+        if edit.on_hover_text("Recorded with every mask and every change of a label").changed() {
             cx.push(prefer(move |s| s.person = name.clone()));
         }
     });
@@ -82,7 +82,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     ui.label(section("Models", cx.p));
     ui.horizontal(|ui| {
-        ui.label(RichText::new("Runtime").color(cx.p.weak));
+        ui.label(RichText::new("Engine").color(cx.p.weak));
         let combo = egui::ComboBox::from_id_salt("runtime").selected_text(settings.runtime.name());
         let response = combo.show_ui(ui, |ui| {
             for runtime in EngineChoice::possible() {
@@ -91,7 +91,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        response.response.accessible_name("Runtime").on_hover_text("What runs the models");
+        response.response.accessible_name("Engine").on_hover_text("What runs the models: processor or GPU");
     });
     ui.horizontal(|ui| {
         ui.label(RichText::new("Keep predictions").color(cx.p.weak));
@@ -102,7 +102,7 @@ fn body(cx: &mut Cx<'_>, ui: &mut Ui) {
             cx.out.push(prefer(move |s| s.cache_mib = mib).into());
         }
         response.on_hover_text(
-            "What predictions kept on the disk may take; the least recently used go first. 0 keeps none. Default 512 MiB",
+            "Disk space for earlier predictions; the least recently used go first, 0 keeps none. Default 512 MiB",
         );
     });
     ui.label(section("Labels", cx.p));

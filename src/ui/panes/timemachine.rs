@@ -50,7 +50,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, _: Pane) {
                 let (why, own) = (err.why.clone(), cx.state.inspect.start.is_some());
                 let action = own.then(|| (Action::OwnStarts.name(), Action::OwnStarts.tooltip()));
                 within(ui, body, |ui| {
-                    if empty::show(ui, "No registration from here", &why, action) {
+                    if empty::show(ui, "No pose to replay", &why, action) {
                         cx.act(Action::OwnStarts);
                     }
                 });
@@ -126,7 +126,7 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
         images::side_mark(ui, cx.p, source);
         let button = egui::Button::selectable(inspect.source == source, RichText::new(source.name()).size(12.0));
         let button = ui.add(button).accessible_name(format!("Steps of the {} imprint", source.name().to_lowercase()));
-        if button.on_hover_text("The imprint whose registration is looked at").clicked() {
+        if button.on_hover_text("Whose registration is replayed").clicked() {
             cx.push(Command::Inspect(InspectCommand::Source(source)));
         }
     }
@@ -149,15 +149,15 @@ fn header(cx: &mut Cx<'_>, ui: &mut Ui) {
     match inspect.start.map(PoseBits::get) {
         Some(start) => {
             ui.label(caption(format!("from {}", pose_text(start)), cx.p))
-                .on_hover_text("The start asked for; step 0 shows the one that was applied");
-            cx.action_button(ui, Action::OwnStarts, "Own starts");
+                .on_hover_text("The requested start; step 0 shows where it really began");
+            cx.action_button(ui, Action::OwnStarts, "All starts");
         }
         None => runs(cx, ui),
     }
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         let mut lines = inspect.lines;
-        let text = RichText::new("Lines").size(12.0);
-        let tip = "Draws a line from contact points to the points of the tool that they are pulled to, in the 3D view";
+        let text = RichText::new("Show pull lines").size(12.0);
+        let tip = "Draws lines in 3D from contact points to where they are pulled on the tool";
         if ui.checkbox(&mut lines, text).on_hover_text(with_keys(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Lines(lines)));
         }
@@ -181,8 +181,8 @@ fn runs(cx: &mut Cx<'_>, ui: &mut Ui) {
         let button = button.accessible_name(format!("Start {}", run + 1));
         let about = match (inspection.requested(run), inspection.report().runs.get(run)) {
             (Some(start), Some(r)) => {
-                let winner = if winner { "The winner. " } else { "" };
-                format!("{winner}Asked to begin at {}; {}", pose_text(start), r.stop)
+                let winner = if winner { "Best. " } else { "" };
+                format!("{winner}Starts at {}; {}", pose_text(start), r.stop)
             }
             _ => String::new(),
         };
@@ -262,14 +262,14 @@ fn transport(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     }
     ui.add_space(4.0);
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        cx.action_button(ui, Action::PinStep, "Pin");
+        cx.action_button(ui, Action::PinStep, "Compare step");
         let text = format!("step {at} of {}", steps.saturating_sub(1));
         ui.add_sized([92.0, 18.0], egui::Label::new(RichText::new(text).size(SMALL).color(cx.p.text)));
         ui.spacing_mut().slider_width = (ui.available_width() - 8.0).max(24.0);
         let mut to = at;
         let slider = Slider::new(&mut to, 0..=steps.saturating_sub(1)).show_value(false);
         let slider = ui.add_enabled(steps > 1, slider).accessible_name("Step");
-        let tip = "The step shown, 0 is the applied start. [[step_back]] and [[step_forward]] step, [[first_step]] and \
+        let tip = "Step shown; 0 is the start. [[step_back]] and [[step_forward]] step, [[first_step]] and \
                    [[last_step]] jump to the ends";
         if slider.on_hover_text(with_keys(tip)).changed() {
             cx.push(Command::Inspect(InspectCommand::Go { run, at: to }));

@@ -163,7 +163,7 @@ fn modes(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus) {
     });
     let tip = "{} ([[compare_mode]]: next, [[swap_compared]]: swap, hold F: B in the place of A)";
     let tip = with_keys(&tip.replace("{}", versus.mode.tooltip()));
-    response.response.accessible_name("Way to compare").on_hover_text(tip);
+    response.response.accessible_name("Comparison").on_hover_text(tip);
 }
 
 /// The canvas of a picture of `size` pixels, moved together with all bubble images.
@@ -344,7 +344,7 @@ fn readout(cx: &mut Cx<'_>, output: &CanvasOutput, versus: &Versus, finger: PadI
     let note = scale_note(cx.state);
     let note = if note.is_empty() { String::new() } else { format!("   ({note})") };
     cx.shared.readout = Some(format!(
-        "Compare {} ({x}, {y})   A {}   B {}   A - B {}{note}",
+        "Compare {} ({x}, {y})   A {}   B {}   A minus B {}{note}",
         cx.state.finger_name(finger),
         text(a),
         text(b),

@@ -173,10 +173,10 @@ impl Dialogs {
             let what = match state.purpose {
                 Purpose::Output(output) => match output.file_name() {
                     Some(name) => format!("A file such as {name}"),
-                    None => "A folder; it is made if it is not there.".to_owned(),
+                    None => "A folder; it is created if missing.".to_owned(),
                 },
-                Purpose::Labels => "A folder on another disk; touch2touch_masks is made in it.".to_owned(),
-                Purpose::Masks => "The folder of an export, one of its parts, or one .png of a mask.".to_owned(),
+                Purpose::Labels => "A folder on another disk; touch2touch_masks is created in it.".to_owned(),
+                Purpose::Masks => "The folder of an export, one of its splits, or one mask (.png).".to_owned(),
                 _ => "A folder in the lab's layout, a folder of image pairs, or any file in one.".to_owned(),
             };
             ui.label(caption(what, p));
@@ -184,7 +184,7 @@ impl Dialogs {
             ui.horizontal(|ui| {
                 let text = state.text.trim();
                 let ok = ui.add_enabled(!text.is_empty(), egui::Button::new("Use this path"));
-                if (ok.on_hover_text("Take the path (Enter)").clicked() || enter) && !text.is_empty() {
+                if (ok.on_hover_text("Use this path (Enter)").clicked() || enter) && !text.is_empty() {
                     let path = from_home(text);
                     match state.purpose.objection(&path) {
                         Some(why) => (state.why, state.fresh) = (why, true),
@@ -194,7 +194,7 @@ impl Dialogs {
                         }
                     }
                 }
-                close |= ui.button("Close").on_hover_text("Leave everything as it is (Esc)").clicked();
+                close |= ui.button("Close").on_hover_text("Cancel (Esc)").clicked();
             });
         });
         if close || modal.should_close() {

@@ -8,7 +8,7 @@ use super::cx::Cx;
 use super::theme::SMALL;
 use super::widget::cut::cut_in_the_middle;
 use crate::app::action::Action;
-use crate::app::keys::{ImprintSource, ShiftMode};
+use crate::app::keys::{ImprintSource, ShiftMode, shift_name};
 use crate::app::pane::{Kind, Pane};
 use crate::app::results;
 use crate::app::results::Why;
@@ -55,15 +55,18 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
     let shift = cx.state.settings.shift;
     let model = cx.state.library.model_name(&recipe.bundle);
     let why = results::outdated(cx.state, finger).map(|outdated| outdated.why);
+    // What is meant needs no more than its seed; what is not says all that may differ.
     let settings = match why {
-        None => format!(" · {} · {}", recipe.config.text(), shift.label().to_lowercase()),
+        None => format!(", seed {}", recipe.config.seed),
         Some(_) => format!(" · {}", recipe.config.text()),
     };
+    let engine = cx.state.results.predictions.get(recipe).map_or(String::new(), |made| format!(", by {}", made.engine));
+    let full = format!("{model}: {}{engine}. Depth scale: {}", recipe.config.text(), shift_name(shift));
     let (lead, tip) = match why {
-        None => ("", "What is shown was predicted so"),
-        Some(Why::OnItsWay) => ("Predicting anew; this is ", "The settings ask for another prediction"),
-        Some(Why::Picked) => ("Picked: ", "Shown until the settings change, or Generate"),
-        Some(Why::NotMade) => ("Made with ", "The settings in force would make another prediction"),
+        None => ("", "This is what the current settings give"),
+        Some(Why::OnItsWay) => ("Updating; this is ", "A prediction with the current settings is being made"),
+        Some(Why::Picked) => ("Picked: ", "Shown until you change the settings or press Generate"),
+        Some(Why::NotMade) => ("Old settings: ", "The current settings would give another prediction"),
     };
     let text = format!("{lead}{model}{settings}");
     if why.is_some_and(|why| !why.is_meant()) {
@@ -88,13 +91,13 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, title: &str, place: Rect, line:
     painter.galley(start, galley, color);
     let response = ui.interact(room, ui.scope_id().with((title, "made with")), Sense::hover());
     response.widget_info(|| eframe::egui::WidgetInfo::labeled(eframe::egui::Role::Label, true, &text));
-    response.on_hover_text(format!("{text}. {tip}"));
+    response.on_hover_text(format!("{full}. {tip}"));
     if again {
         let place =
             Rect::from_center_size(pos2(line.right() - BUTTON / 2.0 - 3.0, line.center().y), vec2(BUTTON, 16.0));
         let button = Button::new(RichText::new("Generate").size(SMALL)).small().min_size(vec2(BUTTON, 16.0));
-        let button = ui.put(place, button).accessible_name(format!("Generate anew, {title}"));
-        let tip = Action::Generate.behind("Predicts with the settings in force");
+        let button = ui.put(place, button).accessible_name(format!("Generate again, {title}"));
+        let tip = Action::Generate.behind("Predicts with the current settings");
         if button.on_hover_text(tip).clicked() {
             cx.act(Action::Generate);
         }

@@ -155,7 +155,7 @@ fn way(cx: &Cx<'_>, easel: &Easel<'_>) {
     let mut line: Vec<Pos2> = match (drawing.tool, drawing.points.as_slice()) {
         (DrawTool::Wand { .. }, [a, ..]) => {
             let mm = drawing.tolerance_m().map_or(f32::NAN, |m| m * 1e3);
-            let text = format!("within {mm:.2} mm of this depth");
+            let text = format!("±{mm:.2} mm of this depth");
             let place = at(a) + vec2(10.0, -10.0);
             for (shift, color) in [(vec2(1.0, 1.0), Color32::BLACK), (Vec2::ZERO, color)] {
                 easel.painter.text(place + shift, Align2::LEFT_BOTTOM, &text, FontId::proportional(12.0), color);

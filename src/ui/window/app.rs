@@ -439,7 +439,7 @@ impl StudioApp {
     fn outside(&mut self, ctx: &egui::Context) {
         if !self.lacks_letters && self.lacking.try_recv().is_ok() {
             self.lacks_letters = true;
-            let why = "no font of this computer has Chinese, Japanese or Korean letters: they are shown as boxes";
+            let why = "no font on this computer has Chinese, Japanese or Korean characters; they show as boxes";
             self.inbox.push(TasksCommand::Report(TaskError::new("Letters", why).with_hint(fonts::ADVICE)).into());
         }
         let dropped: Vec<PathBuf> = ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_owned()).collect());

@@ -54,7 +54,7 @@ fn open_menu(cx: &mut Cx<'_>, ui: &mut Ui) {
         if ui.button("Demo").on_hover_text(Action::OpenDemo.tooltip()).clicked() {
             cx.push(LibraryCommand::Open(Place::Demo));
         }
-        let tip = "46 simulated grasps of each of 9 seen and 3 unseen tools, none of them trained on";
+        let tip = "Simulated, never trained on: 46 grasps of each of 12 tools, 3 of them new to the models";
         if ui.button("Test set").on_hover_text(tip).clicked() {
             cx.push(LibraryCommand::Open(Place::Path("test-set".into())));
         }
@@ -119,9 +119,6 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
                     }
                     edited = true;
                 }
-                if cx.state.selection.panes.contains(&pane) {
-                    ui.label(caption("on screen", cx.p));
-                }
             });
         }
         ui.separator();
@@ -140,7 +137,7 @@ fn view_menu(cx: &mut Cx<'_>, ui: &mut Ui, tree: &mut Tree<Pane>) -> bool {
             cx.action_button(ui, action, action.name());
         }
     });
-    response.on_hover_text("What is shown: panes, fingers, marks, colors of the window");
+    response.on_hover_text("Show or hide panes, fingers and overlays; light or dark");
     edited
 }
 
@@ -176,7 +173,7 @@ pub(crate) fn bottom(cx: &mut Cx<'_>, ui: &mut Ui, frame_ms: f32) {
             fingers(cx, ui);
             ui.add_space(12.0);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                engine(cx, ui, frame_ms);
+                frame_time(cx, ui, frame_ms);
                 following(cx, ui);
                 jobs(cx, ui);
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
@@ -264,20 +261,12 @@ fn following(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.add_space(8.0);
 }
 
-/// The runtime that made what is shown, and in debug builds how long a frame takes.
-fn engine(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
+/// Time of a frame, in debug builds.
+fn frame_time(cx: &Cx<'_>, ui: &mut Ui, frame_ms: f32) {
     if cfg!(debug_assertions) && frame_ms > 0.0 {
         ui.label(caption(format!("{:.1} ms", frame_ms), cx.p)).on_hover_text("Time of the last frame (debug)");
         ui.add_space(8.0);
     }
-    let prediction =
-        results::chosen(cx.state, cx.state.selection.finger).and_then(|r| cx.state.results.predictions.get(r));
-    let text = match prediction {
-        Some(prediction) => prediction.engine.clone(),
-        None => cx.state.settings.runtime.name().to_owned(),
-    };
-    ui.label(caption(text, cx.p)).on_hover_text("The runtime that runs the models");
-    ui.add_space(8.0);
 }
 
 /// Three lines on the first start; gone for good when dismissed.
@@ -294,9 +283,9 @@ pub(crate) fn hint(cx: &mut Cx<'_>, ctx: &egui::Context) {
                 ui.vertical(|ui| {
                     let predicted = results::chosen(cx.state, cx.state.selection.finger).is_some();
                     let first = if predicted {
-                        "Simulated touches are open, with a first prediction beside the measurement."
+                        "This is simulated data: the predicted imprint next to the measured one."
                     } else {
-                        "Simulated touches are open; a first prediction is being made."
+                        "This is simulated data; the first prediction is on its way."
                     };
                     ui.label(RichText::new(first).color(cx.p.strong));
                     let steps = "[[next_pair]] and [[previous_pair]] step through the pairs, [[generate]] predicts the one \

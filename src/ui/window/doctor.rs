@@ -52,8 +52,8 @@ pub(crate) fn panel(cx: &mut Cx<'_>, ctx: &egui::Context) {
             examined(cx, ui);
             ui.add_space(4.0);
             let mut always = cx.state.settings.about_own_data;
-            let tick = ui.checkbox(&mut always, caption("open this with every folder of my own", cx.p));
-            let tip = "It is in the menus of Open and of the list and in the palette, too: About this data";
+            let tick = ui.checkbox(&mut always, caption("open this with every new folder", cx.p));
+            let tip = "Also in the menu Open: About this data";
             if tick.on_hover_text(tip).changed() {
                 cx.push(prefer(move |s| s.about_own_data = always));
             }
@@ -102,7 +102,7 @@ fn glance(cx: &mut Cx<'_>, ui: &mut Ui) {
             ui.add(Label::new(RichText::new(err.to_string()).color(cx.p.wrong)).wrap());
         }
         Lookup::Waiting | Lookup::Absent(_) => {
-            ui.label(caption("Reading a handful of pairs…", cx.p));
+            ui.label(caption("Reading a few pairs…", cx.p));
         }
     }
 }
@@ -169,7 +169,7 @@ fn tried(cx: &mut Cx<'_>, ui: &mut Ui) {
             let worth: &Worth = &worth;
             worth.facts().iter().for_each(|fact| line(cx, ui, fact));
             if let Some(name) = doctor::fitted_in_use(cx.state) {
-                let text = format!("in use: {name}; the figures are of the model that it was made from");
+                let text = format!("in use: {name}; these numbers are of the model it was fitted from");
                 named(cx, ui, "", |cx, ui| {
                     ui.add(Label::new(caption(text, cx.p)).wrap());
                 });
@@ -180,9 +180,7 @@ fn tried(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     if state.doctor.worth.is_none() {
         named(cx, ui, "Models", |cx, ui| {
-            let tip = format!(
-                "Predicts {SAMPLE} pairs spread over the data set, and tries a fit to them; nothing is written"
-            );
+            let tip = format!("Predicts {SAMPLE} pairs spread over the data set and tries a fit; writes nothing");
             if ui.small_button("Try the models").on_hover_text(tip).clicked() {
                 cx.push(DoctorCommand::Try);
             }
@@ -203,10 +201,7 @@ fn examined(cx: &mut Cx<'_>, ui: &mut Ui) {
     }
     report.problems.iter().take(LISTED).for_each(|finding| one(cx, ui, finding));
     if report.problems.len() > LISTED {
-        ui.label(caption(
-            format!("and {} more kinds: the verb doctor lists all", report.problems.len() - LISTED),
-            cx.p,
-        ));
+        ui.label(caption(format!("and {} more; `touch2touch doctor` lists all", report.problems.len() - LISTED), cx.p));
     }
 }
 

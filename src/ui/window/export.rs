@@ -38,9 +38,9 @@ fn stills(cx: &mut Cx<'_>, ui: &mut Ui) {
                 let button = button.accessible_name(format!("Save 3D picture {text} {on}"));
                 let size = format!("{} x {} pixels {on}", asked.width_px, asked.width_px);
                 let tip = match asked.turntable {
-                    None => format!("Save as PNG of {size}, in the direction of this view"),
+                    None => format!("Save as PNG, {size}, from this viewpoint"),
                     Some(frames) => {
-                        format!("Save one turn around the pair as {frames} PNG files of {size}, for a film")
+                        format!("Save one turn around the pair as {frames} PNG files, {size}")
                     }
                 };
                 if button.on_hover_text(tip).clicked() {
@@ -73,8 +73,8 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
     }
     ui.separator();
     for (copied, text, tip) in [
-        (false, "Save as picture", Action::SavePane.behind("Saves this pane as it is on the screen as PNG")),
-        (true, "Copy as picture", Action::CopyPane.behind("Copies this pane as it is on the screen")),
+        (false, "Save as picture", Action::SavePane.behind("Saves this pane as PNG")),
+        (true, "Copy as picture", Action::CopyPane.behind("Copies this pane as a picture")),
     ] {
         if ui.button(text).on_hover_text(tip).clicked() {
             cx.push(ViewCommand::Ui(UiRequest::PictureOf { pane, copied }));
@@ -82,8 +82,8 @@ pub(crate) fn menu(cx: &mut Cx<'_>, ui: &mut Ui, pane: Pane) {
         }
     }
     if let Some(command) = export::equivalent(cx.state, pane) {
-        let copy = ui.button("Copy the command");
-        let tip = format!("What does the same in a shell:\n{command}");
+        let copy = ui.button("Copy as command line");
+        let tip = format!("Command line for this:\n{command}");
         if copy.on_hover_text(tip).clicked() {
             ui.copy_text(command);
             ui.close();

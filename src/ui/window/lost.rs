@@ -69,7 +69,7 @@ fn may_start(started_again: Option<&str>, now: u64) -> bool {
 /// Note in the window of a program that had to start again.
 pub(crate) fn greeting() -> Option<TaskError> {
     std::env::var_os(STARTED_AGAIN)?;
-    let why = "the graphics device was lost, so the studio closed, with everything saved, and started again";
+    let why = "the graphics device was lost; everything was saved and the studio restarted";
     Some(
         TaskError::new("Start again", why)
             .with_hint("If it happens often, look for a newer driver of the graphics card."),

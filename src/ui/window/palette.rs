@@ -86,7 +86,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
                 }
             }
             if entries.is_empty() {
-                ui.label(crate::ui::parts::theme::caption("Nothing fits", cx.p));
+                ui.label(crate::ui::parts::theme::caption("No match", cx.p));
             }
         });
     });

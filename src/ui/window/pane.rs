@@ -102,7 +102,10 @@ fn menu(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane: Pane) 
     let text = if whole { "Back to all panes" } else { "Fill the window" };
     let fill = egui::Button::new(text).shortcut_text(Action::MaximizePane.key_text());
     let fill = ui.add(fill).accessible_name(format!("{text}: {}", pane.title()));
-    if fill.on_hover_text("Lets this pane fill the window, or shows all again; so does a double-click").clicked() {
+    if fill
+        .on_hover_text("Makes this pane fill the window or shows all again; so does a double-click on its tab")
+        .clicked()
+    {
         *maximized = if whole { None } else { Some(pane) };
         ui.close();
     }
@@ -125,7 +128,7 @@ fn menu_button(cx: &mut Cx<'_>, ui: &mut Ui, maximized: &mut Option<Pane>, pane:
         egui::containers::menu::MenuButton::from_button(button).ui(ui, |ui| menu(cx, ui, maximized, pane));
     response
         .accessible_name(format!("Menu of {}", pane.title()))
-        .on_hover_text("Fill the window, mouse and keys, save or copy what this pane shows");
+        .on_hover_text("Maximize, mouse and keys, save or copy this pane");
 }
 
 /// Behavior of the panes in their tree.

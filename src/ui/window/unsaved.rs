@@ -33,25 +33,17 @@ pub(crate) fn question(cx: &mut Cx<'_>, ctx: &egui::Context) {
                     answer = Some(command);
                 }
             };
-            button(
-                "Try again",
-                "Writes them where they belong; this is tried every few seconds",
-                UnsavedCommand::Retry,
-            );
-            let tip = "Writes them to a folder of your choice, from where they can be taken in later";
+            button("Try again", "Saves again; this is also tried every few seconds", UnsavedCommand::Retry);
+            let tip = "Saves them to a folder of your choice, to be taken in later";
             button("Save elsewhere…", tip, UnsavedCommand::AskFolder);
             match question {
                 Question::Closing => {
-                    button(
-                        "Discard and close",
-                        "Closes the window; what is listed here is lost",
-                        UnsavedCommand::Discard,
-                    );
+                    button("Discard and close", "Closes the window and loses these labels", UnsavedCommand::Discard);
                     button("Stay open", "Changes nothing (Esc)", UnsavedCommand::Stay);
                 }
                 Question::Lost => {
-                    let tip = "Keeps them in memory and goes on trying (Esc)";
-                    button("Go on unsaved", tip, UnsavedCommand::Stay);
+                    let tip = "Keeps them in memory and keeps trying (Esc)";
+                    button("Continue unsaved", tip, UnsavedCommand::Stay);
                 }
             }
         });
@@ -71,8 +63,8 @@ fn said(cx: &Cx<'_>, ui: &mut egui::Ui) {
     let first = doc.unsaved.first().map_or("", String::as_str);
     let pairs = match doc.unsaved.len() {
         0 => "Everything is saved by now.".to_owned(),
-        1 => format!("Not on the disk: the labels of {first}"),
-        n => format!("Not on the disk: the labels of {}, {first} the first", counted(n, "pair")),
+        1 => format!("Not saved: the labels of {first}"),
+        n => format!("Not saved: the labels of {}, starting with {first}", counted(n, "pair")),
     };
     ui.add(egui::Label::new(pairs).wrap());
     if let Some(err) = doc.failed.values().next() {

@@ -61,8 +61,8 @@ impl Cure {
             Self::ReadAs { list } if list.is_empty() => "Read as stored".into(),
             Self::ReadAs { list } => format!("Read with {list}"),
             Self::Fit { pairs } => format!("Fit to {}", counted(*pairs, "pair")),
-            Self::TrainFromCad { .. } => "Masks from CAD, and train".into(),
-            Self::Examine { pairs } => format!("Examine {}", counted(*pairs, "pair")),
+            Self::TrainFromCad { .. } => "Train on masks from CAD".into(),
+            Self::Examine { pairs } => format!("Check all {}", counted(*pairs, "pair")),
         }
     }
 
@@ -71,25 +71,24 @@ impl Cure {
         match self {
             Self::FitRange { min_m, max_m } => {
                 let [lo, hi] = [min_m, max_m].map(|m| fixed(mm(f64::from(*m)), 1));
-                format!("Colors go from {lo} to {hi} mm in all panes, instead of 0 to 18 mm")
+                format!("Sets the colors of all panes to {lo}–{hi} mm instead of 0–18 mm")
             }
-            Self::ReadTool { .. } => "Writes unit.txt beside the CAD model, which says so for good".into(),
+            Self::ReadTool { .. } => "Writes unit.txt beside the CAD model, so this has to be done only once".into(),
             Self::ReadAs { .. } => {
-                "Writes read-as.txt into the data set, which says so for good, and opens it again; the files stay as \
-                 they are"
+                "Writes read-as.txt into the data set and opens it again; the data files stay unchanged"
                     .into()
             }
             Self::Fit { .. } => {
-                "Fits the generator to the pairs in closed form, scores it on pairs that were left out, and writes a new \
-                 bundle that can be taken into use"
+                "Fits the generator to your pairs, scores it on pairs that were left out, and saves it as a new model that \
+                 you can use"
                     .into()
             }
             Self::TrainFromCad { .. } => {
-                "Makes masks from the CAD models at the true poses, trains the mask model on them, and scores it on \
-                 pairs that were left out. No mask of yours is touched, no pair is marked"
+                "Trains the mask model on masks made from the CAD models at the true poses, and scores it on pairs that were \
+                 left out. Your masks and review states stay as they are"
                     .into()
             }
-            Self::Examine { .. } => "Reads every pair and lists what is wrong with it".into(),
+            Self::Examine { .. } => "Reads every pair and lists what is wrong".into(),
         }
     }
 

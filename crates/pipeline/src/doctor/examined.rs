@@ -29,7 +29,7 @@ pub fn examined(
     generator: Option<Generator<'_>>,
     cx: &JobCx,
 ) -> Result<Examined, TaskError> {
-    const WHAT: &str = "Examine the pairs";
+    const WHAT: &str = "Check the pairs";
     let mut report = doctor::examine(dataset, most, &mut |done, total| {
         cx.progress(done as u64, total as u64, format!("{done} of {total} pairs"));
         if cx.cancel.is_cancelled() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

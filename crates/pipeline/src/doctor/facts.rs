@@ -74,24 +74,24 @@ fn pairs(dataset: &Dataset, looked_at: &[Sample], asked: usize) -> Fact {
     let all = &dataset.index.pairs;
     let mut text = counted(all.len(), "pair");
     text += match dataset.kind {
-        SourceKind::Pictures => " of pictures",
-        SourceKind::Demo => ", simulated when they are looked at",
+        SourceKind::Pictures => " of images",
+        SourceKind::Demo => ", simulated on demand",
         _ => " in the lab's files",
     };
     let tests = all.iter().filter(|pair| pair.split == Split::Test).count();
     if tests > 0 {
-        text += &format!("; {tests} kept for tests");
+        text += &format!("; {tests} reserved for tests");
     }
     if looked_at.iter().any(|sample| sample.scale == Scale::Assumed) {
-        text += "; pictures do not say their depth: it is assumed to go from -6.3 to 18 mm";
+        text += "; pictures carry no depth scale: -6.3 to 18 mm is assumed";
     }
     let has = |sample: &&Sample, get: fn(&PadTouch) -> bool| sample.pads.iter().flatten().any(get);
     let blind = looked_at.iter().filter(|sample| !has(sample, |touch| touch.color().is_some())).count();
     let unfelt = looked_at.iter().filter(|sample| !has(sample, |touch| touch.depth().is_some())).count();
     let mut grade = Grade::Plain;
-    for (count, what) in [(blind, "a color picture"), (unfelt, "a measured imprint")] {
+    for (count, what) in [(blind, "color image"), (unfelt, "measured imprint")] {
         if count > 0 {
-            text += &format!("; {count} of {asked} looked at lack {what}");
+            text += &format!("; {count} of {asked} checked have no {what}");
             grade = Grade::Caution;
         }
     }
@@ -107,7 +107,7 @@ fn tools(dataset: &Dataset) -> Fact {
         .filter_map(|pair| pair.tool.as_deref())
         .for_each(|tool| *of.entry(tool).or_default() += 1);
     if of.is_empty() {
-        return Fact::plain(Topic::Tools, "no pair says which tool it is of: no CAD model, no pose");
+        return Fact::plain(Topic::Tools, "unknown: no CAD model, no pose");
     }
     let list = named(of.iter().map(|(tool, count)| (*tool, Some(*count))));
     let without = dataset.index.pairs.len() - of.values().sum::<usize>();
@@ -156,20 +156,20 @@ fn cad(dataset: &Dataset, models: &BTreeMap<String, Cad>) -> Option<Fact> {
     let refused: Vec<&str> = of(|cad| matches!(cad, Cad::Refused(_))).collect();
     let unit = match (dataset.tool_scale, usable.first()) {
         (Some(ToolScale::Meters), _) => " in meters".into(),
-        (Some(_), _) => " in the unit that was named".into(),
+        (Some(_), _) => " in the given unit".into(),
         (None, Some(tool)) => match units_of(dataset, tool).ok().and_then(|offer| offer.says) {
             Some(says) => format!(" in {says} (unit.txt)"),
             None => " in meters".into(),
         },
         (None, None) => String::new(),
     };
-    let mut text = format!("{} of {} can be used{unit}", usable.len(), models.len());
+    let mut text = format!("{} of {} usable{unit}", usable.len(), models.len());
     let list = |names: &[&str]| named(names.iter().map(|name| (*name, None)).collect::<Vec<_>>().into_iter());
     if !missing.is_empty() {
-        text += &format!("; none of {}", list(&missing));
+        text += &format!("; no file for {}", list(&missing));
     }
     if !refused.is_empty() {
-        text += &format!("; not as large as a tool in this unit: {}", list(&refused));
+        text += &format!("; wrong unit? {}", list(&refused));
     }
     let grade = match (missing.is_empty(), refused.is_empty()) {
         (_, false) => Grade::Wrong,
@@ -185,14 +185,14 @@ fn cameras(looked_at: &[Sample], posed: usize) -> Fact {
     let camera = looked_at.iter().flat_map(|sample| sample.pads.iter().flatten()).find_map(PadTouch::camera);
     let assumed = looked_at.iter().any(|sample| sample.scale == Scale::Assumed);
     let camera = match camera {
-        Some(_) if assumed => "depth cameras assumed: pictures hold none".into(),
+        Some(_) if assumed => "depth cameras assumed: images carry none".into(),
         Some(camera) => format!("depth cameras known (focal length {:.0} px)", camera.intrinsics.fx),
-        None => "no depth camera known: no points in space, no pose".into(),
+        None => "no depth camera: no 3D points, no pose".into(),
     };
     let poses = match posed {
-        0 => "true poses not known".into(),
+        0 => "true poses unknown".into(),
         n if n == looked_at.len() => "true poses known".into(),
-        n => format!("true poses known of {n} of {} looked at", looked_at.len()),
+        n => format!("true poses known for {n} of {} checked", looked_at.len()),
     };
     Fact::plain(Topic::Cameras, format!("{camera}; {poses}"))
 }
@@ -219,7 +219,7 @@ fn range(looked_at: &[Sample]) -> Option<Fact> {
     }
     let mut text = format!("{} to {} mm", fixed(from, 1), fixed(hi, 1));
     if lo < -ASIDE_MM {
-        text += &format!("; beside the tool down to {} mm", fixed(lo, 1));
+        text += &format!("; down to {} mm beside the tool", fixed(lo, 1));
     }
     let cure = Cure::FitRange { min_m: (from * 1e-3) as f32, max_m: (hi * 1e-3) as f32 };
     Some(Fact::plain(Topic::Range, text).with_cure(cure))
@@ -231,14 +231,14 @@ fn drawn(dataset: &Dataset, masks: &DrawnMasks<'_>, posed: bool, models: &BTreeM
     let mut of: Vec<&str> = drawn.iter().map(|(pair, _)| pair.as_str()).collect();
     of.dedup();
     let text = match drawn.len() {
-        0 => "none was corrected: masks are made when they are looked at".into(),
-        n => format!("{} corrected, of {}", counted(n, "mask"), counted(of.len(), "pair")),
+        0 => "none edited yet: automatic masks".into(),
+        n => format!("{} edited, in {}", counted(n, "mask"), counted(of.len(), "pair")),
     };
     let fact = Fact::plain(Topic::Masks, text);
     let usable = |tool: &String| matches!(models.get(tool), Some(Cad::Usable));
     let pairs = dataset.index.pairs.iter().filter(|pair| pair.tool.as_ref().is_some_and(usable)).count();
     if posed && pairs > 1 && dataset.kind != SourceKind::Demo {
-        let text = format!("{}; CAD and true poses can make them for {}", fact.text, counted(pairs, "pair"));
+        let text = format!("{}; could be made from CAD and true poses for {}", fact.text, counted(pairs, "pair"));
         return Fact { text, ..fact }.with_cure(Cure::TrainFromCad { pairs });
     }
     fact
@@ -263,7 +263,7 @@ fn problems(dataset: &Dataset, unreadable: usize) -> Fact {
     let found = doubts::examine_reading(dataset, doubts::PAIRS, None, &JobCx::unwatched());
     let mut parts: Vec<String> = found.iter().map(|doubt| doubt.what.clone()).collect();
     if unreadable > 0 {
-        parts.push(format!("{} of those looked at cannot be read", counted(unreadable, "pair")));
+        parts.push(format!("{} of those checked cannot be read", counted(unreadable, "pair")));
     }
     match dataset.problems.as_slice() {
         [] => {}
@@ -275,7 +275,7 @@ fn problems(dataset: &Dataset, unreadable: usize) -> Fact {
         (false, true) => Grade::Caution,
         (false, false) => Grade::Wrong,
     };
-    let text = if parts.is_empty() { "none at a glance".into() } else { parts.join("; ") };
+    let text = if parts.is_empty() { "none obvious".into() } else { parts.join("; ") };
     let mut fact = Fact::plain(Topic::Problems, text).graded(grade);
     if let Some(list) = doubts::remedy(dataset, &found).filter(|_| dataset.root.is_some()) {
         fact = fact.with_cure(Cure::ReadAs { list });

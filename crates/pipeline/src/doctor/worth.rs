@@ -103,18 +103,18 @@ impl Worth {
     fn of_fit(&self, fit: &Adapted) -> Fact {
         let db = |scored: &Scored| scored.psnr_db;
         let Some(before) = db(&fit.before) else {
-            return Fact::plain(Topic::Generator, "no prediction could be compared with its measurement");
+            return Fact::plain(Topic::Generator, "no prediction could be compared with a measurement");
         };
         let angle = |scored: &Scored| scored.angle.and_then(|angle| angle.mean_deg);
-        let posed = angle(&fit.before).map_or(String::new(), |deg| format!(", pose {deg:.1}° off"));
+        let posed = angle(&fit.before).map_or(String::new(), |deg| format!(", angle error {deg:.1}°"));
         let mut text = format!("{before:.1} dB{posed} on {}", counted(fit.pairs, "pair"));
         let Some(after) = fit.closed_form.as_ref().and_then(db) else { return Fact::plain(Topic::Generator, text) };
         if let Some(objection) = fit.objections.first() {
-            text += &format!("; a fit is not offered: {objection}");
+            text += &format!("; no fit: {objection}");
             return Fact::plain(Topic::Generator, text).graded(Grade::Caution);
         }
         if after < before + GAIN_DB {
-            text += &format!("; a fit gains nothing ({after:.1} dB on pairs that were left out)");
+            text += &format!("; a fit would not help ({after:.1} dB on pairs that were left out)");
             return Fact::plain(Topic::Generator, text);
         }
         // What is read and predicted grows with the pairs, the rest hardly.
@@ -134,7 +134,7 @@ impl Worth {
             return Fact::plain(Topic::MaskModel, text);
         }
         // The button stands with the masks.
-        Fact::plain(Topic::MaskModel, format!("{text}; masks from CAD can train it")).graded(Grade::Caution)
+        Fact::plain(Topic::MaskModel, format!("{text}: train it on masks from CAD")).graded(Grade::Caution)
     }
 }
 
@@ -157,7 +157,7 @@ mod tests {
         let bad = of(0.6, &[0.01, 0.3]);
         assert_eq!((bad.len(), bad[0].grade), (1, Grade::Caution));
         assert!(bad[0].text.contains("IoU 0.60") && bad[0].text.contains("50 % within 5°"), "{}", bad[0].text);
-        assert!(bad[0].text.ends_with("masks from CAD can train it"), "{}", bad[0].text);
+        assert!(bad[0].text.ends_with("train it on masks from CAD"), "{}", bad[0].text);
         assert_eq!(of(0.9, &[0.01, 0.02])[0].grade, Grade::Plain);
         let lost = of(0.9, &[f64::NAN]);
         assert!(lost[0].text.contains("no pose found") && lost[0].grade == Grade::Caution, "{}", lost[0].text);

@@ -240,9 +240,7 @@ fn warnings(
     }
     if grouped {
         warnings.push(
-            "the pictures do not say which finger they are of: two lattices of markers were found, and named by where \
-             their windows lie"
-                .into(),
+            "the images do not say which finger they are of: the fingers were told apart by their markers".into(),
         );
     }
     if (1..ENOUGH_STEPS).contains(&steps) {

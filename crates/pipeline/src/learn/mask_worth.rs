@@ -38,7 +38,7 @@ pub struct MaskWorth {
 impl MaskWorth {
     /// In words.
     pub fn text(&self) -> String {
-        let mean = self.angle.mean_deg.map_or("no pose found".into(), |mean| format!("pose {mean:.1}° off"));
+        let mean = self.angle.mean_deg.map_or("no pose found".into(), |mean| format!("angle error {mean:.1}°"));
         format!("IoU {:.2} with masks from CAD, {mean}, {:.0} % within 5°", self.iou, self.angle.success_5)
     }
 }

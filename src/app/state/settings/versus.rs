@@ -28,20 +28,20 @@ impl VersusMode {
         match self {
             Self::Side => "Side",
             Self::Wipe => "Wipe",
-            Self::Difference => "A - B",
+            Self::Difference => "Difference",
             Self::Clouds => "3D",
-            Self::Apart => "3D A - B",
+            Self::Apart => "3D difference",
         }
     }
 
     /// The tooltip.
     pub fn tooltip(self) -> &'static str {
         match self {
-            Self::Side => "A at the left, B at the right",
-            Self::Wipe => "A at the left of a line that can be dragged, B at the right of it",
+            Self::Side => "A on the left, B on the right",
+            Self::Wipe => "A left, B right of a line that you drag",
             Self::Difference => "A minus B in millimeters: blue where A is shallower, red where it is deeper",
-            Self::Clouds => "The contact points of both in 3D, with the model at the pose of each",
-            Self::Apart => "The points of A in 3D, colored by their distance to the surface of B in millimeters",
+            Self::Clouds => "Contact points of both in 3D, with the CAD model at both poses",
+            Self::Apart => "Points of A in 3D, colored by their distance to the surface of B, in mm",
         }
     }
 

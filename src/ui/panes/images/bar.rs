@@ -22,13 +22,13 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
     if !range.locked || bulk.hi <= bulk.lo || shown >= LITTLE * (range.max_m - range.min_m) {
         return;
     }
-    let text = format!("{:.1} to {:.1} mm: fit the colors", bulk.lo * 1e3, bulk.hi * 1e3);
+    let text = format!("Fit colors to {:.1}–{:.1} mm", bulk.lo * 1e3, bulk.hi * 1e3);
     let text = Action::RangeOnce.behind(&text);
     let place = Rect::from_min_max(pos2(area.left() + 4.0, area.bottom() - 24.0), area.max - vec2(4.0, 2.0));
     ui.scope_builder(UiBuilder::new().max_rect(place).id_salt("offer range"), |ui| {
         ui.vertical_centered(|ui| {
             let button = Button::new(RichText::new(text).size(SMALL)).min_size(vec2(0.0, 20.0));
-            let tip = "The picture takes less than a sixth of the locked color range";
+            let tip = "This pair uses less than a sixth of the color range";
             if ui.add(button).on_hover_text(tip).clicked() {
                 cx.act(Action::RangeOnce);
             }
@@ -37,9 +37,9 @@ pub(super) fn offer_range(cx: &mut Cx<'_>, ui: &mut Ui, area: Rect, histogram: &
 }
 
 /// Tooltip of the button that sets the range.
-const AUTO: &str = "Set the range once from what is shown";
+const AUTO: &str = "Fit the range to what is shown";
 /// Tooltip of the lock.
-const LOCK: &str = "Locked: colors mean the same in every pair. Unlocked: set from each pair shown";
+const LOCK: &str = "Keep the range: the same colors in every pair. Off: fitted to each pair";
 
 /// The bar of differences.
 pub(crate) fn error_bar(cx: &mut Cx<'_>, ui: &mut Ui, histogram: Option<&Histogram>) {

@@ -44,7 +44,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
     let tip = if automatic { source.tooltip() } else { proposal.tooltip() };
     let combo = egui::ComboBox::from_id_salt("mask source").width(ui.available_width() - 8.0).selected_text(text);
     let response = combo.height(420.0).show_ui(ui, |ui| {
-        ui.label(caption("Automatic: in force where nothing is drawn", cx.p));
+        ui.label(caption("Used until you draw", cx.p));
         for other in MaskSource::iter() {
             let option = ui.selectable_label(automatic && other == source, other.name());
             if option.on_hover_text(other.tooltip()).clicked() {
@@ -55,7 +55,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         }
         ui.separator();
-        ui.label(caption(format!("Proposed: {} stays the automatic one", source.name()), cx.p));
+        ui.label(caption("Suggestions only: nothing changes until you accept", cx.p));
         for other in ProposalSource::iter().filter(|other| *other != ProposalSource::Automatic) {
             if ui.selectable_label(other == proposal, other.name()).on_hover_text(other.tooltip()).clicked() {
                 cx.push(prefer(move |s| s.mask.proposal = other));
@@ -69,7 +69,7 @@ fn list(cx: &mut Cx<'_>, ui: &mut Ui) {
 fn number(ui: &mut Ui, new: &mut MaskSettings) {
     if new.proposal != ProposalSource::Automatic {
         if new.proposal.is_cad() {
-            let tip = "The greatest distance to the CAD model that is proposed as contact";
+            let tip = "Points closer to the CAD model than this are suggested as contact";
             slider_mm(ui, "Proposal distance", &mut new.choice.cad_distance_m, 0.0..=(FARTHEST_M as f32 * 0.5e3), tip);
         }
         return;
@@ -77,16 +77,16 @@ fn number(ui: &mut Ui, new: &mut MaskSettings) {
     let default = MaskChoice::default();
     match new.choice.source {
         MaskSource::Threshold => {
-            let tip = "Pixels pushed in further than this, millimeters. Default 5.00; double-click resets";
+            let tip = "Pixels deeper than this are contact, mm. Default 5.00; double-click resets";
             let threshold = &mut new.choice.threshold_m;
             resets(ui, "Threshold", tip, threshold, default.threshold_m, (1e3, 15.0, 2, " mm"));
         }
         MaskSource::TopPercent => {
-            let tip = "Share of the deepest pixels. Default 15.0; double-click resets";
+            let tip = "This share of the pixels, the deepest, is contact. Default 15.0; double-click resets";
             resets(ui, "Top percent", tip, &mut new.choice.top_percent, default.top_percent, (1.0, 60.0, 1, " %"));
         }
         MaskSource::Cad => {
-            let tip = "Largest distance to the CAD model at the true pose. Default 1.00; double-click resets";
+            let tip = "Points closer to the CAD model at its true pose than this are contact, mm. Default 1.00; double-click resets";
             let distance = &mut new.choice.cad_distance_m;
             resets(ui, "CAD distance", tip, distance, default.cad_distance_m, (1e3, 5.0, 2, " mm"));
         }
@@ -120,14 +120,16 @@ fn probability(ui: &mut Ui, choice: &mut MaskChoice) {
     /// Probability at which somebody starts who chooses it himself.
     const START: f32 = 0.5;
     let mut own = choice.probability.is_some();
-    let tip = "Choose the probability from which a pixel is contact; off, it is as the mask model's bundle says";
+    let tip = "Set the probability above which a pixel is contact; off: the mask model's own";
     if ui.checkbox(&mut own, "probability").on_hover_text(tip).changed() {
         choice.probability = own.then_some(START);
     }
     if let Some(least) = &mut choice.probability {
         ui.spacing_mut().slider_width = (ui.available_width() - 60.0).max(40.0);
         let slider = Slider::new(least, 0.0..=1.0).fixed_decimals(2);
-        ui.add(slider).accessible_name("Probability").on_hover_text("Least probability of contact, 0 to 1");
+        ui.add(slider)
+            .accessible_name("Probability")
+            .on_hover_text("Pixels above this probability are contact, 0 to 1");
     }
 }
 
@@ -151,7 +153,7 @@ fn in_force(cx: &Cx<'_>, ui: &mut Ui) {
         .map(|(imprint, pad)| origin(cx, imprint, pad))
         .collect();
     let label = egui::Label::new(RichText::new(text).size(SMALL).color(color)).truncate();
-    ui.add(label).on_hover_text(format!("Masks in force:\n{}", all.join("\n")));
+    ui.add(label).on_hover_text(format!("Masks in use:\n{}", all.join("\n")));
 }
 
 /// Origin of the mask of one imprint: `right, measured: mask model`.
@@ -171,8 +173,8 @@ fn offer(cx: &mut Cx<'_>, ui: &mut Ui) {
         cx.action_button(ui, Action::Accept, "Accept");
         cx.action_button(ui, Action::CancelJobs, "Reject");
         let mut over = cx.state.settings.mask.over_drawn;
-        let tip = "Accepting replaces what was painted by hand as well; off, hand work stays";
-        if ui.checkbox(&mut over, "over hand work").on_hover_text(tip).changed() {
+        let tip = "Accepting also replaces what you painted; off: it stays";
+        if ui.checkbox(&mut over, "replace hand-drawn").on_hover_text(tip).changed() {
             cx.push(prefer(move |s| s.mask.over_drawn = over));
         }
         return;

@@ -42,7 +42,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             let mut text = place_text(pose);
             if let Some(off) = off_truth(cx.state, pose) {
                 let (angle, position) = (units::text_deg(off.angle_rad), units::text_mm(off.position_m));
-                text += &format!("   ({angle}, {position} off truth)");
+                text += &format!("   (error {angle}, {position})");
             }
             ui.label(RichText::new(text).size(SMALL).color(cx.p.strong));
             let (text, color) = cost_text(cx, hand.as_ref());
@@ -52,7 +52,7 @@ pub(super) fn strip(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, rect: R
             );
             ui.horizontal(|ui| {
                 let busy = hand.as_ref().is_some_and(|hand| hand.icp.is_some());
-                let icp = if busy { "Registering…" } else { "ICP from here" };
+                let icp = if busy { "Registering…" } else { "Register from here" };
                 for (action, text) in
                     [(Action::IcpFromHere, icp), (Action::Accept, "Accept"), (Action::RevertHand, "Revert")]
                 {
@@ -82,11 +82,11 @@ pub(super) fn place_text(pose: PlanarPose) -> String {
 /// Cost of the pose, against where it began.
 fn cost_text(cx: &Cx<'_>, hand: Option<&ManualTry>) -> (String, Color32) {
     let Some(hand) = hand else {
-        return ("Move the tool by keys or by its handles".into(), cx.p.weak);
+        return ("Move the tool with the arrow keys or its handles".into(), cx.p.weak);
     };
     let text = match (hand.cost, hand.began_cost) {
         (Some(now), Some(before)) => costs(now, before),
-        _ => "cost: the contact points are not there yet".into(),
+        _ => "Fit: waiting for the contact points".into(),
     };
     let better = hand.cost.zip(hand.began_cost).is_some_and(|(a, b)| a.cost_m2 <= b.cost_m2);
     (text, if better { cx.p.good } else { cx.p.caution })

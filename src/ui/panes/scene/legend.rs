@@ -76,7 +76,7 @@ fn folded(cx: &Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSource, 
     }
     let clicked = response.clicked();
     response.on_hover_ui(|ui| {
-        ui.label(RichText::new("Legend: a click shows switches, colors and sizes").size(SMALL));
+        ui.label(RichText::new("Click to show or hide things and change their colors").size(SMALL));
         for row in &rows {
             ui.label(RichText::new(&row.text).size(SMALL).color(row.color));
         }
@@ -98,7 +98,7 @@ fn unfolded(cx: &mut Cx<'_>, ui: &mut Ui, memory: &mut Memory, source: ImprintSo
         ui.spacing_mut().interact_size.y = ROW;
         ui.spacing_mut().button_padding = vec2(2.0, 0.0);
         let fold = Button::new(RichText::new("Fold").size(SMALL).color(cx.p.weak)).frame(false);
-        if ui.add(fold.min_size(vec2(0.0, ROW))).on_hover_text("Folds the legend to its colors").clicked() {
+        if ui.add(fold.min_size(vec2(0.0, ROW))).on_hover_text("Collapses the legend").clicked() {
             memory.legend_open = false;
         }
         for row in rows.into_iter().take(most) {
@@ -170,12 +170,12 @@ fn rows(cx: &Cx<'_>, memory: &Memory, source: ImprintSource) -> Vec<Row> {
 
 fn model_name(cx: &Cx<'_>, source: ImprintSource, layer: SceneLayer) -> &'static str {
     match layer {
-        SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, in hand",
-        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, accepted by hand",
+        SceneLayer::Cad if cx.state.workbench.hand(source).is_some() => "CAD, being moved",
+        SceneLayer::Cad if results::by_hand(cx.state, source).is_some() => "CAD, pose by hand",
         SceneLayer::TrueCad => "CAD, true pose",
         SceneLayer::OtherCad if source == ImprintSource::Measured => "CAD, predicted side",
         SceneLayer::OtherCad => "CAD, measured side",
-        _ => "CAD, aligned",
+        _ => "CAD, registered",
     }
 }
 
@@ -201,8 +201,7 @@ fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource, row: &Row) {
         let name = format!("{}, {}", row.text, source.name().to_lowercase());
         swatch.widget_info(|| WidgetInfo::selected(Role::CheckBox, true, shown, format!("Show {name}")));
         let text = Button::new(RichText::new(&row.text).size(SMALL).color(color)).frame(false).min_size(vec2(0.0, ROW));
-        let text =
-            ui.add(text).on_hover_text("Shows or hides it; the dots at its right change color, size and opacity");
+        let text = ui.add(text).on_hover_text("Show or hide; the dots at the right change color, size and opacity");
         if swatch.clicked() || text.clicked() {
             cx.push(prefer(move |s| s.scene.set(layer, LayerLook { shown: !shown, ..look })));
         }
@@ -250,7 +249,7 @@ fn change(ui: &mut Ui, row: &Row, layer: SceneLayer, look: LayerLook, weak: Colo
             });
         }
     }
-    if ui.add_enabled(new != layer.preset(), Button::new("As at first")).clicked() {
+    if ui.add_enabled(new != layer.preset(), Button::new("Reset")).clicked() {
         new = layer.preset();
     }
     (new != look).then_some(new)
@@ -307,8 +306,8 @@ pub(crate) fn distances(cx: &mut Cx<'_>, ui: &mut Ui, view: &str, below: &str, r
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             let drag =
                 DragValue::new(&mut mm).speed(0.02).range(0.01..=50.0).fixed_decimals(2).prefix("± ").suffix(" mm");
-            let drag = ui.add(drag).accessible_name(format!("Reach of the distances, {view}"));
-            let drag = drag.on_hover_text("Signed distance that has the last color, in all views; double-click: 1 mm");
+            let drag = ui.add(drag).accessible_name(format!("End of the distance scale, {view}"));
+            let drag = drag.on_hover_text("Distance at the end of the color bar, in all views; double-click: 1 mm");
             let mut changed = drag.changed();
             if drag.double_clicked() {
                 (mm, changed) = (1.0, true);

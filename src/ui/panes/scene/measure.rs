@@ -37,7 +37,7 @@ pub(super) fn click(cx: &mut Cx<'_>, memory: &Memory, source: ImprintSource, out
             }
         }
         (_, Some((_, point, _))) => cx.push(Command::Workbench(WorkbenchCommand::Mark(source, point))),
-        (_, None) => cx.push(TasksCommand::Notice("No point under the pointer: measure from point to point".into())),
+        (_, None) => cx.push(TasksCommand::Notice("No point under the pointer".into())),
     }
 }
 
@@ -85,7 +85,7 @@ pub(super) fn result(tool: SceneTool, points: &[DVec3]) -> Option<String> {
         (SceneTool::Angle, [a, b, c]) => {
             let (u, v) = (*a - *b, *c - *b);
             let angle = u.angle_between(v);
-            Some(if angle.is_finite() { units::text_deg(angle) } else { "no angle: two points are one".into() })
+            Some(if angle.is_finite() { units::text_deg(angle) } else { "no angle: two points coincide".into() })
         }
         _ => None,
     }

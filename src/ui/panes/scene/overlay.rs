@@ -55,7 +55,7 @@ pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, C
     }
     let last = shown.inspection.num_steps(shown.run).saturating_sub(1);
     let details = format!(
-        "step {} of {last}, start {} · {:.0} % inliers",
+        "step {} of {last}, start {} · {:.0} % of the points fit",
         shown.at,
         shown.run + 1,
         shown.step.inlier_share * 100.0
@@ -63,9 +63,9 @@ pub(super) fn step_text(cx: &Cx<'_>, source: ImprintSource) -> Option<(String, C
     Some((text, color, details))
 }
 
-/// `Measured and predicted 1.2° and 0.85 mm apart`.
+/// `Measured vs predicted: 1.2° and 0.85 mm apart`.
 pub(super) fn difference(what: &str, how: &str, d: PoseDifference) -> String {
-    format!("{what} {} and {} {how}", units::text_deg(d.angle_rad), units::text_mm(d.position_m))
+    format!("{what} {} and {} {how}", units::text_deg(d.angle_rad), units::text_mm(d.position_m)).trim_end().to_owned()
 }
 
 pub(super) fn lower_first(absent: Absent) -> String {
@@ -88,11 +88,11 @@ pub(crate) fn pose_time(pose: &PoseResult) -> String {
 pub(crate) fn pose_details(pose: &PoseResult) -> String {
     let report = &pose.report;
     let rung = if report.rung == Rung::Fixed { String::new() } else { format!(" · {}", report.rung) };
-    let beyond = if report.within_prior { "" } else { " · beyond what the gripper can hold (±22.5°, ±5 mm)" };
+    let beyond = if report.within_prior { "" } else { " · outside what the gripper can hold (±22.5°, ±5 mm)" };
     let open = if report.is_degenerate() { " · not fully determined" } else { "" };
     let refused =
-        if report.refused().is_some() { " · a cheaper place was refused: no gripper holds it so" } else { "" };
-    let who = report.joint.map_or(String::new(), |fit| format!(" · by {}", fit.basis));
+        if report.refused().is_some() { " · a better fit was rejected: no gripper could hold it there" } else { "" };
+    let who = report.joint.map_or(String::new(), |fit| format!(" · from {}", fit.basis));
     format!(
         "{} points · residual {} · {}{rung}{who}{open}{beyond}{refused}",
         pose.num_points,

@@ -118,7 +118,7 @@ fn pins(cx: &Cx<'_>, source: ImprintSource) -> impl Iterator<Item = (usize, Plan
 
 /// Colors and names of the pins of a side, for the legend.
 pub(super) fn legend_entries(cx: &Cx<'_>, source: ImprintSource) -> Vec<(Color32, &'static str)> {
-    pins(cx, source).map(|(i, _)| (cx.p.pins[i], ["CAD, pin A", "CAD, pin B"][i])).collect()
+    pins(cx, source).map(|(i, _)| (cx.p.pins[i], ["CAD, step A", "CAD, step B"][i])).collect()
 }
 
 /// The color of a residual. The end of the map that would vanish before the background is left out.
@@ -153,7 +153,7 @@ pub(super) fn show_legend(cx: &Cx<'_>, ui: &Ui, memory: &Memory, source: Imprint
         if shown == of { format!("{of} points") } else { format!("1 of {} points", of.div_ceil(shown.max(1))) };
     let text = match lines.residual_m {
         Some([median, max]) => {
-            format!("{points}: half within {}, all within {}", units::text_mm(median), units::text_mm(max))
+            format!("{points}: residual {} (median), {} (largest)", units::text_mm(median), units::text_mm(max))
         }
         None => points,
     };

@@ -75,7 +75,7 @@ fn switch(cx: &mut Cx<'_>, ui: &mut Ui, icon: Icon, action: Action, on: bool) {
 /// Menu of the places to look from.
 fn views(cx: &mut Cx<'_>, ui: &mut Ui) {
     let button = sign(ui, icon::Button { icon: Icon::Views, key: "", name: "Views", enabled: true, on: false });
-    let button = button.on_hover_text("Seven cameras, fit, parallel or in perspective");
+    let button = button.on_hover_text("Camera views, fit, perspective or parallel");
     Popup::menu(&button).show(|ui| {
         ui.set_min_width(190.0);
         for action in VIEWS {
@@ -94,17 +94,17 @@ fn shown(cx: &mut Cx<'_>, ui: &mut Ui) {
     let painted = cx.state.workbench.layer;
     let on = !matches!(painted, Layer::None | Layer::Distance);
     let button = sign(ui, icon::Button { icon: Icon::Layers, key: "", name: "What is shown", enabled: true, on });
-    let button = button.on_hover_text("What the contact points are painted with, and what is drawn around them");
+    let button = button.on_hover_text("Coloring of the contact points, and what else is drawn");
     Popup::menu(&button).close_behavior(PopupCloseBehavior::CloseOnClickOutside).show(|ui| {
         ui.set_min_width(210.0);
-        ui.label(caption("Contact points painted with", cx.p));
+        ui.label(caption("Color the contact points by", cx.p));
         for layer in Layer::iter() {
             let text = match layer {
                 Layer::None => "one color",
                 Layer::Residuals => "residuals, mm",
-                Layer::Reasons => "why one was left out",
+                Layer::Reasons => "pixels used and left out",
                 Layer::Distance => "signed distance, mm",
-                Layer::Correspondences => "lines to the model",
+                Layer::Correspondences => "pull lines to the model",
             };
             if ui.radio(layer == painted, text).on_hover_text(layer.tooltip()).clicked() {
                 cx.push(Command::Workbench(WorkbenchCommand::SetLayer(layer)));

@@ -52,10 +52,10 @@ pub(super) fn line(cx: &mut Cx<'_>, ui: &mut Ui, source: ImprintSource) {
             let button = Button::new(RichText::new(name).size(SMALL)).small().min_size(vec2(88.0, 16.0));
             ui.put(place, button).on_hover_text(tip).clicked()
         };
-        if offer("Open in Label", "The mask can be corrected there, or another source chosen") {
+        if offer("Open in Label", "Edit the mask there, or choose another source") {
             cx.act(Action::LabelWorkspace);
         }
-        let tip = "Marks what is deeper than the threshold as contact, here and on the other pairs";
+        let tip = "Makes everything deeper than a threshold contact, in all pairs";
         if !threshold && offer("Use threshold", tip) {
             cx.push(prefer(|s| s.mask.choice.source = MaskSource::Threshold));
         }
@@ -125,7 +125,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
                 None => (angle, cx.p.strong),
             };
             if results::provisional_pose(state, source).is_some() {
-                text += " · being proved…";
+                text += " · checking…";
             }
             let mut details: Vec<String> = Vec::new();
             if let Some(verdict) = &pose.verdict {
@@ -140,7 +140,7 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
             }
             if results::sample(state).ready().is_some_and(|sample| sample.scale == Scale::Assumed) {
                 text += " · assumed camera";
-                details.push("Pictures hold no camera and no scale: those of the simulator are assumed".to_owned());
+                details.push("Pictures carry no camera and no scale; the simulator's are assumed".to_owned());
             }
             (text, color, details)
         }
@@ -152,11 +152,11 @@ fn said(cx: &Cx<'_>, source: ImprintSource) -> (String, Color32, Vec<String>) {
     if let Some(pose) = results::by_hand(state, source) {
         text = format!("By hand: {} · {text}", hands::place_text(pose));
         if let Some(off) = hands::off_truth(state, pose) {
-            details.push(difference("The pose by hand", "off the truth", off));
+            details.push(difference("Pose by hand: error", "", off));
         }
     }
     if let Some(apart) = results::sides_apart(state) {
-        details.push(difference("Measured and predicted", "apart", apart));
+        details.push(difference("Measured vs predicted:", "apart", apart));
     }
     (text, color, details)
 }

@@ -11,7 +11,7 @@ pub(super) fn bar(cx: &mut Cx<'_>, ui: &mut Ui) {
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.add_space(4.0);
-        ui.label(caption("GelSlim's window only", cx.p));
+        ui.label(caption("GelSlim window only", cx.p));
         let button = ui.add(Button::new("×").frame(false).min_size(vec2(16.0, 16.0)));
         if button.accessible_name("Show all").on_hover_text("Show all").clicked() {
             cx.push(prefer(|s| s.scene.only_window = false));

@@ -131,7 +131,7 @@ fn axes(p: &Palette, painter: &Painter, plot: &Plot<'_>) {
     let font = FontId::proportional(10.0);
     let faint = Stroke::new(1.0, p.line);
     for (rect, top, unit, title) in
-        [(plot.cost, plot.top_mm, 1.0, "√cost per point, mm"), (plot.share, 100.0, 1.0, "points within the kernel, %")]
+        [(plot.cost, plot.top_mm, 1.0, "√cost per point, mm"), (plot.share, 100.0, 1.0, "points that fit, %")]
     {
         for share in [0.0, 0.5, 1.0] {
             let y = rect.bottom() - share as f32 * rect.height();
@@ -149,7 +149,7 @@ fn axes(p: &Palette, painter: &Painter, plot: &Plot<'_>) {
         painter.text(place, Align2::CENTER_TOP, at.to_string(), font.clone(), p.weak);
     }
     let end = pos2(plot.share.right(), plot.share.top() - 2.0);
-    painter.text(end, Align2::RIGHT_BOTTOM, "step; 0 is the applied start", font, p.weak);
+    painter.text(end, Align2::RIGHT_BOTTOM, "step", font, p.weak);
 }
 
 /// Lines where the kernel's width or the points change: costs on both sides of a line are not of one kind.
@@ -168,7 +168,7 @@ fn kernels(p: &Palette, painter: &Painter, plot: &Plot<'_>, run: usize) {
                 2.0,
                 3.0,
             ));
-            let text = format!("{} mm, {} pts", (10.0 * units::mm(step.kernel_m)).round() / 10.0, step.points);
+            let text = format!("{} mm, {} points", (10.0 * units::mm(step.kernel_m)).round() / 10.0, step.points);
             let galley = painter.layout_no_wrap(text, font.clone(), p.weak);
             let width = galley.size().x + 6.0;
             let left = if plot.cost.right() - x < width { x - width } else { x };

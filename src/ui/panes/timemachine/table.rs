@@ -66,9 +66,9 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
     let line = Line { height: LINE, size: 12.0, column, swatch: None };
     heads(cx, ui, &columns, pins, column);
     for (i, (name, tip)) in [
-        ("Angle °", "Of object from grasp: the angle that the lab reports"),
-        ("y mm", "Of the object's origin in the grasp frame"),
-        ("z mm", "Of the object's origin in the grasp frame"),
+        ("Angle °", "In-hand angle, with the sign that the lab reports"),
+        ("y mm", "Position of the tool's origin in the grasp frame"),
+        ("z mm", "Position of the tool's origin in the grasp frame"),
         ("√cost mm", "Root of the cost per point; comparable within one kernel width"),
     ]
     .into_iter()
@@ -93,40 +93,36 @@ pub(super) fn show(cx: &mut Cx<'_>, ui: &mut Ui, shown: Inspected<'_>) {
         });
     }
     ui.add_space(3.0);
-    let kernel = if step.kernel_m.is_finite() {
-        format!("kernel {:.2} mm", units::mm(step.kernel_m))
-    } else {
-        "no kernel".into()
-    };
-    let used = format!(
-        "{:.0} % inliers of {} points ({} offered) · {kernel}",
-        step.inlier_share * 100.0,
+    let kernel =
+        if step.kernel_m.is_finite() { format!(" within {:.2} mm", units::mm(step.kernel_m)) } else { String::new() };
+    let used = format!("{:.0} % of {} points fit{kernel}", step.inlier_share * 100.0, step.points);
+    let tip = format!(
+        "Points in use at this step: {} of {}. Those within the kernel's width count as fitting",
         step.points,
         shown.inspection.report().offered
     );
-    text(cx, ui, &used, "Points within the kernel's width, of those in use at this step");
+    text(cx, ui, &used, &tip);
     if let Some(mask_m2) = step.mask_cost_m2 {
         let [membranes, mask] = [step.cost_m2 - mask_m2, mask_m2].map(root_mm);
-        let parts = format!("√cost of the membranes {membranes:.2} mm, of the mask {mask:.2} mm");
-        text(cx, ui, &parts, "Parts of the joint cost; their squares add up");
+        let parts = format!("√cost: membrane {membranes:.2} mm, mask {mask:.2} mm");
+        text(cx, ui, &parts, "The two parts of the cost; their squares add up");
     }
     let (start, stop) = (shown.inspection.applied(shown.run), shown.inspection.what_next(shown.run, shown.at));
     if shown.is_last() {
-        text(cx, ui, &format!("End: {stop}"), "Why this run ended");
+        text(cx, ui, &format!("End: {stop}"), "Why the registration stopped here");
     } else {
         text(cx, ui, &format!("Next: {stop}"), "What the registration does from here");
     }
     if let (Some(requested), Some(applied)) = (shown.inspection.requested(shown.run), start) {
         let same = touch2touch_core::inspect::is_same_place(requested, applied);
-        let said = if same { "began as asked" } else { "asked for" };
         let color = if same { cx.p.weak } else { cx.p.caution };
         let line = if same {
-            format!("Start: {} ({said})", pose_text(applied))
+            format!("Start: {}", pose_text(applied))
         } else {
-            format!("Start: {} ({said} {})", pose_text(applied), pose_text(requested))
+            format!("Start: {} (requested {})", pose_text(applied), pose_text(requested))
         };
         let label = egui::Label::new(egui::RichText::new(line).size(SMALL).color(color)).wrap();
-        ui.add(label).on_hover_text("The pose of step 0, as it was applied, and the one that was asked for");
+        ui.add(label).on_hover_text("Pose of step 0, and the requested one where it differs");
     }
 }
 
@@ -145,10 +141,10 @@ fn heads(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[(&str, Color32, StepFigures)],
         ui.painter().text(place.right_center(), Align2::RIGHT_CENTER, text, FontId::proportional(SMALL), *color);
         if let Some(pin) = pin {
             let response = ui.interact(place, ui.scope_id().with(("unpin", pin)), Sense::click());
-            response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Let pin {name} go")));
+            response.widget_info(|| WidgetInfo::labeled(Role::Button, true, format!("Remove step {name}")));
             let about = pins[pin].map_or(String::new(), |p| {
                 let registration = p.registration.label();
-                format!("{}: {registration}, start {}, step {}. Click to let it go", p.source.name(), p.run + 1, p.at)
+                format!("{}: {registration}, start {}, step {}. Click to remove it", p.source.name(), p.run + 1, p.at)
             });
             if response.on_hover_text(about).clicked() {
                 cx.push(Command::Inspect(InspectCommand::Unpin(pin)));

@@ -33,7 +33,7 @@ pub(super) fn menu(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus, letter: Letter, wi
         MenuButton::from_button(Button::new(text)).config(config).ui(ui, |ui| content(cx, ui, subject));
     button
         .accessible_name(format!("{letter:?}: {label}"))
-        .on_hover_text(format!("{label}: choose what {letter:?} is; the choice is kept for this workspace"));
+        .on_hover_text(format!("{label}. Click to choose another; each workspace remembers its own"));
     inner.and_then(|inner| inner.inner)
 }
 
@@ -52,16 +52,16 @@ fn content(cx: &Cx<'_>, ui: &mut Ui, subject: &Subject) -> Option<Subject> {
         Subject::Mean(..) => subject.clone(),
         _ => Subject::Mean(RecipeChange::default(), 8),
     };
-    row(ui, mean, "Mean of seeds", "The mean of predictions that differ in their seeds");
-    row(ui, Subject::Stored, "Stored picture", "What another program predicted: NAME_vqvae.png beside the pair");
+    row(ui, mean, "Mean of seeds", "Mean of predictions with different seeds");
+    row(ui, Subject::Stored, "Stored picture", "Prediction of another program: NAME_vqvae.png beside the pair");
     let variants = variants(cx);
     if !variants.is_empty() {
         ui.separator();
-        ui.label(caption("Made of this touch", cx.p));
+        ui.label(caption("Predictions of this touch so far", cx.p));
         for variant in variants {
             let value = Subject::Predicted(variant);
             let text = value.label();
-            row(ui, value, text.trim_start_matches("Prediction · "), "This very recipe, of every pair");
+            row(ui, value, text.trim_start_matches("Prediction · "), "The same settings in every pair");
         }
     }
     ui.separator();
@@ -109,7 +109,7 @@ fn change(cx: &Cx<'_>, ui: &mut Ui, variant: &RecipeChange) -> Option<RecipeChan
     let depth = |b: &&BundleInfo| b.generator.as_ref().is_some_and(|g| g.sensors.output.kind == SensorKind::Depth);
     for bundle in cx.state.library.bundles.iter().filter(|b| b.fits(&rig)).filter(depth) {
         let on = new.bundle.as_deref() == Some(bundle.name.as_str());
-        let tip = "By this model; a second click leaves it to the Generate pane";
+        let tip = "Use this model; click again to follow the Generate pane";
         if ui.selectable_label(on, &bundle.name).on_hover_text(tip).clicked() {
             new.bundle = (!on).then(|| bundle.name.clone());
         }
@@ -121,12 +121,12 @@ fn change(cx: &Cx<'_>, ui: &mut Ui, variant: &RecipeChange) -> Option<RecipeChan
     });
     for mapping in Mapping::iter() {
         let on = new.shift == Some(mapping);
-        let tip = "Becomes meters in this way; a second click leaves it to the Generate pane";
+        let tip = "Use this depth scale; click again to follow the Generate pane";
         if ui.selectable_label(on, mapping.mode().label()).on_hover_text(tip).clicked() {
             new.shift = (!on).then_some(mapping);
         }
     }
-    ui.label(RichText::new("What is not chosen here is as in the Generate pane.").size(SMALL).color(cx.p.weak));
+    ui.label(RichText::new("Everything else follows the Generate pane.").size(SMALL).color(cx.p.weak));
     (new != *variant).then_some(new)
 }
 
@@ -139,7 +139,7 @@ fn number<N: egui::emath::Numeric>(
     range: std::ops::RangeInclusive<N>,
 ) {
     let mut own = value.is_some();
-    if ui.checkbox(&mut own, name).on_hover_text("Ticked: this number; else as in the Generate pane").changed() {
+    if ui.checkbox(&mut own, name).on_hover_text("Ticked: this number; otherwise follows the Generate pane").changed() {
         *value = own.then_some(usual);
     }
     let mut number = value.unwrap_or(usual);

@@ -34,8 +34,10 @@ impl Figure {
     fn tip(self) -> &'static str {
         match self {
             Self::Psnr => "PSNR against the measurement (last row: A against B), as in the metrics",
-            Self::Ssim => "Structural similarity against the measurement (last row: of A and B)",
-            Self::Angle => "The registered angle, in brackets its error where the truth is known (last row: A minus B)",
+            Self::Ssim => "Structural similarity with the measurement (last row: of A and B)",
+            Self::Angle => {
+                "Registered angle, with its error in brackets where the truth is known (last row: A minus B)"
+            }
         }
     }
 
@@ -90,7 +92,7 @@ pub(super) fn show(cx: &Cx<'_>, ui: &mut Ui, versus: &Versus) {
         [Some(a), Some(b)] => format!("{:+.1}", units::wrap_angle(a.angle_rad - b.angle_rad).to_degrees()),
         _ => "–".into(),
     };
-    row(3, "A - B", cx.p.strong, columns.iter().map(|column| column.text(apart, &turned)).collect(), cx.p.strong);
+    row(3, "A minus B", cx.p.strong, columns.iter().map(|column| column.text(apart, &turned)).collect(), cx.p.strong);
     for (i, column) in columns.iter().enumerate() {
         let left = area.left() + NAMES + width * i as f32;
         let place = Rect::from_min_size(pos2(left, area.top()), vec2(width, area.height()));

@@ -229,7 +229,7 @@ fn legend(cx: &mut Cx<'_>, ui: &mut Ui, versus: &Versus, flipped: bool, rect: ef
         line("A, colored by its distance to B".into(), cx.p.text);
         if let Some((_, difference)) = results::subjects_apart(cx.state, &versus.a, &versus.b) {
             let rms = units::text_mm(difference.contact_rms_m);
-            line(format!("contact points: {rms} (root mean square)"), cx.p.text);
+            line(format!("contact points: {rms} RMS"), cx.p.text);
         }
     } else {
         for letter in [Letter::A, Letter::B].into_iter().filter(|letter| !flipped || *letter == Letter::B) {

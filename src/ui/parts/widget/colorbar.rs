@@ -74,7 +74,7 @@ impl Colorbar<'_> {
                 ui.label(egui::RichText::new("mm").size(SMALL).color(p.weak));
                 if noted {
                     ui.add(egui::Label::new(egui::RichText::new(self.note).size(SMALL).color(p.caution)))
-                        .on_hover_text("The source lost its scale: the range in millimeters is an assumption");
+                        .on_hover_text("Pictures carry no scale: millimeters are assumed");
                 }
                 if wide {
                     asked = self.buttons(ui).or(asked);
@@ -84,9 +84,9 @@ impl Colorbar<'_> {
                         egui::containers::menu::MenuButton::from_button(more).ui(ui, |ui| self.buttons(ui));
                     let more = more.accessible_name(format!("{}: more", self.label));
                     more.on_hover_text(if self.locked == Some(false) {
-                        "Range: unlocked"
+                        "Range: not kept"
                     } else {
-                        "Range: automatic, lock"
+                        "Range: automatic, keep"
                     });
                     asked = inner.and_then(|i| i.inner).or(asked);
                 }
@@ -106,13 +106,13 @@ impl Colorbar<'_> {
 
     fn buttons(&self, ui: &mut Ui) -> Option<ColorbarChange> {
         let mut asked = None;
-        let auto = ui.add(egui::Button::new(egui::RichText::new("Auto").size(SMALL)).min_size(vec2(32.0, 18.0)));
+        let auto = ui.add(egui::Button::new(egui::RichText::new("Fit").size(SMALL)).min_size(vec2(32.0, 18.0)));
         let auto = auto.accessible_name(format!("{}: set from what is shown", self.label));
         if auto.on_hover_text(&self.tips[0]).clicked() {
             asked = Some(ColorbarChange::Auto);
         }
         if let Some(locked) = self.locked {
-            let text = egui::RichText::new("Lock").size(SMALL);
+            let text = egui::RichText::new("Keep").size(SMALL);
             let lock = ui.add(egui::Button::selectable(locked, text).min_size(vec2(32.0, 18.0)));
             let lock = lock.accessible_name(format!("{}: lock", self.label));
             if lock.on_hover_text(&self.tips[1]).clicked() {

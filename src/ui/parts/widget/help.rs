@@ -15,10 +15,10 @@ pub(crate) const IMAGE: &[(&str, &str)] = &[
 
 /// Controls of the comparison of any two imprints.
 pub(crate) const VERSUS: &[(&str, &str)] = &[
-    ("Click on A or B", "choose what it is"),
+    ("Click on A or B", "choose what to compare"),
     ("[[swap_compared]]", "swap A and B"),
     ("[[compare_mode]]", "side by side, wipe, difference, 3D"),
-    ("Hold F", "B in the place of A"),
+    ("Hold F", "show B instead of A"),
     ("Drag the line", "wipe"),
     ("Hover", "both values and their difference, in the status bar"),
     ("Wheel, drag, double-click", "zoom, move, fit; in 3D zoom, orbit, fit"),
@@ -44,8 +44,8 @@ pub(crate) const SCENE: &[(&str, &str)] = &[
     ("Hover", "cross-hair in the images"),
     ("Click a point", "read it, or measure with [[measure_distance]] (mm) and [[measure_angle]] (angle)"),
     ("[[pose_tool]]", "pose tool: keys or handles; [[accept]] accepts, [[cancel_jobs]] reverts"),
-    ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other paints"),
-    ("[[window_only]], [[parallel]]", "GelSlim's window only, parallel lines"),
+    ("[[distances]], [[next_layer]]", "distance to the CAD in mm; other colorings"),
+    ("[[window_only]], [[parallel]]", "GelSlim window only, parallel projection"),
     ("Click on the colored dots", "legend: show or hide, color, size, opacity"),
 ];
 
@@ -56,7 +56,7 @@ pub(crate) const STEPS: &[(&str, &str)] = &[
     ("[[step_back]] and [[step_forward]]", "previous and next step"),
     ("[[first_step]] and [[last_step]]", "first and last step"),
     ("[[play_steps]]", "play or pause, also over a 3D view"),
-    ("[[pin_step]]", "pin the step for comparison"),
+    ("[[pin_step]]", "keep the step to compare others with it"),
 ];
 
 /// The list of `controls`, with their keys.

@@ -29,9 +29,9 @@ pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
 fn content(cx: &mut Cx<'_>, ui: &mut egui::Ui, form: &ImportForm) {
     ui.add(egui::Label::new(caption(form.from.display().to_string(), cx.p)).wrap());
     let mut over_drawn = form.over_drawn;
-    let tip = "Else pixels that a person painted stay, and so do the masks of pairs marked \"done\", \"flagged\" or \
-               \"skip\". Undo brings back what was, pair by pair";
-    let tick = ui.checkbox(&mut over_drawn, "over hand work and judged pairs").on_hover_text(tip);
+    let tip = "Off: hand-drawn pixels stay, and so do the masks of pairs that are done, flagged or skipped. Can be undone, \
+               pair by pair";
+    let tick = ui.checkbox(&mut over_drawn, "also replace hand-drawn masks and reviewed pairs").on_hover_text(tip);
     if tick.changed() {
         cx.push(ExportCommand::ImportOverHand(over_drawn));
     }
@@ -39,7 +39,7 @@ fn content(cx: &mut Cx<'_>, ui: &mut egui::Ui, form: &ImportForm) {
     let ready = plan(cx, ui);
     ui.horizontal(|ui| {
         let import = ui.add_enabled(ready, egui::Button::new("Import")).accessible_name("Import these masks");
-        let tip = "Makes them the masks of their measured imprints. No pair is marked: each is still to be looked at";
+        let tip = "Makes them the masks of the measured imprints. No pair is marked done";
         if import.on_hover_text(tip).clicked() {
             cx.push(ExportCommand::Import);
         }
@@ -57,7 +57,7 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
     };
     match cx.state.look(key) {
         Lookup::Ready(plan) | Lookup::Stale(plan) => {
-            line(format!("Form of the masks: {}", plan.format.name()), cx.p.text);
+            line(format!("Format: {}", plan.format.name()), cx.p.text);
             plan.lines().into_iter().for_each(|text| line(text, cx.p.text));
             if plan.total() == 0 {
                 line("Nothing would change.".into(), cx.p.caution);
@@ -69,7 +69,7 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
             false
         }
         Lookup::Waiting | Lookup::Absent(_) => {
-            line("The masks are being read…".into(), cx.p.weak);
+            line("Reading the masks…".into(), cx.p.weak);
             false
         }
     }

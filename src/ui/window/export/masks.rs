@@ -31,7 +31,7 @@ pub(crate) fn form(cx: &mut Cx<'_>, ctx: &egui::Context) {
             let write = ui.add_enabled(ready, egui::Button::new("Choose folder…"));
             let write = write.accessible_name("Choose the folder of the export");
             let tip = format!(
-                "An empty or new folder, or a previous export. {}. What was written is read back and checked.",
+                "A new or empty folder, or a previous export. {}. Everything written is read back and checked.",
                 choice.format.text()
             );
             if write.on_hover_text(tip).clicked() {
@@ -55,33 +55,33 @@ fn choices(cx: &Cx<'_>, ui: &mut egui::Ui, choice: &mut ExportChoice) {
         ui.label(caption("Masks", cx.p));
         for (which, text, tip) in [
             (Which::Done, "done", "Pairs marked \"done\" that have a mask drawn by hand"),
-            (Which::Begun, "done and in progress", "Those, and pairs whose mask was begun"),
+            (Which::Begun, "done and in progress", "Also pairs whose mask was begun"),
         ] {
             let radio = ui.radio(choice.which == which, text);
-            if radio.on_hover_text(format!("{tip}. Skipped and flagged pairs never go along")).clicked() {
+            if radio.on_hover_text(format!("{tip}. Never skipped or flagged pairs")).clicked() {
                 choice.which = which;
             }
         }
     });
     ui.horizontal(|ui| {
-        ui.label(caption("Form", cx.p));
+        ui.label(caption("Format", cx.p));
         for format in Format::iter() {
             if ui.radio(choice.format == format, format.name()).on_hover_text(format.text()).clicked() {
                 choice.format = format;
             }
         }
     });
-    let tip = "Else pairs that the data set keeps for tests (test_only) go to test, so that no score is of what was \
-               trained on";
-    ui.checkbox(&mut choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
-    let tip = "A score on tools that were not trained on. Else each pair goes to a part by itself";
-    ui.checkbox(&mut choice.by_tool, "all pairs of a tool in the same part").on_hover_text(tip);
-    let tip = "All other pixels are ignored: they are written beside the masks as pixels of which these say nothing";
+    let tip =
+        "Off: pairs reserved for tests (test_only) go to test, so that no model is scored on what it was trained on";
+    ui.checkbox(&mut choice.test_in_train, "train on pairs reserved for tests").on_hover_text(tip);
+    let tip = "So that scores are on tools the model was not trained on. Off: pairs are split one by one";
+    ui.checkbox(&mut choice.by_tool, "keep each tool in one split").on_hover_text(tip);
+    let tip = "All other pixels are written as ignored";
     ui.checkbox(&mut choice.manual_checked, "only pixels painted by hand").on_hover_text(tip);
     ui.horizontal(|ui| {
-        ui.label(caption("Seed of the division", cx.p));
-        let drag = ui.add(DragValue::new(&mut choice.seed).range(0..=999_999)).accessible_name("Seed of the division");
-        drag.on_hover_text("The same seed sends the same pairs to the same parts, whatever is added later");
+        ui.label(caption("Split seed", cx.p));
+        let drag = ui.add(DragValue::new(&mut choice.seed).range(0..=999_999)).accessible_name("Split seed");
+        drag.on_hover_text("The same seed always gives the same split, also when pairs are added");
     });
 }
 
@@ -94,7 +94,7 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
                 ui.add(egui::Label::new(RichText::new(line).size(12.0).color(cx.p.text)).wrap());
             }
             if plan.total() == 0 {
-                let what = "Nothing to write yet: correct a mask and mark its pair \"done\" (Enter).";
+                let what = "Nothing to write yet: edit a mask and mark its pair done (Ctrl+Enter).";
                 ui.label(RichText::new(what).size(12.0).color(cx.p.caution));
             }
             plan.total() > 0

@@ -50,7 +50,7 @@ pub(crate) fn sheet(cx: &mut Cx<'_>, ctx: &egui::Context, memory: &mut Memory) {
             if first {
                 edit.request_focus();
             }
-            edit.on_hover_text("A name, another word for it, or a key such as Ctrl+J");
+            edit.on_hover_text("A name or a key such as Ctrl+J");
             ui.with_layout(Layout::right_to_left(egui::Align::Center), |ui| {
                 if ui.button("Close").on_hover_text("Esc").clicked() {
                     cx.push(ViewCommand::SetShortcutSheet(false));
@@ -93,7 +93,7 @@ fn body(cx: &Cx<'_>, ui: &mut Ui, memory: &Memory) {
     }
     parts.retain(|(_, actions)| !actions.is_empty());
     if parts.is_empty() {
-        ui.label(caption("Nothing fits", cx.p));
+        ui.label(caption("No match", cx.p));
         return;
     }
     let columns = ((ui.available_width() / COLUMN) as usize).clamp(1, 3);
