@@ -10,7 +10,7 @@ use touch2touch_pipeline::steps::recipe::{Model, Recipe};
 /// # Errors
 /// Why the source that the settings ask for cannot give one.
 pub(crate) fn automatic_mask(state: &State) -> Result<MaskRecipe, Absent> {
-    in_force(state, ImprintSource::Measured).mask_recipe().map_err(|_| Absent::NoMaskModel)
+    in_force(state, ImprintSource::Measured).mask_recipe(&state.rig()).map_err(|_| Absent::NoMaskModel)
 }
 
 /// The recipe that the settings give a touch; `None` without a generator.

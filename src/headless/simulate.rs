@@ -13,7 +13,7 @@ use super::args::{at_least_one, keyed};
 use super::{Common, Output, VerbResult};
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::sim::{self, Condition, Fault, Sensors};
-use touch2touch_pipeline::io::simulated::{Layout, Writing};
+use touch2touch_pipeline::io::simulated::{Depths, Layout, Writing, write_depths};
 
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
@@ -48,8 +48,9 @@ pub(super) struct SimulateArgs {
     /// millimeters) instead: to learn what each looks like in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed", "sensors", "gelslims"])]
     faults: bool,
-    /// Part of the lab's layout that it is written as: `train/...`, `test/test_only/...` or `test/train_only/...`.
-    #[arg(long, value_parser = keyed::<Layout>(), default_value = "test")]
+    /// Part of the lab's layout that it is written as: `train/...`, `test/test_only/...` or `test/train_only/...`; or its other
+    /// form, `<tool>.pt` with GelSlims and the depth of their own gel.
+    #[arg(long, visible_alias = "form", value_parser = keyed::<Layout>(), default_value = "test")]
     part: Layout,
     #[command(flatten)]
     common: Common,
@@ -74,6 +75,10 @@ struct Written {
 }
 
 pub(super) fn run(args: &SimulateArgs) -> VerbResult {
+    let own_depth = args.part == Layout::GelslimDepth;
+    if own_depth && (args.faults || args.test_set || args.condition != Condition::Plain) {
+        anyhow::bail!("the form gelslim-depth has neither --faults nor --test-set nor --condition");
+    }
     if args.faults {
         return write_faults(args);
     }
@@ -103,6 +108,7 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
     }
     let writing = Writing::begin(&args.out, args.part, &tools, pairs, recipe)?;
     for (t, tool) in chosen.iter().enumerate() {
+        let mut depths = Depths::default();
         for g in 0..grasps {
             let touched = args.condition.tool(tool, g);
             let (grasp, seed) = if args.test_set {
@@ -113,9 +119,16 @@ pub(super) fn run(args: &SimulateArgs) -> VerbResult {
                 let seed = args.seed.wrapping_mul(1_000_003) ^ ((t as u64) << 32) ^ g;
                 (sim::random_grasp(seed), seed)
             };
-            let sample = args.condition.simulate(&touched, grasp, seed, &config);
-            writing.pair(&touched.name, g, &sample)?;
+            if own_depth {
+                depths.push(tool, grasp, seed, &config);
+            } else {
+                let sample = args.condition.simulate(&touched, grasp, seed, &config);
+                writing.pair(&touched.name, g, &sample)?;
+            }
             output.step(&touched.name);
+        }
+        if own_depth {
+            write_depths(&args.out, &tool.name, depths)?;
         }
     }
     writing.finish()?;

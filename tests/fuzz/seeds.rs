@@ -172,6 +172,60 @@ pub(super) fn gelslim() -> Vec<Seed> {
     ]
 }
 
+/// Files of the depth data set with one touch.
+pub(super) fn gelslim_depth() -> Vec<Seed> {
+    let picture = |n: usize| PtItem::from(Tensor::u8(&[n, 6, 320, 427], vec![9; n * 6 * 320 * 427]));
+    let whole = |depths: PtItem, pose: PtItem| {
+        dict(&[
+            ("tactile_image", picture(1)),
+            ("base_tactile_image", picture(1)),
+            ("depth_images", depths),
+            ("in_hand_pose", pose),
+            ("grasp_widths", Tensor::f32(&[1], vec![12.0]).into()),
+        ])
+    };
+    let (depths, pose) = (|| zeros(&[1, 2, 320, 427]), || zeros(&[1, 3]));
+    vec![
+        good("a touch", whole(depths(), pose())),
+        bad("other depths", whole(zeros(&[1, 2, 4, 4]), pose()), "expected [1, 2, 320, 427]"),
+        bad("too many poses", whole(depths(), zeros(&[2, 3])), "expected [1, 3]"),
+        bad("empty", text(""), "empty"),
+    ]
+}
+
+/// Imprints as numpy's arrays.
+pub(super) fn depth_arrays() -> Vec<Seed> {
+    let zeros = vec![0; 4 * 140 * 175];
+    vec![
+        good("an imprint", Content::Raw(npy("140, 175", &zeros))),
+        bad("another size", Content::Raw(npy("2, 3", &zeros[..24])), "3 x 2 values"),
+        bad("a bomb", Content::Raw(npy("100000, 100000", &zeros[..24])), "do not fit"),
+        bad("empty", text(""), "cut off"),
+    ]
+}
+
+/// Imprints as TIFF files.
+pub(super) fn depth_tiffs() -> Vec<Seed> {
+    let tiff = |width: u32, height: u32, compression: u32, data: &[u8]| {
+        let properties =
+            [(256, width), (257, height), (258, 32), (259, compression), (273, 98), (279, data.len() as u32), (339, 3)];
+        // The list is 8 + 2 + 7 * 12 + 4 = 98 bytes long; the values follow.
+        let entry = |(tag, value): (u16, u32)| {
+            [&tag.to_le_bytes()[..], &4u16.to_le_bytes(), &1u32.to_le_bytes(), &value.to_le_bytes()].concat()
+        };
+        let list: Vec<u8> = properties.into_iter().flat_map(entry).collect();
+        Content::Raw([b"II\x2a\0\x08\0\0\0\x07\0", &list[..], &[0; 4], data].concat())
+    };
+    let zeros = vec![0; 4 * 140 * 175];
+    vec![
+        good("an imprint", tiff(175, 140, 1, &zeros)),
+        bad("another size", tiff(3, 2, 1, &zeros[..24]), "3 x 2 values"),
+        bad("too large", tiff(100_000, 100_000, 1, &zeros[..24]), "100000 x 100000"),
+        bad("compressed", tiff(175, 140, 5, &zeros), "compressed"),
+        bad("cut off", tiff(175, 140, 1, &zeros[..24]), "cut off"),
+    ]
+}
+
 /// An array file with this header.
 fn npy(shape: &str, data: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': '<f4', 'fortran_order': True, 'shape': ({shape}), }}\n");

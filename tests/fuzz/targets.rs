@@ -76,6 +76,36 @@ pub(super) fn all() -> Vec<Target> {
             read_pair,
         ),
         target(
+            "gelslim depth",
+            PT_MIB,
+            seeds::gelslim_depth(),
+            |dir, bytes| put(dir.join("rod.pt"), bytes),
+            |dir, file| {
+                let dataset = Dataset::open(dir).map_err(|err| format!("{err}: {}", file.display()))?;
+                if dataset.index.pairs.is_empty() {
+                    return Err(dataset
+                        .problems
+                        .first()
+                        .map_or_else(|| file.display().to_string(), |p| p.what.clone()));
+                }
+                dataset.load(PairId(0)).map(drop).map_err(said)
+            },
+        ),
+        target(
+            "depth array",
+            NPZ_MIB,
+            seeds::depth_arrays(),
+            |dir, bytes| beside(dir, "a_bubble.npy", bytes),
+            read_pair,
+        ),
+        target(
+            "depth tiff",
+            PICTURE_MIB,
+            seeds::depth_tiffs(),
+            |dir, bytes| beside(dir, "a_bubble.tif", bytes),
+            read_pair,
+        ),
+        target(
             "npz",
             NPZ_MIB,
             seeds::npz(),
@@ -124,6 +154,13 @@ pub(super) fn all() -> Vec<Target> {
             |_, file| ShiftStatistics::read(file).map(drop).map_err(said),
         ),
     ]
+}
+
+/// Puts a depth beside a picture of the same touch.
+fn beside(dir: &Path, name: &str, bytes: &[u8]) -> PathBuf {
+    let picture = Grid::from_fn(32, 32, |x, y| [120.0, (x * 7 % 250) as f32, (y * 5 % 250) as f32]);
+    images::write_rgb8(&dir.join("a_gelslim.png"), &picture).unwrap();
+    put(dir.join(name), bytes)
 }
 
 fn read_pt(_: &Path, file: &Path) -> Outcome {

@@ -12,6 +12,7 @@ use super::cloud::{self, CloudError};
 use super::frames::PlanarPose;
 use super::grid::{DepthMap, Grid, Mask};
 use super::mesh::MeshDistance;
+use super::rig::Rig;
 use super::sample::DepthCamera;
 use super::units::text_mm;
 
@@ -108,7 +109,16 @@ pub fn without_grain(imprint: &DepthMap, radius_px: usize) -> DepthMap {
 }
 
 /// An imprint that rises less than this holds no contact: a bubble that is touched at all gives way by more.
-pub const FLAT_M: f32 = 0.000_5;
+const FLAT_M: f32 = 0.000_5;
+/// The same of a gel, which has no air to give way.
+const GEL_FLAT_M: f32 = 0.000_05;
+/// Depth from which on a gel is taken to be in contact, meters, where nobody says another.
+pub const GEL_CONTACT_M: f32 = 0.000_1;
+
+/// Rise below which an imprint of this rig's depth sensor holds no contact, meters.
+pub fn flat_m(rig: &Rig) -> f32 {
+    if rig.is_gel() { GEL_FLAT_M } else { FLAT_M }
+}
 /// An imprint that rises by this holds contact somewhere, whatever a model says.
 pub(crate) const CLEAR_M: f32 = 0.002;
 /// Contact by depth alone: what is pushed in by more than this share of the imprint's rise.
@@ -173,9 +183,9 @@ impl MaskBasis {
     }
 }
 
-/// A mask with the last word on it: a flat imprint has no contact, whatever the mask's source.
-pub fn settled(imprint: &DepthMap, mask: Mask) -> ContactMask {
-    if rise(imprint) >= FLAT_M {
+/// A mask with the last word on it: an imprint that rises less than `flat_m` has no contact, whatever the mask's source.
+pub fn settled(imprint: &DepthMap, mask: Mask, flat_m: f32) -> ContactMask {
+    if rise(imprint) >= flat_m {
         return ContactMask { mask: Arc::new(mask), basis: MaskBasis::Source, unsure: None };
     }
     let mask = Arc::new(Mask::filled(imprint.width(), imprint.height(), false));
@@ -191,7 +201,7 @@ pub fn settled_model(imprint: &DepthMap, mask: Mask) -> ContactMask {
             let mask = Arc::new(threshold(imprint, min_m));
             ContactMask { mask, basis: MaskBasis::Depth(min_m), unsure: None }
         }
-        _ => settled(imprint, mask),
+        _ => settled(imprint, mask, FLAT_M),
     }
 }
 
@@ -292,14 +302,14 @@ mod tests {
         // A ramp of 12 mm, as a bubble that is held askew gives.
         let ramp = DepthMap::from_fn(175, 140, |x, y| 0.012 * (x as f32 / 349.0 + y as f32 / 279.0) + noise[(x, y)]);
         for flat in [DepthMap::filled(175, 140, 0.0), DepthMap::filled(175, 140, 0.004), bump(0.001, 0.0), dots, ramp] {
-            for contact in [settled(&flat, all.clone()), settled_model(&flat, all.clone())] {
+            for contact in [settled(&flat, all.clone(), FLAT_M), settled_model(&flat, all.clone())] {
                 assert_eq!((count(&contact.mask), contact.basis), (0, MaskBasis::Flat), "{}", rise(&flat));
             }
         }
         for none in [DepthMap::filled(175, 140, f32::NAN), DepthMap::filled(0, 0, 0.0)] {
-            assert_eq!(settled(&none, Mask::filled(none.width(), none.height(), true)).basis, MaskBasis::Flat);
+            assert_eq!(settled(&none, Mask::filled(none.width(), none.height(), true), FLAT_M).basis, MaskBasis::Flat);
         }
-        let deep = settled(&bump(0.0, 0.008), all.clone());
+        let deep = settled(&bump(0.0, 0.008), all.clone(), FLAT_M);
         assert_eq!((&*deep.mask, deep.basis), (&all, MaskBasis::Source));
     }
 

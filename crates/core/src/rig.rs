@@ -207,6 +207,12 @@ impl Rig {
         self.pads().find(|other| *other != pad)
     }
 
+    /// True where the depth sensor sees a gel, whose depth follows the tool pixel by pixel, and no membrane, which spans
+    /// between the parts that lift it: told by the key of the lab's own ([`lab::GELSLIM_DEPTH`]).
+    pub fn is_gel(&self) -> bool {
+        self.depth().is_some_and(|sensor| sensor.key == lab::GELSLIM_DEPTH.key)
+    }
+
     /// Pixels to the millimeter of depth images; NaN where there is no such sensor, so that a size in millimeters says nothing.
     pub fn depth_px_per_mm(&self) -> f64 {
         self.depth().map_or(f64::NAN, |sensor| sensor.px_per_m * 1e-3)

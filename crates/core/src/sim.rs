@@ -23,7 +23,7 @@ mod membrane;
 mod rig;
 mod sheet;
 
-use glam::{DAffine3, DQuat, DVec3};
+use glam::{DAffine3, DQuat, DVec2, DVec3};
 
 pub use condition::{Condition, TEST_GRASPS, test_grasp};
 pub(crate) use config::GelSlimConfig;
@@ -37,6 +37,7 @@ pub(crate) use rig::INTRINSICS;
 pub use rig::{RANGE_M, gelslim_yz, grasp_from_camera, outward};
 
 use super::catalog::ToolSpec;
+use super::grid::{DepthMap, Grid};
 use super::noise::{Noise, Stream};
 use super::rig::{PadId, lab};
 use super::sample::{DepthCamera, DepthTouch, DepthTruth, PadTouch, Sample};
@@ -67,6 +68,23 @@ pub(crate) fn simulate_apart(
         Some(felt.with(lab::BUBBLE_ID, Some(bubble_touch(&config.bubble, tool, &membrane, finger, seed))))
     });
     Sample { pads: pads.into(), grasp_from_object: Some(bubbles.inverse()), ..Sample::default() }
+}
+
+/// Depth that a tool is pressed into a gel in [`gelslim_depth`], meters.
+pub const GEL_PRESS_M: f64 = 0.001;
+
+/// How far a tool held at `grasp` comes into a finger's gel, meters, pixel by pixel of the GelSlim's own depth
+/// ([`lab::GELSLIM_DEPTH`]): from its shape alone, as the lab made the depths of its data set. It is pressed in by
+/// [`GEL_PRESS_M`].
+pub fn gelslim_depth(tool: &ToolSpec, grasp: Grasp, finger: PadId) -> DepthMap {
+    let (solid, object_from_grasp, sensor) = (tool.solid(), grasp.object_from_grasp(), &lab::GELSLIM_DEPTH);
+    let (gel_m, middle) =
+        (tool.half_thickness_m - GEL_PRESS_M, DVec2::from_array(sensor.size().map(|n| 0.5 * n as f64)));
+    Grid::from_fn(sensor.width, sensor.height, |x, y| {
+        let flat = (DVec2::new(x as f64, y as f64) - middle) / sensor.px_per_m;
+        let height = solid.height(object_from_grasp.transform_yz(gelslim_yz(finger, flat)));
+        height.map_or(0.0, |height| (height - gel_m).max(0.0) as f32)
+    })
 }
 
 /// The nominal depth camera of a finger as it looks at one of the lab's tools, with the depth of the free membrane.

@@ -26,3 +26,4 @@ pub mod simulated;
 pub(crate) mod staging;
 pub mod statistics;
 pub mod stl;
+pub(crate) mod tiff;

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use super::poses::{Models, Registered};
 use super::{Cause, Doubt, PairInput, imprints};
-use crate::contact::{FLAT_M, rise};
+use crate::contact::{flat_m, rise};
 use crate::mesh::TriMesh;
 use crate::rig::PadId;
 use crate::sample::Sample;
@@ -41,8 +41,11 @@ impl Alone {
 
     /// Pairs in which it felt something.
     fn touched(&self) -> usize {
-        let imprints = self.samples.iter().filter_map(|sample| Some(&sample.pad(self.pad)?.depth()?.imprint));
-        imprints.filter(|imprint| rise(imprint) >= FLAT_M).count()
+        let rises = |sample: &&Sample| {
+            let imprint = sample.pad(self.pad).and_then(|touch| Some(&touch.depth()?.imprint));
+            imprint.is_some_and(|imprint| rise(imprint) >= flat_m(&sample.rig))
+        };
+        self.samples.iter().filter(rises).count()
     }
 
     fn is_at_least(&self, share: f64) -> bool {

@@ -48,6 +48,18 @@ pub static BUBBLE: Sensor = Sensor {
     rotation_deg: 180,
 };
 
+/// The depth of a GelSlim's own gel, pixel by pixel as in its picture: what the lab's depth data set holds.
+pub static GELSLIM_DEPTH: Sensor = Sensor {
+    key: Cow::Borrowed("gelslimdepth"),
+    name: Cow::Borrowed("GelSlim depth"),
+    kind: SensorKind::Depth,
+    width: GELSLIM.width,
+    height: GELSLIM.height,
+    px_per_m: GELSLIM.px_per_m,
+    crop: GELSLIM.crop,
+    rotation_deg: 0,
+};
+
 /// Centers of what the GelSlims see, in raw bubble pixels: right, left. Measured on published pairs by registering the bead in
 /// the GelSlim's picture and the crests of the imprint to the same tool, good to half a pixel.
 ///
@@ -57,13 +69,30 @@ const WINDOW_CENTERS_PX: [[f64; 2]; 2] = [[64.5, 71.6], [74.8, 73.4]];
 
 /// The whole rig; the windows are as large as the GelSlim's view (18.0 x 13.5 mm) at the bubble's scale.
 pub(super) fn rig() -> Rig {
-    let pad = |key, name| Pad { key: Cow::Borrowed(key), name: Cow::Borrowed(name) };
     let size_px = GELSLIM.size().map(|side| side as f64 / GELSLIM.px_per_m * BUBBLE.px_per_m);
     let window = |pad, center_px| Window { pad, of: GELSLIM_ID, within: BUBBLE_ID, center_px, size_px };
     Rig {
         name: Cow::Borrowed("GelSlim and Soft Bubble"),
         sensors: vec![GELSLIM.clone(), BUBBLE.clone()],
-        pads: vec![pad("right", "Right"), pad("left", "Left")],
+        pads: pads(),
         windows: vec![window(RIGHT, WINDOW_CENTERS_PX[0]), window(LEFT, WINDOW_CENTERS_PX[1])],
     }
+}
+
+/// The rig of the lab's depth data set: a GelSlim with its own depth on either finger.
+pub fn depth_rig() -> Rig {
+    let [width, height] = GELSLIM.size().map(|side| side as f64);
+    let (center_px, size_px) = ([0.5 * (width - 1.0), 0.5 * (height - 1.0)], [width, height]);
+    let window = |pad| Window { pad, of: GELSLIM_ID, within: SensorId(1), center_px, size_px };
+    Rig {
+        name: Cow::Borrowed("GelSlim with its depth"),
+        sensors: vec![GELSLIM.clone(), GELSLIM_DEPTH.clone()],
+        pads: pads(),
+        windows: PADS.map(window).to_vec(),
+    }
+}
+
+fn pads() -> Vec<Pad> {
+    let pad = |key, name| Pad { key: Cow::Borrowed(key), name: Cow::Borrowed(name) };
+    vec![pad("right", "Right"), pad("left", "Left")]
 }

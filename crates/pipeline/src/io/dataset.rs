@@ -1,6 +1,6 @@
-//! [`Dataset`]: one index over three kinds of source. Opening reads names only; samples load one by one.
+//! [`Dataset`]: one index over the kinds of source. Opening reads names only; samples load one by one.
 //!
-//! * the lab's folders of `.pt` files (the submodule `lab`),
+//! * the lab's folders of `.pt` files (the submodule `lab`), and its depth data set (the submodule `depths`),
 //! * a folder of pictures `NAME_gelslim.png`, with or without `NAME_bubble.png`, or of camera images `NAME_touch.png`
 //!   with `NAME_reference.png` (the submodule `pictures`),
 //! * the built-in data sets (the demo and the test sets), rendered by the simulator.
@@ -9,12 +9,15 @@
 
 mod built_in;
 mod cad;
+mod depths;
 mod error;
 mod grow;
 mod lab;
+mod other;
 mod pictures;
 mod plausible;
 mod read_as;
+mod rig_json;
 mod tool_scale;
 
 use std::collections::BTreeMap;
@@ -35,8 +38,8 @@ use super::stl::MeshError;
 pub use built_in::BuiltIn;
 pub use error::{LoadError, OpenError};
 pub(crate) use pictures::{ASSUMED_IMPRINT_RANGE_M, assumed_meters, imprint_from_tile};
-pub use pictures::{RIG_JSON, rig_of};
 pub use read_as::{READ_AS_FILE, write_read_as};
+pub use rig_json::{RIG_JSON, rig_of};
 pub(crate) use tool_scale::ToolFile;
 pub use tool_scale::{ToolScale, ToolUnit, UNIT_FILE, read_in_meters};
 pub(crate) use tool_scale::{read_tool, said_beside, tool_size, write_beside};
@@ -122,6 +125,7 @@ pub struct Dataset {
 #[derive(Clone, Debug)]
 enum Source {
     Lab(lab::Lab),
+    Depths(depths::Depths),
     Pictures(pictures::Pictures),
     BuiltIn(BuiltIn),
 }
@@ -152,17 +156,24 @@ impl Dataset {
         }
         // Absolute, so that masks are found again from every working directory.
         let absolute = path.canonicalize().map_err(io)?;
-        let folder = if absolute.is_dir() { absolute } else { absolute.parent().unwrap_or(&absolute).to_owned() };
+        let folder = if absolute.is_dir() { absolute.as_path() } else { absolute.parent().unwrap_or(&absolute) };
+        let folder = folder.to_owned();
         drop(std::fs::read_dir(&folder).map_err(io)?);
         let found = match lab::scan(&folder) {
             Some(scan) => Some(scan),
-            None => match pictures::scan(&folder)?.or_else(|| lab::scan_flat(&folder)) {
+            None => match pictures::scan(&folder)? {
                 Some(scan) => Some(scan),
-                None => pictures::scan_folders(&folder)?,
+                None => match depths::scan(&folder)?.or_else(|| lab::scan_flat(&folder)) {
+                    Some(scan) => Some(scan),
+                    None => pictures::scan_folders(&folder)?,
+                },
             },
         };
-        let mut scan = found.ok_or_else(|| OpenError::NothingFound { path: path.to_owned() })?;
-        if *rig_of(&scan.root)? != *scan.rig {
+        let mut scan = found.ok_or_else(|| OpenError::NothingFound {
+            path: path.to_owned(),
+            instead: other::kind(&absolute, &folder),
+        })?;
+        if scan.kind == SourceKind::Lab && *scan.rig == *Rig::lab() && *rig_of(&scan.root)? != *scan.rig {
             let what = format!("{RIG_JSON} declares other sensors, but .pt files are always read as the lab's");
             scan.problems.push(problem(scan.root.join(RIG_JSON), what, "remove it, or save the touches as pictures"));
         }
@@ -235,6 +246,11 @@ impl Dataset {
         self.caught(id, || {
             let mut loaded = match &self.source {
                 Source::Lab(lab) => lab.load(id)?,
+                Source::Depths(depths) => {
+                    let mut loaded = depths.load(id)?;
+                    self.read_otherwise(&mut loaded.sample);
+                    return Ok(loaded);
+                }
                 Source::Pictures(pictures) => pictures.load(id)?,
                 Source::BuiltIn(set) => {
                     let mut sample = set.load(id).ok_or(LoadError::NoSuchPair { id })?;
@@ -272,7 +288,7 @@ impl Dataset {
     pub(crate) fn tool_with_notes(&self, tool: &str) -> Result<Option<ToolFile>, MeshError> {
         match (self.tool_mesh_file(tool), &self.source) {
             (Some(path), _) => read_tool(path, self.scale_of(tool)).map(Some),
-            (None, Source::Lab(_)) => Ok(None),
+            (None, Source::Lab(_) | Source::Depths(_)) => Ok(None),
             (None, Source::Pictures(_) | Source::BuiltIn(_)) => {
                 Ok(built_in::mesh(tool).map(|mesh| ToolFile { mesh, notes: Vec::new() }))
             }
@@ -294,6 +310,7 @@ impl Dataset {
     pub fn tool_mesh_file(&self, tool: &str) -> Option<&Path> {
         match &self.source {
             Source::Lab(lab) => lab.meshes.get(tool).map(PathBuf::as_path),
+            Source::Depths(depths) => depths.meshes.get(tool).map(PathBuf::as_path),
             Source::Pictures(pictures) => pictures.meshes.get(tool).map(PathBuf::as_path),
             Source::BuiltIn(_) => None,
         }
@@ -303,6 +320,7 @@ impl Dataset {
     pub fn pair_files(&self, id: PairId) -> Vec<PathBuf> {
         match &self.source {
             Source::Lab(lab) => lab.files(id),
+            Source::Depths(depths) => depths.files(id),
             Source::Pictures(pictures) => pictures.files(id),
             Source::BuiltIn(_) => Vec::new(),
         }
@@ -319,7 +337,7 @@ impl Dataset {
                 let tile = pictures.tile(id, pictures::BUBBLE, laid)?;
                 Ok(tile.map(|tile| self.lays().fold(tile, |tile, lay| lay.apply(&tile))))
             }),
-            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 
@@ -331,7 +349,7 @@ impl Dataset {
     pub fn vqvae_tile(&self, id: PairId, laid: Turn) -> Result<Option<Grid<f32>>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => self.caught(id, || pictures.tile(id, pictures::VQVAE, laid)),
-            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 
@@ -342,7 +360,7 @@ impl Dataset {
     pub fn gelslim_is_clipped(&self, id: PairId) -> Result<Option<bool>, LoadError> {
         match &self.source {
             Source::Pictures(pictures) => self.caught(id, || pictures.is_clipped(id)),
-            Source::Lab(_) | Source::BuiltIn(_) => Ok(None),
+            Source::Lab(_) | Source::Depths(_) | Source::BuiltIn(_) => Ok(None),
         }
     }
 

@@ -6,6 +6,7 @@
 
 mod budget;
 mod error;
+mod rows;
 mod write;
 
 use std::io::{Read as _, Seek as _};
@@ -14,6 +15,7 @@ use std::path::{Path, PathBuf};
 use pytorch_reader::{DType, PickleValue, PytorchError, PytorchReader};
 
 pub use error::PtError;
+pub(crate) use rows::Rows;
 pub use write::{PtItem, write_dict};
 
 use super::files::{self, clip};
@@ -154,7 +156,7 @@ impl PtDict {
     /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
     pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
         let Some(tensor) = self.reader.get(key) else { return self.plain_number(key) };
-        let bad = |reason: String| PtError::BadStorage { file: self.file.clone(), key: key.into(), reason };
+        let bad = |reason: String| self.bad(key, reason);
         // A view can repeat one value of the file for ever.
         if tensor.shape().iter().fold(1usize, |product, &n| product.saturating_mul(n)) > MAX_VALUES {
             return Err(bad(format!("its shape {:?} has more than {MAX_VALUES} values", tensor.shape())));
@@ -211,6 +213,14 @@ impl PtDict {
                 Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found })
             }
         }
+    }
+
+    fn bad(&self, key: &str, reason: String) -> PtError {
+        PtError::BadStorage { file: self.file.clone(), key: key.into(), reason }
+    }
+
+    fn missing(&self, key: &str) -> PtError {
+        PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&self.keys().join(", ")) }
     }
 
     fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> PtError {

@@ -3,6 +3,7 @@
 //! Keys, shapes and element types are those of the released data set; `contact_mask` and `imprint_clean`, the
 //! simulator's truth, come on top.
 
+mod depths;
 mod manifest;
 
 use std::path::{Path, PathBuf};
@@ -17,6 +18,7 @@ use touch2touch_core::mesh::TriMesh;
 use touch2touch_core::rig::lab;
 use touch2touch_core::sample::Sample;
 
+pub use depths::{Depths, write_depths};
 pub use manifest::{MANIFEST, Writing, unfinished};
 
 /// Layout of the lab's that a simulated data set is written in.
@@ -29,6 +31,9 @@ pub enum Layout {
     Test,
     /// `test/train_only/{bubbles,gelslims}/<tool>_data_N.pt`: the grasps that shift statistics are taken from.
     TrainOnly,
+    /// `<tool>.pt`, all touches of a tool in one file: a GelSlim with its own depth.
+    #[strum(serialize = "gelslim-depth")]
+    GelslimDepth,
 }
 
 /// Why a touch cannot be written.
@@ -78,7 +83,7 @@ pub enum WriteError {
     },
 }
 
-/// The paths of one pair's GelSlim and bubble file.
+/// The paths of one pair's GelSlim and bubble file; of [`Layout::GelslimDepth`] the one file of its tool.
 pub fn pair_paths(root: &Path, layout: Layout, tool: &str, index: u64) -> [PathBuf; 2] {
     let in_group = |group: &str| {
         ["gelslims", "bubbles"].map(|sensor| root.join(group).join(sensor).join(format!("{tool}_data_{index}.pt")))
@@ -92,6 +97,7 @@ pub fn pair_paths(root: &Path, layout: Layout, tool: &str, index: u64) -> [PathB
             root.join("train").join(sensor).join("data").join(folder).join(format!("data_{index}.pt"))
         }),
         Layout::Test => in_group("test/test_only"),
+        Layout::GelslimDepth => [root.join(format!("{tool}.pt")), root.join(format!("{tool}.pt"))],
         Layout::TrainOnly => in_group("test/train_only"),
     }
 }

@@ -120,11 +120,11 @@ pub fn contact_points(
 }
 
 /// Views of the pads' depth cameras, for registrations that look at more than contact points. A pad without imprint or
-/// camera is left out.
+/// camera is left out, and a gel: what they look at is a membrane.
 pub fn images<'a>(sample: &'a Sample, imprints: &PerPad<&'a DepthMap>, source: ImprintSource) -> Vec<PadImage<'a>> {
     let predicted = source == ImprintSource::Predicted;
     let image = |pad| Some(PadImage { imprint: imprints[pad]?, camera: sample.pad(pad)?.camera()?, predicted });
-    sample.rig.pads().filter_map(image).collect()
+    sample.rig.pads().filter(|_| !sample.rig.is_gel()).filter_map(image).collect()
 }
 
 /// Pixels of a finger's imprint that are visible in a 3D picture that its mask is drawn on, with their places in it.

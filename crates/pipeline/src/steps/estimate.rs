@@ -105,7 +105,7 @@ impl Estimate {
         sample: &Sample,
     ) -> Result<Self, TaskError> {
         let recipe = Recipe { imprint, ..Recipe::default() };
-        let made_by = made_by.map_or_else(|| recipe.mask_recipe(), Ok)?;
+        let made_by = made_by.map_or_else(|| recipe.mask_recipe(&sample.rig), Ok)?;
         let contact = Contact { imprints, masks, recipe: made_by, model: None };
         Ok(Self {
             recipe,
@@ -299,7 +299,7 @@ impl Estimate {
     }
 
     fn masks(&mut self, touch: Touch<'_>, models: &Models) -> Result<Contact, TaskError> {
-        let made_by = self.recipe.mask_recipe()?;
+        let made_by = self.recipe.mask_recipe(&touch.sample.rig)?;
         let of = self.recipe.imprint_of();
         let inputs = self.mask_inputs(touch, &of);
         let (imprints, mut masks) = (self.imprints.clone(), PerPad::default());

@@ -22,8 +22,6 @@ use touch2touch_core::sample::{PadTouch, Sample};
 use touch2touch_core::units::text_mm;
 
 const WHAT: &str = "Contact mask";
-/// Depth by which a touch is pushed in at least, beyond what lies around it, meters.
-const FELT_M: f32 = 0.000_5;
 
 /// Source of a mask when nobody drew one.
 #[derive(
@@ -178,6 +176,14 @@ pub enum MaskRecipe {
 }
 
 impl MaskRecipe {
+    /// The recipe on touches of this rig: a gel gives way by a tenth of what a membrane does, so that the threshold that goes
+    /// without saying is its own.
+    #[must_use]
+    pub(super) fn on(self, rig: &Rig) -> Self {
+        let unsaid = self == Self::Threshold(MaskChoice::UNNAMED.threshold_m.into());
+        if unsaid && rig.is_gel() { Self::Threshold(contact::GEL_CONTACT_M.into()) } else { self }
+    }
+
     /// Provenance of the pixels of its masks; `model` is the mask model's name, and `basis` what a mask is made of in
     /// the end.
     pub fn provenance(&self, model: &str, basis: MaskBasis) -> Provenance {
@@ -288,7 +294,7 @@ fn without_model(
             let within_m = f64::from(limit_m.get());
             let mask = contact::cad_signed_distance(imprint, camera, &tool.distance, truth.inverse(), within_m)
                 .map_err(|err| TaskError::from_error(WHAT, &err))?;
-            felt(imprint, &mask)?;
+            felt(imprint, &mask, &inputs.sample.rig)?;
             mask
         }
         MaskRecipe::Truth => {
@@ -299,14 +305,15 @@ fn without_model(
         }
         MaskRecipe::Unet(..) => return Err(TaskError::new(WHAT, "the mask model is needed")),
     };
-    Ok(contact::settled(imprint, mask))
+    Ok(contact::settled(imprint, mask, contact::flat_m(&inputs.sample.rig)))
 }
 
 /// Refuses a mask of the CAD model at the true pose where nothing was felt: it would say the pose that it was made from.
-fn felt(imprint: &DepthMap, mask: &Mask) -> Result<(), TaskError> {
-    let above = contact::stands_out(imprint, mask).filter(|above| *above < FELT_M);
+fn felt(imprint: &DepthMap, mask: &Mask, rig: &Rig) -> Result<(), TaskError> {
+    let least_m = contact::flat_m(rig);
+    let above = contact::stands_out(imprint, mask).filter(|above| *above < least_m);
     // A flat imprint has no contact, whatever the mask.
-    let Some(above) = above.filter(|_| contact::rise(imprint) >= contact::FLAT_M) else { return Ok(()) };
+    let Some(above) = above.filter(|_| contact::rise(imprint) >= least_m) else { return Ok(()) };
     let why = format!(
         "where the CAD model lies at the true pose the imprint is {} above what lies around it: nothing was felt there, and the \
          mask would only repeat the pose",

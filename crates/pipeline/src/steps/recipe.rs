@@ -251,11 +251,12 @@ impl Recipe {
         Ok(Generating { bundle: model, engine: self.engine, config })
     }
 
-    /// The making of the masks that nobody drew.
+    /// The making of the masks that nobody drew, on touches of this rig.
     ///
     /// # Errors
     /// If it takes a mask model and there is none.
-    pub fn mask_recipe(&self) -> Result<MaskRecipe, TaskError> {
-        self.mask.recipe(self.mask_model.as_ref().map(|model| &model.id)).ok_or_else(no_mask_model)
+    pub fn mask_recipe(&self, rig: &Rig) -> Result<MaskRecipe, TaskError> {
+        let recipe = self.mask.recipe(self.mask_model.as_ref().map(|model| &model.id)).ok_or_else(no_mask_model)?;
+        Ok(recipe.on(rig))
     }
 }

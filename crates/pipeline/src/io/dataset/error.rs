@@ -27,10 +27,12 @@ pub enum OpenError {
         why: String,
     },
     /// Nothing in the folder looks like a data set.
-    #[error("no paired touches found ({})", path.display())]
+    #[error("no paired touches found{} ({})", instead.as_ref().map_or(String::new(), |what| format!(", but {what}")), path.display())]
     NothingFound {
         /// The folder.
         path: PathBuf,
+        /// Container of another kind that lies there, by what it is.
+        instead: Option<&'static str>,
     },
     /// The file that says how the data are to be read cannot be understood.
     #[error("how the data are to be read is not understood: {reason} ({})", file.display())]
@@ -49,6 +51,10 @@ impl OpenError {
             Self::Io { .. } => "check the path and its permissions",
             Self::ReadAs { .. } => "correct that file, or remove it to read the data as they are stored",
             Self::Rig { .. } => "correct it, or remove it to take the pictures for the lab's sensors",
+            Self::NothingFound { instead: Some(_), .. } => {
+                "five lines of Python make a folder of it that opens, with touch2touch.from_arrays: docs/python.md, \
+                 \"Arrays and containers\""
+            }
             Self::NothingFound { .. } => {
                 "open the folder that holds train/, test/ and tools_stls/, a folder of GelSlim .pt files, of \
                  NAME_gelslim.png (with NAME_bubble.png), or of NAME_touch.png with reference.png"
@@ -60,7 +66,7 @@ impl OpenError {
     pub fn to_problem(&self) -> Problem {
         let (Self::Io { path, .. }
         | Self::Rig { path, .. }
-        | Self::NothingFound { path }
+        | Self::NothingFound { path, .. }
         | Self::ReadAs { file: path, .. }) = self;
         Problem { file: path.clone(), what: self.to_string(), hint: self.hint().into() }
     }

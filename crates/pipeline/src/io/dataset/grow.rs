@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use super::depths;
 use super::lab::{self, FileRef, Lab};
 use super::{Dataset, LoadError, OpenError, RIG_JSON, SAME_NAME, Scan, Source, SourceKind, pictures, problem};
 use crate::io::caught::caught;
@@ -49,13 +50,14 @@ impl Dataset {
         let scan = match &self.source {
             Source::Lab(lab) if lab.flat => lab::scan_flat_again(root),
             Source::Lab(_) => lab::scan(root),
+            Source::Depths(_) => depths::scan(root)?,
             Source::Pictures(pictures) if pictures.folders.iter().all(|folder| folder != root) => {
                 pictures::scan_folders(root)?
             }
             Source::Pictures(_) => pictures::scan(root)?,
             Source::BuiltIn(_) => None,
         };
-        let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone() })?);
+        let fresh = Self::of(scan.ok_or_else(|| OpenError::NothingFound { path: root.clone(), instead: None })?);
         if *fresh.rig != *self.rig {
             let why = format!("{RIG_JSON} declares other sensors than when the folder was opened: open it again");
             return Err(OpenError::Rig { path: root.join(RIG_JSON), why });
@@ -88,6 +90,7 @@ impl Dataset {
         match (&mut dataset.source, &fresh.source) {
             (Source::Lab(mine), Source::Lab(other)) => mine.meshes.clone_from(&other.meshes),
             (Source::Pictures(mine), Source::Pictures(other)) => mine.meshes.clone_from(&other.meshes),
+            (Source::Depths(mine), Source::Depths(other)) => mine.meshes.clone_from(&other.meshes),
             _ => {}
         }
         Ok(Growth { dataset, new, changed })
@@ -102,7 +105,7 @@ impl Dataset {
             Source::Lab(lab) if lab.flat => (true, "GelSlim .pt files"),
             Source::Lab(_) => (false, "the lab's folders"),
             Source::Pictures(_) => (false, "pictures"),
-            Source::BuiltIn(_) => return out,
+            Source::Depths(_) | Source::BuiltIn(_) => return out,
         };
         let (folders, pictures) =
             (matches!(&self.source, Source::Lab(lab) if !lab.flat), self.kind == SourceKind::Pictures);
@@ -132,6 +135,10 @@ impl Dataset {
             (Source::Pictures(mine), Source::Pictures(other)) => {
                 put(&mut mine.pairs, other.pairs[id.0 as usize].clone(), into);
             }
+            (Source::Depths(mine), Source::Depths(other)) => {
+                let row = mine.take(other, id);
+                put(&mut mine.pairs, row, into);
+            }
             _ => return false,
         }
         true
@@ -142,6 +149,7 @@ impl Dataset {
         match &self.source {
             Source::Lab(lab) => lab.folders.clone(),
             Source::Pictures(pictures) => pictures.folders.clone(),
+            Source::Depths(depths) => depths.folders.clone(),
             Source::BuiltIn(_) => Vec::new(),
         }
     }
@@ -151,7 +159,7 @@ impl Dataset {
         let first = self.pair_files(id).into_iter().next()?;
         match &self.source {
             Source::Lab(lab) => lab.pairs[id.0 as usize].gelslim.is_some().then_some(first),
-            Source::Pictures(_) | Source::BuiltIn(_) => Some(first),
+            Source::Depths(_) | Source::Pictures(_) | Source::BuiltIn(_) => Some(first),
         }
     }
 
@@ -161,7 +169,7 @@ impl Dataset {
             let named = self.root.iter().map(|root| root.join(RIG_FILE)).find(|file| file.is_file());
             let first = || match &self.source {
                 Source::Lab(lab) => lab.first_bubble(),
-                Source::Pictures(_) | Source::BuiltIn(_) => None,
+                Source::Depths(_) | Source::Pictures(_) | Source::BuiltIn(_) => None,
             };
             let cameras = named.or_else(first).map(|file| (cameras_of(&file), file));
             match cameras {

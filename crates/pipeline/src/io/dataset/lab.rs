@@ -37,7 +37,7 @@ const TOOL_PREFIXES: [&str; 3] = [
 const MAX_DEPTH: usize = 3;
 
 /// `.pt` files that lie beside touches and are none.
-const NO_TOUCH: [&str; 4] = ["rig", "tools", "stats", "training_stats"];
+pub(super) const NO_TOUCH: [&str; 4] = ["rig", "tools", "stats", "training_stats"];
 
 /// The files of the lab's folders, in the order of the index.
 #[derive(Clone, Debug)]

@@ -1,4 +1,4 @@
-//! A folder of pictures (PNG or JPEG): `NAME_gelslim.png`, optionally with `NAME_bubble.png` and `NAME_vqvae.png`; or
+//! A folder of pictures (PNG or JPEG; depths as NPY and TIFF too): `NAME_gelslim.png`, optionally with `NAME_bubble.png` and `NAME_vqvae.png`; or
 //! the camera's own images, `NAME_touch.png` with `NAME_reference.png` or one `reference.png` for all.
 //!
 //! A file [`RIG_JSON`] in the folder declares the sensors ([`Rig`]); the names of the first color and the first depth
@@ -18,13 +18,13 @@
 //!   camera, because a pose needs one.
 
 mod lengths;
+mod meters;
 mod tools;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use crate::io::files;
 use crate::io::images;
 use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -35,7 +35,9 @@ use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample, Scale};
 use touch2touch_core::turn::Turn;
 use touch2touch_core::upright::{self, TurnReading};
 
+use self::meters::Depth;
 use super::cad::{CAD_FOLDER, cad_files};
+use super::rig_json::{RIG_JSON, rig_of};
 use super::{LoadError, Loaded, OpenError, Scan, Source, SourceKind, built_in, last_integer, problem, same_name};
 
 /// Depths that the darkest and the brightest value of a bubble picture are taken for, meters.
@@ -63,8 +65,6 @@ const TOUCH: usize = 3;
 const REFERENCE: usize = 4;
 
 const KINDS: usize = 5;
-/// The file in a folder of pictures that says which sensors took them.
-pub const RIG_JSON: &str = "rig.json";
 const EXTENSIONS: [&str; 3] = [".png", ".jpg", ".jpeg"];
 /// The untouched image of all touches that have none of their own.
 const COMMON_REFERENCE: &str = "reference";
@@ -100,23 +100,6 @@ fn suffixes(rig: &Rig) -> [String; KINDS] {
     let of = |sensor: Option<&Sensor>, without: &Sensor| format!("_{}", sensor.unwrap_or(without).key.to_lowercase());
     let (color, depth) = (of(rig.color(), &lab::GELSLIM), of(rig.depth(), &lab::BUBBLE));
     [color, depth, "_vqvae".into(), "_touch".into(), "_reference".into()]
-}
-
-/// The sensors that a folder declares in its [`RIG_JSON`], else the lab's.
-///
-/// # Errors
-/// [`OpenError::Rig`] if the file is there and cannot be read or declares no rig.
-pub fn rig_of(folder: &Path) -> Result<Arc<Rig>, OpenError> {
-    let path = folder.join(RIG_JSON);
-    // A link that leads nowhere is there.
-    if path.symlink_metadata().is_err_and(|err| err.kind() == std::io::ErrorKind::NotFound) {
-        return Ok(Rig::lab());
-    }
-    let rig = match files::read(&path, files::SMALL) {
-        Ok(text) => Rig::parse(&text).map_err(|why| format!("{RIG_JSON} does not declare a rig: {why}")),
-        Err(err) => Err(format!("{RIG_JSON} cannot be read: {err}")),
-    };
-    rig.map(Arc::new).map_err(|why| OpenError::Rig { path, why })
 }
 
 /// Looks for pictures directly in `folder`; `None` if there is no GelSlim or bubble picture.
@@ -170,7 +153,10 @@ impl Found {
                 );
                 problems.push(problem(&path, what, "rename it to rig.json"));
             }
-            let Some(stem) = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext)) else { continue };
+            let depth = meters::EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext));
+            let depth = depth.filter(|stem| stem.ends_with(suffixes[BUBBLE].as_str()));
+            let picture = EXTENSIONS.iter().find_map(|ext| lower.strip_suffix(ext));
+            let Some(stem) = picture.or(depth) else { continue };
             if name.starts_with('.') {
                 continue;
             }
@@ -267,9 +253,10 @@ impl Pictures {
     /// The picture of [`Self::tile`], and what to say of its file.
     fn tile_and_note(&self, id: PairId, kind: usize, laid: Turn) -> Result<Option<NotedTile>, LoadError> {
         let Some(path) = self.file(id, kind)? else { return Ok(None) };
-        let (tile, note) = match images::read_depth(path)? {
-            Ok(values) => lengths::levels(path, &values)?,
-            Err(tile) => (tile, None),
+        let sensor = self.rig.depth().unwrap_or(&lab::BUBBLE);
+        let (tile, note) = match meters::read(path, sensor)? {
+            Depth::Levels(found) => found,
+            Depth::Meters(imprint) => (tile_from_imprint(&imprint, sensor), None),
         };
         // Pairs are turned as squares; in another shape a quarter turn would not fit back.
         let upright = tile.width() == tile.height() || laid.quarters.is_multiple_of(2);
@@ -330,7 +317,13 @@ impl Pictures {
         }
         let dots = || lab_finger(&touch.color()?.difference).filter(|_| reading.is_some());
         let taken_by = named.finger.or_else(dots);
-        if let Some((tile, note)) = self.tile_and_note(id, BUBBLE, laid)? {
+        let sensor = self.rig.depth().unwrap_or(&lab::BUBBLE);
+        let of_tool = || named.of_tool.then(|| tools::camera(&self.rig, taken_by.unwrap_or(lab::RIGHT))).flatten();
+        if let Some(path) = self.file(id, BUBBLE)?.filter(|path| meters::has_any(path))
+            && let Depth::Meters(imprint) = meters::read(path, sensor)?
+        {
+            touch.set(depth_id, DepthTouch { imprint, camera: of_tool(), truth: None });
+        } else if let Some((tile, note)) = self.tile_and_note(id, BUBBLE, laid)? {
             notes.extend(note);
             let [w, h] = tile.size();
             let path = self.file(id, BUBBLE)?.unwrap_or(Path::new(""));
@@ -345,8 +338,7 @@ impl Pictures {
                 notes.push(problem(path, "the picture is a single gray", "check that the right picture was saved"));
             }
             let imprint = imprint_from_tile(&tile, &self.rig);
-            let camera = named.of_tool.then(|| tools::camera(&self.rig, taken_by.unwrap_or(lab::RIGHT))).flatten();
-            touch.set(depth_id, DepthTouch { imprint, camera, truth: None });
+            touch.set(depth_id, DepthTouch { imprint, camera: of_tool(), truth: None });
             scale = Scale::Assumed;
         }
         let pads = self.rig.pads().map(|pad| (pad.index() == 0).then(|| touch.clone())).collect();
@@ -379,6 +371,13 @@ pub(crate) fn imprint_from_tile(tile: &Grid<f32>, rig: &Rig) -> DepthMap {
     let turned = if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile.clone() };
     // The lab made these pictures with torchvision's resize, so they are undone with the same one.
     resample::bilinear(&assumed_meters(&turned), sensor.width, sensor.height)
+}
+
+/// The gray levels (0..255) that stand for an imprint, as a picture beside the first sensor's lies.
+fn tile_from_imprint(imprint: &DepthMap, sensor: &Sensor) -> Grid<f32> {
+    let [lo, hi] = ASSUMED_IMPRINT_RANGE_M;
+    let tile = imprint.map(|meters| (255.0 * (f64::from(*meters) - lo) / (hi - lo)) as f32);
+    if sensor.rotation_deg == 180 { tile.rotated_180() } else { tile }
 }
 
 /// The most frequent level of a channel.

@@ -34,6 +34,11 @@ const ROUND_TRIP_PX: f64 = 1e-6;
 
 /// Adds to the sample's notes what cannot be right about it; `file` is its bubble's file.
 pub(super) fn notes(loaded: &mut Loaded, file: &Path) {
+    notes_of(loaded, file, "bubble_imprint", true);
+}
+
+/// [`notes`] of a sample whose imprints are stored under another key, with its cameras or, where they are assumed, without.
+pub(super) fn notes_of(loaded: &mut Loaded, file: &Path, key: &str, with_cameras: bool) {
     let mut problems = std::mem::take(&mut loaded.sample.notes);
     for (finger, touch) in loaded.sample.pads.entries() {
         let Some(bubble) = touch.depth() else { continue };
@@ -46,14 +51,14 @@ pub(super) fn notes(loaded: &mut Loaded, file: &Path) {
             problems.push(problem(
                 file,
                 format!(
-                    "key \"bubble_imprint\": {share:.2} % of the {name} finger's pixels are no measurement ({nan} NaN, \
+                    "key \"{key}\": {share:.2} % of the {name} finger's pixels are no measurement ({nan} NaN, \
                      {infinite} infinite, {dropped} at depth 0)"
                 ),
                 "these pixels are left out everywhere; record the grasp again if they cover the contact",
             ));
         }
     }
-    sample(&loaded.sample, file, &mut problems);
+    sample(&loaded.sample, file, with_cameras, &mut problems);
     loaded.sample.notes = problems;
 }
 
@@ -75,7 +80,7 @@ pub(super) fn rounded_place(file: &Path, what: &str, values: &[f64]) -> Option<P
     })
 }
 
-fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
+fn sample(sample: &Sample, file: &Path, with_cameras: bool, problems: &mut Vec<Problem>) {
     let mut add = |what: String, hint: &str| {
         problems.push(Problem { file: file.to_owned(), what, hint: hint.into() });
     };
@@ -96,7 +101,7 @@ fn sample(sample: &Sample, file: &Path, problems: &mut Vec<Problem>) {
         }
         let Some(touch) = touch.depth() else { continue };
         imprint(&touch.imprint, name, &mut add);
-        if let Some(camera) = &touch.camera {
+        if let Some(camera) = touch.camera.as_ref().filter(|_| with_cameras) {
             sides.push(camera.grasp_from_camera.translation.x);
             self::camera(camera, &touch.imprint, name, &mut add);
         }

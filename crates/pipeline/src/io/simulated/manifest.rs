@@ -122,6 +122,7 @@ impl Layout {
             Self::Train => "train",
             Self::Test => "test",
             Self::TrainOnly => "train_only",
+            Self::GelslimDepth => "gelslim_depth",
         }
     }
 }

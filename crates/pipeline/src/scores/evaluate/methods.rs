@@ -195,7 +195,7 @@ impl Models {
             notes.push("pictures: no tool or Fréchet distance, and no angle where the tools are not named".into());
             return notes;
         }
-        notes.push(match self.common.mask_recipe().ok() {
+        notes.push(match self.common.mask_recipe(rig).ok() {
             None => "no mask model: no angle".into(),
             Some(MaskRecipe::Unet(_, least)) => {
                 let from = least.map_or(String::new(), |p| format!(" from probability {} on", p.get()));

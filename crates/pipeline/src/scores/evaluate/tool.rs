@@ -151,7 +151,7 @@ impl<'a> Tool<'a> {
             say(method.name());
             let upper = matches!(method, Method::Measured);
             let recipe = method.posed(&common);
-            let with_masks = recipe.mask_recipe().is_ok();
+            let with_masks = recipe.mask_recipe(&self.dataset.rig).is_ok();
             let cases: Vec<&LoadedPair> = cases.iter().collect();
             let Some(made) = method.make(&cases, common.shift, cx) else { return };
             let mut skip = |case: &LoadedPair, why: String| {

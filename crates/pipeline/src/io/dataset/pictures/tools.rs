@@ -14,7 +14,7 @@ use touch2touch_core::rig::{PadId, Rig, lab};
 use touch2touch_core::sample::DepthCamera;
 use touch2touch_core::sim;
 
-use super::super::{lab as lab_folders, problem};
+use super::super::{depths, lab as lab_folders, problem};
 use crate::io::files;
 
 /// The file that names the tools.
@@ -86,9 +86,12 @@ pub(super) fn name(
     fingers
 }
 
-/// The camera that is assumed for a finger of the lab's rig: the simulator's nominal one.
+/// The camera that is assumed for a finger: over a gel a straight look at it, for the lab's rig the simulator's nominal one.
 pub(super) fn camera(rig: &Rig, finger: PadId) -> Option<DepthCamera> {
     static CAMERAS: LazyLock<[DepthCamera; 2]> = LazyLock::new(|| lab::PADS.map(sim::nominal_camera));
+    if rig.is_gel() {
+        return depths::assumed_camera(rig, finger);
+    }
     (*rig == *Rig::lab()).then(|| CAMERAS.get(finger.index()).cloned()).flatten()
 }
 
