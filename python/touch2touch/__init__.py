@@ -37,11 +37,12 @@ from ._native import (
     simulate,
     ssim,
 )
+from ._arrays import from_arrays
 from ._many import predict, predict_many, table
 
 __all__ = [
     "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
-    "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "label", "open", "predict", "predict_many", "psnr",
+    "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "from_arrays", "label", "open", "predict", "predict_many", "psnr",
     "register", "register_many", "simulate", "ssim", "table",
 ]
 
