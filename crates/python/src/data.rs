@@ -464,9 +464,10 @@ impl Pair {
         }
     }
 
-    fn _repr_html_(&self) -> PyResult<String> {
-        let depth = self.sample.pads.entries().filter_map(|(_, touch)| touch.depth());
-        picture::html("Measured imprint", depth.map(|touch| &touch.imprint))
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let depth = slf.get().sample.pads.entries().filter_map(|(_, touch)| touch.depth());
+        let images = picture::html("Measured imprint", depth.map(|touch| &touch.imprint))?;
+        slf.py().import("touch2touch._scene")?.call_method1("pair_html", (slf, images))
     }
 
     fn __repr__(&self) -> String {

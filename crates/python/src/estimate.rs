@@ -203,10 +203,11 @@ impl Estimate {
         self.pair.clone()
     }
 
-    fn _repr_html_(&self) -> PyResult<String> {
-        let imprints = self.results.imprints.entries().map(|(_, imprint)| imprint);
-        let pose = self.pose().map(|pose| pose._repr_html_()).unwrap_or_default();
-        Ok(picture::html(&format!("{} imprint", self.results.recipe().imprint.name()), imprints)? + &pose)
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let results = &slf.get().results;
+        let imprints = results.imprints.entries().map(|(_, imprint)| imprint);
+        let images = picture::html(&format!("{} imprint", results.recipe().imprint.name()), imprints)?;
+        slf.py().import("touch2touch._scene")?.call_method1("estimate_html", (slf, images))
     }
 
     fn __repr__(&self) -> String {

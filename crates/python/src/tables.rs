@@ -58,8 +58,8 @@ impl Scores {
         evaluation::text(&self.evaluation.rows)
     }
 
-    fn _repr_html_(&self) -> String {
-        format!("<pre>{}</pre>", self.__str__().replace('<', "&lt;"))
+    fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("touch2touch._scene")?.call_method1("scores_html", (slf,))
     }
 
     fn __repr__(&self) -> String {
