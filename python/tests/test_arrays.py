@@ -182,7 +182,7 @@ def ran(text):
     if not node:
         pytest.skip("no node to run the page's script")
     done = subprocess.run([node, "-"], input=text, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stderr[-900:]
     return done.stdout
 
 
@@ -190,7 +190,7 @@ def test_pairs_and_results_are_a_view_that_turns():
     pair = t2t.open("demo")[0]
     for shown, words in ((pair._repr_html_(), "true pose"), (t2t.estimate(pair)._repr_html_(), "contact")):
         assert len(shown) <= 2 << 20 and "srcdoc" in shown and words in shown
-        turned = STAND_IN + script(shown) + """
+        turned = STAND_IN + "{" + script(shown) + "}" + """
             const before = drawn; canvas.onpointerdown({clientX: 0, clientY: 0}); canvas.onpointermove({clientX: 30, clientY: 9});
             canvas.wheel({ preventDefault() {}, deltaY: 99 }); console.log(before, drawn);"""
         before, after = map(int, ran(turned).split())
@@ -206,7 +206,7 @@ def test_scores_sort_by_a_click():
         const row = (...texts) => ({ cells: texts.map((textContent) => ({ textContent })) });
         const body = { rows: [row("a", "3.2 ± 1"), row("c", "–"), row("b", "-10.1")], append(...rows) { this.rows = rows; } };
         const heads = [0, 1].map((cellIndex) => ({ cellIndex, dataset: {}, closest: () => ({ tBodies: [body] }) }));
-        const document = { querySelectorAll: () => heads };""" + script(shown) + """
+        const document = { querySelectorAll: () => heads };{""" + script(shown) + "}" + """
         const order = () => body.rows.map((row) => row.cells[0].textContent).join("");
         heads[1].onclick(); const up = order(); heads[1].onclick(); console.log(up, order());"""
     assert ran(page).split() == ["bac", "abc"]

@@ -17,6 +17,29 @@ pub struct TriMesh {
 }
 
 impl TriMesh {
+    /// The parts of the surface that are further than this from the plane x = 0, meters, on either side.
+    #[must_use]
+    pub fn beyond(&self, distance_m: f64) -> Self {
+        let mut cut = Self { vertices: Vec::new(), triangles: Vec::new() };
+        for (side, triangle) in [-1.0, 1.0].into_iter().flat_map(|side| self.triangles.iter().map(move |t| (side, t))) {
+            let corners = triangle.map(|at| self.vertices[at as usize]);
+            let above = corners.map(|corner| side * corner.x - distance_m);
+            let first = cut.vertices.len() as u32;
+            for i in 0..3 {
+                let (j, a, b) = ((i + 1) % 3, above[i], above[(i + 1) % 3]);
+                if a > 0.0 {
+                    cut.vertices.push(corners[i]);
+                }
+                if (a > 0.0) != (b > 0.0) {
+                    cut.vertices.push(corners[i].lerp(corners[j], a / (a - b)));
+                }
+            }
+            let last = cut.vertices.len() as u32;
+            cut.triangles.extend((first + 2..last).map(|at| [first, at - 1, at]));
+        }
+        cut
+    }
+
     /// The corners of triangle `index`.
     pub fn corners(&self, index: usize) -> [DVec3; 3] {
         self.triangles[index].map(|v| self.vertices[v as usize])

@@ -20,6 +20,7 @@ use crate::steps::prediction::Prediction;
 use crate::steps::recipe::{Recipe, Stage};
 use touch2touch_core::align::{Ask, Contacts, Register};
 use touch2touch_core::contact::ContactMask;
+use touch2touch_core::contact::GEL_CONTACT_M;
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid};
@@ -74,6 +75,17 @@ pub fn estimate(
     cx: &JobCx,
 ) -> Result<Estimate, TaskError> {
     Estimate::new(recipe).reach(touch, stage, models, cx)
+}
+
+/// The part of a tool that is pressed into the gels of a touch, which is all that they feel of it; `None` on other sensors,
+/// and where the tool does not reach them.
+fn pressed_in(sample: &Sample, tool: &ToolModel) -> Option<ToolModel> {
+    if !sample.rig.is_gel() {
+        return None;
+    }
+    let camera = sample.pads.entries().find_map(|(_, touch)| touch.camera())?;
+    let gel_m = camera.grasp_from_camera.translation.x.abs() - f64::from(*camera.depth_reference.get(0, 0)?);
+    ToolModel::new(tool.mesh.beyond(gel_m + f64::from(GEL_CONTACT_M))).ok()
 }
 
 impl Estimate {
@@ -244,7 +256,11 @@ impl Estimate {
         registration: &dyn Register,
         ask: Ask<'_>,
     ) -> Result<PoseResult, TaskError> {
-        self.with_contacts(sample, |contacts| pose(contacts, tool, registration, ask, sample.grasp_from_object))?
+        let part = pressed_in(sample, tool);
+        let of = part.as_ref().unwrap_or(tool);
+        let found =
+            self.with_contacts(sample, |contacts| pose(contacts, of, registration, ask, sample.grasp_from_object))??;
+        Ok(PoseResult { middle_x_m: tool.middle_x_m, ..found })
     }
 
     /// Candidates for the tool of the touch, the likeliest first.
