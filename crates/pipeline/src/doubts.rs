@@ -32,6 +32,10 @@ pub type Generator<'a> = (&'a Models, Generating<'a>);
 ///
 /// Pairs and CAD models that cannot be read are left out: what is wrong with those is said by whoever reads them.
 pub fn examine_reading(dataset: &Dataset, pairs: usize, generator: Option<Generator<'_>>, cx: &JobCx) -> Vec<Doubt> {
+    // The likeness of an imprint to a tool is that of a membrane.
+    if dataset.rig.is_gel() {
+        return Vec::new();
+    }
     // The simulator's own are what they are.
     if dataset.kind == SourceKind::Demo && dataset.read_as().is_empty() {
         return Vec::new();
