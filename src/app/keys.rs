@@ -7,11 +7,9 @@
 pub mod dataset;
 pub mod imprint;
 pub mod inspection;
-pub mod mask;
 pub mod pose;
 pub mod prediction;
 pub mod proposal;
-pub mod versus;
 
 pub use touch2touch_core::bits::Bits;
 pub use touch2touch_core::diffusion::{Preset, Sampler, Spacing};
@@ -20,29 +18,58 @@ pub use touch2touch_core::postprocess::ShiftMode;
 pub use touch2touch_pipeline::labels::{ImprintSource, Revision};
 pub use touch2touch_pipeline::steps::mask::MaskRecipe;
 
-pub use dataset::{AboutKey, ImportForm, ImportPlanKey, LabelsKey, MaskPlanKey, ThumbnailKey, ToolKey, TrainPlanKey};
-pub use imprint::{AmbiguityKey, ColorKey, FlagsKey, ImprintKey, MeanKey, MetersKey, PictureKey};
-pub use inspection::{Inspection, InspectionKey};
-pub use mask::{MaskKey, MaskVersion};
-pub use pose::{CloudKey, DeviationKey, LayersKey, PoseBits, PoseKey, ProvisionalPoseKey, RankingKey, RunKey};
+pub use dataset::{AboutKey, ImportForm, ImportPlanKey, MaskPlanKey, ToolKey, TrainPlanKey};
+pub use imprint::{ImprintKey, MaskKey, MaskVersion, MeanKey, VersusKey};
+pub use inspection::Inspection;
+pub use pose::{CloudDifferenceKey, CloudKey, PoseBits, PoseKey, RunKey};
 pub(crate) use prediction::Keyed;
-pub use prediction::{ComparedKey, PredictionKey, PrefetchKey, Preview, StoredKey};
+pub use prediction::{PredictionKey, Preview};
 pub use proposal::{CadPlace, Distances, DistancesKey, ProposalInputs, ProposalKey};
-pub use versus::{CloudDifferenceKey, VersusKey};
 
 use touch2touch_core::dataset::PairId;
 use touch2touch_core::postprocess::CorrectionParts;
 use touch2touch_core::rig::PadId;
 
-/// The key of a result. Equal keys have equal results.
-pub trait Key: Clone + Ord + Send + 'static {
-    /// The result.
-    type Value: Send + Sync + 'static;
+/// Keys that are others under a name of their own.
+macro_rules! named {
+    ($( #[doc = $doc:literal] $name:ident($($of:ty),+); )*) => { $(
+        #[doc = $doc]
+        #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        pub struct $name($(pub $of),+);
+    )* };
+}
 
-    /// Bytes that a result holds.
-    fn bytes(_value: &Self::Value) -> usize {
-        0
-    }
+named! {
+    /// The small picture of a pair.
+    ThumbnailKey(PairKey);
+    /// The labels stored for a pair.
+    LabelsKey(PairKey);
+    /// The predictions of a touch that lie on the disk from before.
+    StoredKey(TouchKey);
+    /// The picture beside a touch.
+    PictureKey(TouchKey);
+    /// The ambiguity of the GelSlim image of a touch.
+    AmbiguityKey(TouchKey);
+    /// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
+    PrefetchKey(PredictionKey);
+    /// A prediction that is compared with something.
+    ComparedKey(PredictionKey);
+    /// A prediction of a color sensor, as a picture.
+    ColorKey(PredictionKey);
+    /// A prediction in meters.
+    MetersKey(PredictionKey, ShiftMode);
+    /// Implausible things about the way of a prediction to meters.
+    FlagsKey(PredictionKey, ShiftMode);
+    /// A pose without its proof, where the registration may ask for one: it is there at once.
+    ProvisionalPoseKey(PoseKey);
+    /// The layers of a recorded registration from the registration's own starts.
+    LayersKey(PoseKey);
+    /// The distances of the contact points from the model at a registered pose.
+    DeviationKey(PoseKey);
+    /// The tools of the data set, ranked for the touch that a pose is of.
+    RankingKey(PoseKey);
+    /// The steps of a recorded registration.
+    InspectionKey(RunKey);
 }
 
 /// Counts the data sets opened since the start: results of an earlier one never reach a later one.

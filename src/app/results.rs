@@ -6,81 +6,66 @@
 use std::sync::Arc;
 
 use super::jobs::Job;
-use super::keys::Key;
 use super::services::SharedServices;
 use super::state::State;
-use super::state::results::{Cached, Computed, Request, table};
+use super::state::results::{Cached, Computed, Key, Request, table};
 use touch2touch_pipeline::error::TaskError;
 
-pub(crate) mod ambiguity;
 pub(crate) mod cloud;
-pub(crate) mod doctor;
-pub(crate) mod flags;
-pub(crate) mod import_plan;
 pub(crate) mod imprint;
-pub(crate) mod input;
 pub(crate) mod labels;
 pub(crate) mod manual;
 pub(crate) mod mask;
-pub(crate) mod mask_plan;
 pub(crate) mod on_screen;
 pub(crate) mod outdated;
+pub(crate) mod plans;
 pub(crate) mod pose;
 pub(crate) mod prediction;
-pub(crate) mod prefetch;
 pub(crate) mod preview;
 pub(crate) mod proposal;
 pub(crate) mod registration;
 pub(crate) mod sample;
 pub(crate) mod scores;
 pub(crate) mod shown;
-pub(crate) mod thumbnail;
 pub(crate) mod tool;
-pub(crate) mod train_plan;
 pub(crate) mod versus;
 
-pub use ambiguity::ambiguity;
-pub(crate) use ambiguity::want_ambiguity;
 pub use cloud::cloud;
 pub(crate) use cloud::{automatic_cloud, cloud_key, latest, want_cloud};
-pub(crate) use doctor::{doctor_key, want_doctor};
-pub use flags::flags;
-pub use import_plan::import_plan_key;
-pub(crate) use import_plan::{import_setup, want_import_plan};
-pub(crate) use imprint::{gone, want_imprint};
-pub use imprint::{imprint, predicted_color};
-pub use input::can_generate;
-pub(crate) use input::can_start;
+pub(crate) use imprint::want_imprint;
+pub use imprint::{flags, imprint, predicted_color};
 pub use manual::{accepted, accepted_elsewhere, by_hand, manual_begins, shown_pose};
 pub(crate) use manual::{shown_imprint, sides_apart};
 pub use mask::{MaskInForce, drawn_mask, mask_in_force, mask_places};
 pub(crate) use mask::{
     automatic_mask, automatic_provenance, drawn_mask_on, mask_of, mask_place, mask_recipe, want_mask,
 };
-pub use mask_plan::mask_plan_key;
-pub(crate) use mask_plan::want_mask_plan;
 pub use on_screen::proposes;
 pub(crate) use on_screen::{fingers_to_generate, shows_cloud, shows_deviation, shows_layers, shows_steps};
 pub use outdated::{Outdated, Why, outdated};
+pub(crate) use plans::{
+    doctor_key, import_setup, train_plan_key, want_doctor, want_import_plan, want_mask_plan, want_train_plan,
+};
+pub use plans::{import_plan_key, mask_plan_key};
 pub use pose::{pose, pose_key, provisional_pose};
 pub(crate) use pose::{registered, want_pose};
-pub(crate) use prediction::{keep_prediction, want_other_finger, want_stored};
-pub(crate) use prefetch::{prefetch, want_predictions_ahead};
+pub use prediction::can_generate;
+pub(crate) use prediction::{
+    can_start, keep_prediction, prefetch, want_other_finger, want_predictions_ahead, want_stored,
+};
 pub use preview::{Onlooker, PreviewRequest, preview, preview_request};
 pub(crate) use proposal::want_proposal;
 pub use proposal::{proposal, proposal_key, shown_proposal};
 pub use registration::{deviation, inspected, inspection, layers, ranking};
 pub(crate) use registration::{inspected_in, run_key, want_deviation, want_inspection, want_layers};
-pub use sample::{bubble, gelslim, sample, touch, truth};
+pub use sample::{ambiguity, bubble, gelslim, sample, thumbnail, touch, truth};
+pub(crate) use sample::{gone, want_ambiguity, want_thumbnails};
 pub use scores::evaluated;
 pub(crate) use scores::{evaluation_setup, setup_of_all};
 pub use shown::{chosen, imprint_key, shown, worked_on};
 pub(crate) use shown::{imprint_of, pick, picked};
-pub use thumbnail::thumbnail;
-pub(crate) use thumbnail::want_thumbnails;
 pub use tool::{tool, tool_name};
 pub(crate) use tool::{tool_key, want_tool};
-pub(crate) use train_plan::{train_plan_key, want_train_plan};
 pub use versus::{comparison, subject, subject_key, subject_pose, subjects_apart, subjects_compared};
 pub(crate) use versus::{pose_absent, subject_points, want_comparison, want_versus};
 
@@ -102,7 +87,10 @@ pub(crate) trait Computes: Key {
 }
 
 macro_rules! computing {
-    ($( #[doc = $doc:literal] $variant:ident($key:ident) $(in $cache:ident, $budget:expr)?; )*) => {
+    ($(
+        #[doc = $doc:literal]
+        $variant:ident($key:ident => $value:ty $(, $bytes:expr)?) $(in $cache:ident, $budget:expr)?;
+    )*) => {
         /// Asks for the results that say themselves when they are wanted, in the order of the table.
         pub(crate) fn want_others(wants: &mut Demands<'_>) {
             $( <$crate::app::keys::$key as Computes>::wanted(wants); )*
@@ -124,7 +112,7 @@ macro_rules! computing {
         /// Keeps a result under its key, with what follows from it.
         pub(super) fn keep(computed: Computed, state: &mut State) {
             match computed { $( Computed::$variant(key, value) => {
-                $( state.results.$cache.insert(key.clone(), value.clone(), <$crate::app::keys::$key>::bytes(&value)); )?
+                $( state.results.$cache.insert(key.clone(), value.clone(), <$crate::app::keys::$key as Key>::bytes(&value)); )?
                 key.arrived(state, &value);
             } )* }
         }

@@ -3,35 +3,10 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::super::keys::{DatasetSeq, Key, PairKey, Revision};
-use touch2touch_core::grid::DepthMap;
-use touch2touch_core::sample::Sample;
-use touch2touch_pipeline::doctor::Fact;
-use touch2touch_pipeline::export::import::Import;
-use touch2touch_pipeline::export::{ExportChoice, Plan};
+use super::super::keys::{DatasetSeq, Revision};
+use touch2touch_pipeline::export::ExportChoice;
 use touch2touch_pipeline::labels::{JournalHistory, PairLabels};
-use touch2touch_pipeline::learn::train::{TrainChoice, TrainPlan};
-use touch2touch_pipeline::steps::tool::NamedTool;
-
-impl Key for PairKey {
-    type Value = Sample;
-
-    fn bytes(sample: &Sample) -> usize {
-        sample.bytes()
-    }
-}
-
-/// The small picture of a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ThumbnailKey(pub PairKey);
-
-impl Key for ThumbnailKey {
-    type Value = DepthMap;
-
-    fn bytes(picture: &DepthMap) -> usize {
-        picture.len() * 4
-    }
-}
+use touch2touch_pipeline::learn::train::TrainChoice;
 
 /// A tool of a data set.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -40,24 +15,6 @@ pub struct ToolKey {
     pub dataset: DatasetSeq,
     /// The name.
     pub name: Arc<str>,
-}
-
-impl Key for ToolKey {
-    type Value = NamedTool;
-
-    fn bytes(tool: &NamedTool) -> usize {
-        let mesh = tool.model.mesh.vertices.len() * 24 + tool.model.mesh.triangles.len() * 12;
-        // The registration's field and tree are of the mesh's order, at least a few MB.
-        8 * mesh + (4 << 20)
-    }
-}
-
-/// The labels stored for a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LabelsKey(pub PairKey);
-
-impl Key for LabelsKey {
-    type Value = Read;
 }
 
 /// Labels as they were read.
@@ -79,14 +36,6 @@ pub struct MaskPlanKey {
     pub revision: Revision,
 }
 
-impl Key for MaskPlanKey {
-    type Value = Plan;
-
-    fn bytes(plan: &Plan) -> usize {
-        plan.total() * 128
-    }
-}
-
 /// The plan of an import, over what is drawn and marked now.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct ImportPlanKey {
@@ -96,14 +45,6 @@ pub struct ImportPlanKey {
     pub form: ImportForm,
     /// The last change of the document.
     pub revision: Revision,
-}
-
-impl Key for ImportPlanKey {
-    type Value = Import;
-
-    fn bytes(plan: &Import) -> usize {
-        (plan.changed.len() + plan.unmatched.len() + plan.refused.len()) * 128
-    }
 }
 
 /// An import of masks that is asked about: what it would change is said before anything changes.
@@ -130,14 +71,6 @@ pub struct AboutKey {
     pub units_named: u64,
 }
 
-impl Key for AboutKey {
-    type Value = Vec<Fact>;
-
-    fn bytes(facts: &Vec<Fact>) -> usize {
-        facts.len() * 512
-    }
-}
-
 /// The plan of a training, on what is drawn and marked now.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct TrainPlanKey {
@@ -147,12 +80,4 @@ pub struct TrainPlanKey {
     pub choice: TrainChoice,
     /// The last change of the document.
     pub revision: Revision,
-}
-
-impl Key for TrainPlanKey {
-    type Value = TrainPlan;
-
-    fn bytes(plan: &TrainPlan) -> usize {
-        (plan.masks() + plan.held_out[0]) * 256
-    }
 }

@@ -1,10 +1,6 @@
-//! Keys of imprints, and of what is read off them or their predictions.
+//! Keys of imprints, of their masks, and of any two against each other.
 
-use super::super::keys::{ImprintSource, Key, PredictionKey, ShiftMode, TouchKey};
-use touch2touch_core::ambiguity::Ambiguity;
-use touch2touch_core::grid::{DepthMap, RgbGrid};
-use touch2touch_core::postprocess::Flag;
-use touch2touch_pipeline::compare::Beside;
+use super::super::keys::{ImprintSource, MaskRecipe, PredictionKey, Revision, ShiftMode, TouchKey};
 use touch2touch_pipeline::labels::ImprintOf;
 
 /// One imprint in meters.
@@ -48,30 +44,6 @@ impl ImprintKey {
     }
 }
 
-/// A prediction in meters.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct MetersKey(pub PredictionKey, pub ShiftMode);
-
-impl Key for MetersKey {
-    type Value = DepthMap;
-
-    fn bytes(imprint: &DepthMap) -> usize {
-        imprint.len() * 4
-    }
-}
-
-/// A prediction of a color sensor, as a picture.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ColorKey(pub PredictionKey);
-
-impl Key for ColorKey {
-    type Value = RgbGrid;
-
-    fn bytes(picture: &RgbGrid) -> usize {
-        picture.len() * 12
-    }
-}
-
 /// The mean of several predictions of one touch.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub struct MeanKey {
@@ -83,47 +55,36 @@ pub struct MeanKey {
     pub shift: ShiftMode,
 }
 
-impl Key for MeanKey {
-    type Value = DepthMap;
-
-    fn bytes(mean: &DepthMap) -> usize {
-        mean.len() * 4
-    }
-}
-
-/// The picture beside one touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PictureKey(pub TouchKey);
-
-impl Key for PictureKey {
-    type Value = Beside;
-
-    fn bytes(found: &Beside) -> usize {
-        4 * (found.tile.len() + found.imprint.len())
-    }
-}
-
-/// The ambiguity of the GelSlim image of a touch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct AmbiguityKey(pub TouchKey);
-
-impl Key for AmbiguityKey {
-    /// `None` for an image without a finite pixel.
-    type Value = Option<Ambiguity>;
-
-    fn bytes(found: &Self::Value) -> usize {
-        size_of_val(found)
-    }
-}
-
-/// Flags: implausible things about the way of a prediction to meters.
+/// An automatic mask of one imprint.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct FlagsKey(pub PredictionKey, pub ShiftMode);
+pub struct MaskKey {
+    /// The imprint.
+    pub imprint: ImprintKey,
+    /// The recipe.
+    pub recipe: MaskRecipe,
+}
 
-impl Key for FlagsKey {
-    type Value = Vec<Flag>;
+/// The mask in force, as part of a recipe.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum MaskVersion {
+    /// Automatic.
+    Auto(MaskRecipe),
+    /// Corrected by hand.
+    Hand(Revision),
+}
 
-    fn bytes(found: &Vec<Flag>) -> usize {
-        found.len() * 512
+/// One imprint against another of the same touch.
+#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub struct VersusKey {
+    /// One: the error map is its imprint minus the other's.
+    pub a: ImprintKey,
+    /// The other.
+    pub b: ImprintKey,
+}
+
+impl VersusKey {
+    /// A prediction against the measurement of its touch.
+    pub fn measured(recipe: PredictionKey, shift: ShiftMode) -> Self {
+        Self { b: ImprintKey::Measured(recipe.touch), a: ImprintKey::Predicted(recipe, shift) }
     }
 }

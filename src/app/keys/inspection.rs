@@ -4,24 +4,12 @@ use std::sync::Arc;
 
 use glam::DVec3;
 
-use super::super::keys::{Key, Registration, RunKey};
+use super::super::keys::Registration;
 use touch2touch_core::align::{AlignReport, TraceStep};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::inspect::Counterparts;
 use touch2touch_core::pose::ToolModel;
 use touch2touch_pipeline::steps::pose::PoseResult;
-
-/// The steps of a recorded registration.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct InspectionKey(pub RunKey);
-
-impl Key for InspectionKey {
-    type Value = Inspection;
-
-    fn bytes(inspection: &Inspection) -> usize {
-        inspection.bytes()
-    }
-}
 
 /// A recorded registration with what its steps are looked at with.
 #[derive(Clone, Debug)]

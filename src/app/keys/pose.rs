@@ -2,14 +2,9 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{ImprintKey, ImprintSource, Key, MaskVersion, PairKey, Registration};
+use super::super::keys::{ImprintKey, ImprintSource, LayersKey, MaskVersion, PairKey, Registration};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::rig::PerPad;
-use touch2touch_core::which_tool::Candidate;
-use touch2touch_pipeline::compare::deviation::Deviation;
-use touch2touch_pipeline::steps::estimate::Estimate;
-use touch2touch_pipeline::steps::layers::LayerResult;
-use touch2touch_pipeline::steps::pose::PoseResult;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// A cloud of both fingers: imprint and (where one can be had) mask of each finger.
@@ -24,14 +19,6 @@ impl CloudKey {
     pub fn place(&self) -> Option<(PairKey, ImprintSource)> {
         let (imprint, _) = self.parts.iter().flatten().next()?;
         Some((imprint.touch().pair, imprint.side()))
-    }
-}
-
-impl Key for CloudKey {
-    type Value = Estimate;
-
-    fn bytes(found: &Estimate) -> usize {
-        found.bytes()
     }
 }
 
@@ -50,27 +37,6 @@ impl PoseKey {
     /// The key of a cloud and a tool by a recipe.
     pub(crate) fn of(cloud: CloudKey, tool: Arc<str>, recipe: &Recipe) -> Self {
         Self { cloud, tool, registration: recipe.registration }
-    }
-}
-
-impl Key for PoseKey {
-    type Value = PoseResult;
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
-    }
-}
-
-/// A pose without its proof, where the registration may ask for one: it is there at once, and the pose itself unless it
-/// needs one.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ProvisionalPoseKey(pub PoseKey);
-
-impl Key for ProvisionalPoseKey {
-    type Value = PoseResult;
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
     }
 }
 
@@ -101,18 +67,6 @@ pub struct RunKey {
     pub start: Option<PoseBits>,
 }
 
-impl Key for RunKey {
-    type Value = PoseResult;
-
-    fn bytes(found: &PoseResult) -> usize {
-        found.bytes()
-    }
-}
-
-/// The layers of a recorded registration from the registration's own starts.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct LayersKey(pub PoseKey);
-
 impl LayersKey {
     /// The recorded registration that they are of.
     pub(crate) fn run(&self) -> RunKey {
@@ -120,34 +74,11 @@ impl LayersKey {
     }
 }
 
-impl Key for LayersKey {
-    type Value = LayerResult;
-
-    fn bytes(found: &LayerResult) -> usize {
-        found.bytes()
-    }
-}
-
-/// The distances at a registered pose.
+/// The distances of the points of one cloud from another.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct DeviationKey(pub PoseKey);
-
-impl Key for DeviationKey {
-    type Value = Deviation;
-
-    fn bytes(found: &Deviation) -> usize {
-        found.bytes()
-    }
-}
-
-/// The tools of the data set, ranked for the touch that a pose is of.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct RankingKey(pub PoseKey);
-
-impl Key for RankingKey {
-    type Value = Vec<Candidate>;
-
-    fn bytes(found: &Vec<Candidate>) -> usize {
-        found.len() * size_of::<Candidate>()
-    }
+pub struct CloudDifferenceKey {
+    /// The cloud whose points are measured.
+    pub a: CloudKey,
+    /// The other.
+    pub b: CloudKey,
 }

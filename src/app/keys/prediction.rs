@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::super::keys::{Key, TouchKey};
+use super::super::keys::TouchKey;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_pipeline::infer::engine::EngineChoice;
 use touch2touch_pipeline::job::PreviewPicture;
@@ -36,40 +36,8 @@ impl PredictionKey {
     }
 }
 
-impl Key for PredictionKey {
-    type Value = Prediction;
-
-    fn bytes(prediction: &Prediction) -> usize {
-        prediction.raw.channels.iter().map(|c| c.len() * 4).sum()
-    }
-}
-
-/// The predictions of a touch that lie on the disk from before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct StoredKey(pub TouchKey);
-
-impl Key for StoredKey {
-    type Value = Keyed;
-}
-
 /// Predictions with their keys.
 pub(crate) type Keyed = Vec<(PredictionKey, Arc<Prediction>)>;
-
-/// A prediction that nobody asked for. Whoever goes on to another pair has it stopped.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct PrefetchKey(pub PredictionKey);
-
-impl Key for PrefetchKey {
-    type Value = Prediction;
-}
-
-/// A prediction that is compared with something.
-#[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ComparedKey(pub PredictionKey);
-
-impl Key for ComparedKey {
-    type Value = Prediction;
-}
 
 /// A prediction as it looks on the way.
 #[derive(Clone, Debug)]

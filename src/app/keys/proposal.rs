@@ -1,10 +1,9 @@
 //! Keys of proposals.
 
-use super::super::keys::{Bits, ImprintKey, Key, MaskKey, MaskRecipe, PoseKey, Revision};
+use super::super::keys::{Bits, ImprintKey, MaskKey, MaskRecipe, PoseKey, Revision};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::Grid;
 use touch2touch_core::label::CadPose;
-use touch2touch_pipeline::masks::propose::Proposal;
 
 /// The place where the CAD model lies.
 #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -31,14 +30,6 @@ pub struct DistancesKey {
     pub imprint: ImprintKey,
     /// The place where the model lies.
     pub at: CadPlace,
-}
-
-impl Key for DistancesKey {
-    type Value = Distances;
-
-    fn bytes(found: &Distances) -> usize {
-        found.grid.len() * 8
-    }
 }
 
 /// The distances, and where the model was.
@@ -74,13 +65,5 @@ impl ProposalKey {
     /// The automatic mask of the imprint by a recipe.
     pub(crate) fn automatic(&self, recipe: &MaskRecipe) -> MaskKey {
         MaskKey { imprint: self.imprint.clone(), recipe: recipe.clone() }
-    }
-}
-
-impl Key for ProposalKey {
-    type Value = Proposal;
-
-    fn bytes(found: &Proposal) -> usize {
-        found.mask.len()
     }
 }

@@ -1,16 +1,17 @@
 //! Imprints: those measured lie in the sample, those predicted are made of a raw prediction.
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{ColorKey, ImprintSource, MetersKey, PictureKey, TouchKey};
-use super::super::results;
-use super::super::results::{Computes, Demands};
+use super::super::keys::{ColorKey, FlagsKey, ImprintSource, MetersKey, PictureKey, TouchKey};
+use super::super::pane::Demand;
+use super::super::results::{self, Computes, Demands, gone};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
 use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::postprocess::Flag;
 use touch2touch_core::rig::PadId;
 use touch2touch_pipeline::compare::{Beside, beside};
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::steps::imprint;
+use touch2touch_pipeline::steps::imprint::{self, flags_of};
 
 impl Computes for MetersKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
@@ -54,11 +55,6 @@ impl Computes for PictureKey {
     }
 }
 
-/// An input of a job that was there when it was prepared: a defect if it ever shows.
-pub(crate) fn gone() -> TaskError {
-    TaskError::new("Compute", "the measured imprint is not there")
-}
-
 /// The imprint shown for one finger, meters, raw bubble orientation.
 pub fn imprint(state: &State, source: ImprintSource, finger: PadId) -> Lookup<'_, DepthMap> {
     match results::imprint_key(state, source, finger) {
@@ -86,4 +82,38 @@ pub(crate) fn want_imprint(wants: &mut Demands<'_>, finger: PadId, touch: TouchK
         Some(false) => wants.ask(MetersKey(recipe, state.settings.shift)),
         None => {}
     }
+}
+
+impl Computes for FlagsKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Flag>>> {
+        let Self(recipe, shift) = self.clone();
+        let prediction = state.results.predictions.get(&recipe)?.clone();
+        let sample = state.results.samples.get(&recipe.touch.pair)?.clone();
+        Some(Job::new(Lane::Compute, "Depth chain", move |_| {
+            flags_of(&prediction, shift, &sample, recipe.touch.finger)
+        }))
+    }
+
+    fn wanted(wants: &mut Demands<'_>) {
+        let state = wants.state;
+        let Some(touch) = state.touch_key(state.selection.finger).filter(|_| state.needs(Demand::Flags)) else {
+            return;
+        };
+        let Some(recipe) = results::shown(state, touch) else { return };
+        let there = state.results.samples.contains(&touch.pair) && state.results.predictions.contains(recipe);
+        if there && !state.library.predicts_color(&recipe.bundle) {
+            wants.ask(FlagsKey(recipe.clone(), state.settings.shift));
+        }
+    }
+}
+
+/// Everything implausible about the way to meters of the prediction shown for one finger, the worst first.
+pub fn flags(state: &State, finger: PadId) -> Lookup<'_, Vec<Flag>> {
+    let Some(recipe) = results::chosen(state, finger) else {
+        return results::touch(state, finger).and_then(Absent::NoPrediction, |_| None);
+    };
+    if state.library.predicts_color(&recipe.bundle) {
+        return Lookup::Absent(Absent::PredictsColor);
+    }
+    state.look(FlagsKey(recipe.clone(), state.settings.shift)).value()
 }

@@ -13,13 +13,13 @@ use super::super::state::tasks::Level;
 use touch2touch_pipeline::error::TaskError;
 
 /// The name of the pair.
-fn name(state: &State, key: LabelsKey) -> Option<String> {
+fn name(state: &State, key: &LabelsKey) -> Option<String> {
     Some(state.library.entry(key.0.pair)?.name.clone())
 }
 
 impl Computes for LabelsKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Read>> {
-        let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, *self)?);
+        let (source, name) = (state.library.open.as_ref()?.source.clone(), name(state, self)?);
         Some(Job::new(Lane::Files, format!("Labels of {name}"), move |_| {
             let labels = source.load_labels(&name)?;
             let told = source.past(&name, &labels);
@@ -28,7 +28,7 @@ impl Computes for LabelsKey {
     }
 
     fn arrived(&self, state: &mut State, read: &Arc<Read>) {
-        let Some(name) = name(state, *self) else { return };
+        let Some(name) = name(state, self) else { return };
         let doc = &mut state.document;
         if doc.stored.insert(name.clone(), Stored::Loaded) == Some(Stored::Loaded) {
             // Read twice: what is here may be newer.
@@ -50,7 +50,7 @@ impl Computes for LabelsKey {
     }
 
     fn failed(&self, state: &mut State, err: &TaskError) -> bool {
-        if let Some(name) = name(state, *self) {
+        if let Some(name) = name(state, self) {
             state.document.stored.insert(name, Stored::Blocked(err.clone()));
         }
         true

@@ -1,23 +1,26 @@
-//! Raw predictions: those kept on the disk and those that a pane needs.
+//! Raw predictions: those kept on the disk, those that a pane needs, and those of the pair on screen that cost little.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::{Key, Keyed, PredictionKey, StoredKey, TouchKey};
-use super::super::results;
+use super::super::keys::{ImprintSource, Keyed, PredictionKey, PrefetchKey, StoredKey, TouchKey};
+use super::super::pane::Demand;
+use super::super::recipe;
 use super::super::results::preview::Onlooker;
-use super::super::results::{Computes, Demands};
+use super::super::results::{self, Computes, Demands};
 use super::super::services::{Services, SharedServices};
 use super::super::source::DataSource;
-use super::super::state::State;
+use super::super::state::results::Key as _;
+use super::super::state::{Absent, State};
 use touch2touch_core::grid::RgbGrid;
 use touch2touch_core::rig::{PadId, SensorId};
 use touch2touch_core::sample::Sample;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
-use touch2touch_pipeline::steps::bundles::BundleInfo;
+use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 use touch2touch_pipeline::steps::models;
 use touch2touch_pipeline::steps::prediction::Prediction;
 
@@ -153,4 +156,91 @@ pub(crate) fn keep_prediction(state: &mut State, recipe: PredictionKey, made: Ar
     let bytes = PredictionKey::bytes(&made);
     results.predictions.insert(recipe.clone(), made, bytes);
     results.list_made(&recipe, in_front);
+}
+
+/// `Ok` where something can be generated for the selected pair.
+///
+/// # Errors
+/// Why not.
+pub fn can_generate(state: &State) -> Result<(), Absent> {
+    state.pair_key().ok_or(if state.library.open.is_none() { Absent::NothingOpen } else { Absent::NothingSelected })?;
+    recipe::bundle(state, BundleKind::Generator)?;
+    // While the sample loads, the job loads it itself.
+    let Some(sample) = results::sample(state).ready() else {
+        return Ok(());
+    };
+    if sample.rig.pads().any(|finger| has_input(state, sample, finger)) { Ok(()) } else { Err(Absent::NoInput) }
+}
+
+/// True where a finger has a reading of the sensor that the generator starts from.
+fn has_input(state: &State, sample: &Sample, finger: PadId) -> bool {
+    let ends = recipe::bundle(state, BundleKind::Generator).ok().and_then(|bundle| bundle.ends(&sample.rig)?.ok());
+    ends.is_some_and(|ends| sample.pad(finger).is_some_and(|touch| touch.reading(ends.input).is_some()))
+}
+
+/// True where something can be generated for a finger of the selected pair, which is loaded.
+pub(crate) fn can_start(state: &State, finger: PadId) -> bool {
+    results::sample(state).ready().is_some_and(|sample| has_input(state, sample, finger))
+}
+
+/// The highest cost of a prediction that is made without being asked for, seconds.
+pub(crate) const CHEAP_S: f64 = 1.0;
+/// The time between two looks whether the pair is still on screen, before its prediction begins.
+const LOOK: Duration = Duration::from_millis(10);
+
+impl Computes for PrefetchKey {
+    fn job(&self, state: &State, services: &SharedServices) -> Option<Job<Prediction>> {
+        let Job { lane, what, body } = self.0.job(state, services)?;
+        // Once for a pair and settings: the other finger follows at once.
+        let beside = |pad| PredictionKey { touch: self.0.touch.pair.finger(pad), ..self.0.clone() };
+        let first = !state.rig().pads().any(|pad| state.results.predictions.contains(&beside(pad)));
+        let patience = if first { services.patience() } else { Duration::ZERO };
+        let told = what.clone();
+        Some(Job::new(lane, what, move |cx| {
+            // Who pages on does not want it.
+            let mut waited = Duration::ZERO;
+            while waited < patience {
+                cx.check(&told)?;
+                std::thread::sleep(LOOK);
+                waited += LOOK;
+            }
+            cx.check(&told)?;
+            body(cx)
+        }))
+    }
+
+    fn arrived(&self, state: &mut State, made: &Arc<Prediction>) {
+        results::keep_prediction(state, self.0.clone(), made.clone(), true);
+    }
+}
+
+/// The prediction of a finger of the pair on screen that is made without being asked for, if one is.
+pub(crate) fn prefetch(state: &State, finger: PadId) -> Option<PrefetchKey> {
+    let needs = [Demand::Imprint(ImprintSource::Predicted), Demand::Comparison];
+    let (_, cloud) = results::shows_cloud(state, ImprintSource::Predicted);
+    let shown = cloud || needs.into_iter().any(|need| state.needs(need));
+    if !state.settings.generate.by_itself
+        || !shown
+        || state.tasks.any_generating().is_some()
+        || !results::fingers_to_generate(state).contains(&finger)
+    {
+        return None;
+    }
+    let touch = state.touch_key(finger).filter(|touch| state.results.looked_up.contains(touch))?;
+    let key = PrefetchKey(recipe::prediction(state, touch)?);
+    // What a person picked under these settings is meant.
+    let there = state.results.predictions.contains(&key.0) || results::picked(state, touch).is_some();
+    if there || !results::can_start(state, finger) {
+        return None;
+    }
+    let cheap = state.results.cost_of(&key.0).is_none_or(|seconds| seconds < CHEAP_S);
+    (cheap && state.failure(key.clone()).is_none()).then_some(key)
+}
+
+/// The predictions of the pair on screen that cost little.
+pub(crate) fn want_predictions_ahead(wants: &mut Demands<'_>) {
+    let fingers = results::fingers_to_generate(wants.state);
+    for key in fingers.into_iter().filter_map(|finger| prefetch(wants.state, finger)) {
+        wants.ask_unless(false, key);
+    }
 }

@@ -1,14 +1,19 @@
-//! The tensors of a pair.
+//! The tensors of a pair, its small picture, and what its GelSlim images leave open.
 
 use super::super::jobs::{Job, Lane};
-use super::super::keys::PairKey;
-use super::super::results::Computes;
+use super::super::keys::{AmbiguityKey, PairKey, ThumbnailKey, TouchKey};
+use super::super::pane::Demand;
+use super::super::results::{self, Computes, Demands};
 use super::super::services::SharedServices;
 use super::super::state::{Absent, Lookup, State};
+use touch2touch_core::ambiguity::Ambiguity;
+use touch2touch_core::dataset::PairId;
 use touch2touch_core::frames::PlanarPose;
+use touch2touch_core::grid::DepthMap;
 use touch2touch_core::rig::PadId;
 use touch2touch_core::sample::{ColorTouch, DepthTouch, PadTouch, Sample};
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::steps::imprint;
 
 impl Computes for PairKey {
     fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Sample>> {
@@ -20,6 +25,11 @@ impl Computes for PairKey {
     fn failed(&self, state: &mut State, _: &TaskError) -> bool {
         state.is_selected(*self)
     }
+}
+
+/// An input of a job that was there when it was prepared: a defect if it ever shows.
+pub(crate) fn gone() -> TaskError {
+    TaskError::new("Compute", "the measured imprint is not there")
 }
 
 /// The tensors of the selected pair.
@@ -51,4 +61,56 @@ pub fn bubble(state: &State, finger: PadId) -> Lookup<'_, DepthTouch> {
 /// The true pose of the selected pair, `grasp_from_object`, where it is known.
 pub fn truth(state: &State) -> Option<PlanarPose> {
     sample(state).ready()?.grasp_from_object
+}
+
+impl Computes for ThumbnailKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<DepthMap>> {
+        let (source, pair) = (state.library.open.as_ref()?.source.clone(), self.0.pair);
+        let loaded = state.results.samples.get(&self.0).cloned();
+        let what = format!("Picture of {}", state.library.entry(pair)?.name);
+        Some(Job::new(Lane::Files, what, move |_| match loaded {
+            Some(sample) => Ok(imprint::thumbnail(&sample)),
+            None => Ok(imprint::thumbnail(&source.load(pair)?)),
+        }))
+    }
+}
+
+/// The small picture of a pair, if it was made.
+pub fn thumbnail(state: &State, pair: PairId) -> Option<&DepthMap> {
+    let key = ThumbnailKey(state.library.open.as_ref()?.key(pair));
+    state.results.thumbnails.get(&key).map(|a| &**a)
+}
+
+/// The pictures of the rows on screen.
+pub(crate) fn want_thumbnails(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    let Some(open) = state.library.open.as_ref().filter(|_| state.needs(Demand::Thumbnails)) else {
+        return;
+    };
+    let end = state.library.rows.end.min(state.library.order.len());
+    let start = state.library.rows.start.min(end);
+    for pair in &state.library.order[start..end] {
+        wants.ask(ThumbnailKey(open.key(*pair)));
+    }
+}
+
+impl Computes for AmbiguityKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Self::Value>> {
+        let (sample, finger) = (state.results.samples.get(&self.0.pair)?.clone(), self.0.finger);
+        Some(Job::new(Lane::Compute, "What the GelSlim image leaves open", move |_| {
+            let gelslim = sample.pad(finger).and_then(|t| t.color());
+            Ok(touch2touch_core::ambiguity::ambiguity(&gelslim.ok_or_else(gone)?.difference))
+        }))
+    }
+}
+
+/// The ambiguity of the GelSlim image of one finger, once it is known.
+pub fn ambiguity(state: &State, finger: PadId) -> Option<Ambiguity> {
+    **state.results.ambiguities.get(&AmbiguityKey(state.touch_key(finger)?))?
+}
+
+pub(crate) fn want_ambiguity(wants: &mut Demands<'_>, finger: PadId, touch: TouchKey) {
+    if results::gelslim(wants.state, finger).ready().is_some() {
+        wants.ask(AmbiguityKey(touch));
+    }
 }

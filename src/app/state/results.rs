@@ -1,16 +1,36 @@
 //! [`Results`]: what was computed, each under the key that decides it.
 //!
-//! **The table** has one row for each kind of result; what can be asked for ([`Request`]), what comes back ([`Computed`])
+//! **The table** has one row for each kind of result, with its key, its type and the bytes that one holds; what can be asked for ([`Request`]), what comes back ([`Computed`])
 //! and what is kept ([`Results`]) follow from it, and so does in [`crate::app::results`] how it is computed.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+use super::super::keys::dataset::Read;
 use super::super::keys::{
-    CloudKey, ImprintSource, InspectionKey, Key, PairKey, PoseKey, PredictionKey, Preview, TouchKey,
+    CloudKey, Distances, ImprintSource, Inspection, InspectionKey, Keyed, PairKey, PoseKey, PredictionKey, Preview,
+    TouchKey,
 };
 use super::cache::Cache;
 use super::shown::Shown;
+use touch2touch_core::ambiguity::Ambiguity;
+use touch2touch_core::contact::ContactMask;
+use touch2touch_core::grid::{DepthMap, RgbGrid};
+use touch2touch_core::postprocess::Flag;
+use touch2touch_core::sample::Sample;
+use touch2touch_core::which_tool::Candidate;
+use touch2touch_pipeline::compare::deviation::{CloudDifference, Deviation};
+use touch2touch_pipeline::compare::{Beside, Comparison};
+use touch2touch_pipeline::doctor::Fact;
+use touch2touch_pipeline::export::Plan;
+use touch2touch_pipeline::export::import::Import;
+use touch2touch_pipeline::learn::train::TrainPlan;
+use touch2touch_pipeline::masks::propose::Proposal;
+use touch2touch_pipeline::steps::estimate::Estimate;
+use touch2touch_pipeline::steps::layers::LayerResult;
+use touch2touch_pipeline::steps::pose::PoseResult;
+use touch2touch_pipeline::steps::prediction::Prediction;
+use touch2touch_pipeline::steps::tool::NamedTool;
 
 const MIB: usize = 1 << 20;
 
@@ -19,72 +39,83 @@ macro_rules! table {
     ($with:ident) => {
         $with! {
         /// The tensors of a pair: about 10 MB of a lab pair (two GelSlim images and their difference, per finger).
-        Sample(PairKey) in samples, 192 * MIB;
+        Sample(PairKey => Sample, Sample::bytes) in samples, 192 * MIB;
         /// The labels stored for a pair: they go to the document.
-        Labels(LabelsKey);
+        Labels(LabelsKey => Read);
         /// The lines about the data set.
-        About(AboutKey) in abouts, MIB;
+        About(AboutKey => Vec<Fact>, |facts| facts.len() * 512) in abouts, MIB;
         /// The CAD model of a tool and what the registration derives from it.
-        Tool(ToolKey) in tools, 128 * MIB;
+        Tool(ToolKey => NamedTool, tool_bytes) in tools, 128 * MIB;
         /// The predictions of a touch that lie on the disk from before.
-        Stored(StoredKey);
+        Stored(StoredKey => Keyed);
         /// Raw predictions. One is asked for because a pane needs it beside that of the other finger.
-        Prediction(PredictionKey) in predictions, 256 * MIB;
+        Prediction(PredictionKey => Prediction, |made| made.raw.channels.iter().map(|c| c.len() * 4).sum()) in predictions, 256 * MIB;
         /// A prediction of the pair on screen that nobody asked for: kept with the others.
-        Prefetch(PrefetchKey);
+        Prefetch(PrefetchKey => Prediction);
         /// The mean of several predictions of one touch.
-        Mean(MeanKey) in means, 16 * MIB;
+        Mean(MeanKey => DepthMap, |mean| mean.len() * 4) in means, 16 * MIB;
         /// A prediction in meters, as large as the bubble image.
-        Imprint(MetersKey) in imprints, 64 * MIB;
+        Imprint(MetersKey => DepthMap, |imprint| imprint.len() * 4) in imprints, 64 * MIB;
         /// A prediction of a color sensor: differences, 0..255 scale.
-        Color(ColorKey) in colors, 32 * MIB;
+        Color(ColorKey => RgbGrid, |picture| picture.len() * 12) in colors, 32 * MIB;
         /// The prediction of another program that lies beside a pair as a picture.
-        Picture(PictureKey) in pictures, 16 * MIB;
+        Picture(PictureKey => Beside, |found| 4 * (found.tile.len() + found.imprint.len())) in pictures, 16 * MIB;
         /// A prediction that is compared with something: kept with the others.
-        Compared(ComparedKey);
+        Compared(ComparedKey => Prediction);
         /// Any two imprints of a touch against each other.
-        Versus(VersusKey) in versus, 64 * MIB;
+        Versus(VersusKey => Comparison, |found| found.error.len() * 4) in versus, 64 * MIB;
         /// The distances of the points of one cloud from another.
-        Apart(CloudDifferenceKey) in apart, 16 * MIB;
+        Apart(CloudDifferenceKey => CloudDifference, CloudDifference::bytes) in apart, 16 * MIB;
         /// Flags: implausible things about the way of a prediction to meters.
-        Flags(FlagsKey) in flags, MIB;
+        Flags(FlagsKey => Vec<Flag>, |found| found.len() * 512) in flags, MIB;
         /// The ambiguity of a GelSlim image: what it leaves open.
-        Ambiguity(AmbiguityKey) in ambiguities, MIB;
+        Ambiguity(AmbiguityKey => Option<Ambiguity>, |found| size_of_val(found)) in ambiguities, MIB;
         /// An automatic mask.
-        Mask(MaskKey) in masks, 32 * MIB;
+        Mask(MaskKey => ContactMask, |found| found.mask.len()) in masks, 32 * MIB;
         /// The plan of an export of masks: what it would write where.
-        MaskPlan(MaskPlanKey) in mask_plans, MIB;
+        MaskPlan(MaskPlanKey => Plan, |plan| plan.total() * 128) in mask_plans, MIB;
         /// The plan of an import of masks: what it would change.
-        ImportPlan(ImportPlanKey) in import_plans, MIB;
+        ImportPlan(ImportPlanKey => Import, |plan| (plan.changed.len() + plan.unmatched.len() + plan.refused.len()) * 128) in import_plans, MIB;
         /// The distances of an imprint's points from the CAD model.
-        Distances(DistancesKey) in distances, 32 * MIB;
+        Distances(DistancesKey => Distances, |found| found.grid.len() * 8) in distances, 32 * MIB;
         /// A mask that is proposed.
-        Proposal(ProposalKey) in proposals, 16 * MIB;
+        Proposal(ProposalKey => Proposal, |found| found.mask.len()) in proposals, 16 * MIB;
         /// The plan of a training of the mask model: what it would learn from.
-        TrainPlan(TrainPlanKey) in train_plans, MIB;
+        TrainPlan(TrainPlanKey => TrainPlan, |plan| (plan.masks() + plan.held_out[0]) * 256) in train_plans, MIB;
         /// A cloud.
-        Cloud(CloudKey) in clouds, 128 * MIB;
+        Cloud(CloudKey => Estimate, Estimate::bytes) in clouds, 128 * MIB;
         /// A pose.
-        Pose(PoseKey) in poses, 32 * MIB;
+        Pose(PoseKey => PoseResult, PoseResult::bytes) in poses, 32 * MIB;
         /// A pose without its proof: shown until that is there.
-        ProvisionalPose(ProvisionalPoseKey) in provisional_poses, 3 * MIB;
+        ProvisionalPose(ProvisionalPoseKey => PoseResult, PoseResult::bytes) in provisional_poses, 3 * MIB;
         /// A registration with everything recorded.
-        Run(RunKey) in runs, 32 * MIB;
+        Run(RunKey => PoseResult, PoseResult::bytes) in runs, 32 * MIB;
         /// Reasons, residuals and distances of a recorded registration from the registration's own starts.
-        Layers(LayersKey) in layers, 16 * MIB;
+        Layers(LayersKey => LayerResult, LayerResult::bytes) in layers, 16 * MIB;
         /// Signed distances between contact points and the registered model.
-        Deviation(DeviationKey) in deviations, 63 * MIB;
+        Deviation(DeviationKey => Deviation, Deviation::bytes) in deviations, 63 * MIB;
         /// All tools of the data set, ranked for the touch of a pose.
-        Ranking(RankingKey) in rankings, MIB;
+        Ranking(RankingKey => Vec<Candidate>, |found| found.len() * size_of::<Candidate>()) in rankings, MIB;
         /// The steps of a recorded registration, made ready to be looked through.
-        Inspection(InspectionKey) in inspections, 64 * MIB;
+        Inspection(InspectionKey => Inspection, Inspection::bytes) in inspections, 64 * MIB;
         /// A small picture of a pair's measured imprint (right finger, else left).
-        Thumbnail(ThumbnailKey) in thumbnails, 32 * MIB;
+        Thumbnail(ThumbnailKey => DepthMap, |picture| picture.len() * 4) in thumbnails, 32 * MIB;
         }
     };
 }
 
 pub(in crate::app) use table;
+
+/// The key of a result. Equal keys have equal results.
+pub trait Key: Clone + Ord + Send + 'static {
+    /// The result.
+    type Value: Send + Sync + 'static;
+
+    /// Bytes that a result holds.
+    fn bytes(_value: &Self::Value) -> usize {
+        0
+    }
+}
 
 /// A key whose result is kept in a cache of its own.
 pub(crate) trait Cached: Key + Into<Request> {
@@ -104,19 +135,22 @@ pub struct Latest {
 }
 
 macro_rules! results {
-    ($( #[doc = $doc:literal] $variant:ident($key:ident) $(in $cache:ident, $budget:expr)?; )*) => {
+    ($(
+        #[doc = $doc:literal]
+        $variant:ident($key:ident => $value:ty $(, $bytes:expr)?) $(in $cache:ident, $budget:expr)?;
+    )*) => {
         /// A result that is computed because a visible pane shows it. Ordered, hashable: it is its own key.
         #[derive(Clone, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
         pub enum Request { $( #[doc = $doc] $variant($crate::app::keys::$key), )* }
 
         /// A computed result with its key.
         #[derive(Clone, Debug)]
-        pub enum Computed { $( #[doc = $doc] $variant($crate::app::keys::$key, Arc<<$crate::app::keys::$key as Key>::Value>), )* }
+        pub enum Computed { $( #[doc = $doc] $variant($crate::app::keys::$key, Arc<$value>), )* }
 
         /// All caches, and what follows from their contents.
         #[derive(Debug)]
         pub struct Results {
-            $( $( #[doc = $doc] pub $cache: Cache<$crate::app::keys::$key, <$crate::app::keys::$key as Key>::Value>, )? )*
+            $( $( #[doc = $doc] pub $cache: Cache<$crate::app::keys::$key, $value>, )? )*
             /// Results of which the log said what is odd about them.
             pub noted: BTreeSet<Request>,
             /// The previews of what is on its way to each touch.
@@ -169,6 +203,15 @@ macro_rules! results {
                 }
             }
 
+            impl Key for $crate::app::keys::$key {
+                type Value = $value;
+
+                $( fn bytes(value: &$value) -> usize {
+                    let bytes: fn(&$value) -> usize = $bytes;
+                    bytes(value)
+                } )?
+            }
+
             $( impl Cached for $crate::app::keys::$key {
                 fn cache(results: &Results) -> &Cache<Self, Self::Value> {
                     &results.$cache
@@ -179,6 +222,12 @@ macro_rules! results {
 }
 
 table!(results);
+
+fn tool_bytes(tool: &NamedTool) -> usize {
+    let mesh = tool.model.mesh.vertices.len() * 24 + tool.model.mesh.triangles.len() * 12;
+    // The registration's field and tree are of the mesh's order, at least a few MB.
+    8 * mesh + (4 << 20)
+}
 
 impl Results {
     /// Lists a prediction that was kept; with `in_front` it is shown where the settings name none that is there.

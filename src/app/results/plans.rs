@@ -1,0 +1,143 @@
+//! What is said of the whole data set: plans of exports, imports and trainings of masks, and the doctor's lines.
+
+use super::super::jobs::{Job, Lane};
+use super::super::keys::{AboutKey, ImportPlanKey, MaskPlanKey, Revision, TrainPlanKey};
+use super::super::pane::Demand;
+use super::super::results::{Computes, Demands};
+use super::super::services::SharedServices;
+use super::super::state::State;
+use super::super::state::learn::Network;
+use super::super::state::tasks::TaskKind;
+use touch2touch_pipeline::doctor::{Fact, facts};
+use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::export::import::{Import, ImportSetup, plan_import};
+use touch2touch_pipeline::export::{DrawnMasks, Plan};
+use touch2touch_pipeline::labels::Labels;
+use touch2touch_pipeline::learn::train::{TrainPlan, plan};
+
+impl Computes for MaskPlanKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Plan>> {
+        let source = state.library.open.as_ref()?.source.clone();
+        let (changed, choice) = (state.document.finished_labels(), self.choice);
+        Some(Job::new(Lane::Files, "Plan of an export", move |_| source.plan_masks(&changed, choice)))
+    }
+
+    /// The form says it.
+    fn failed(&self, _: &mut State, _: &touch2touch_pipeline::error::TaskError) -> bool {
+        false
+    }
+}
+
+/// The plan of the export that the form describes, while the form is open.
+pub fn mask_plan_key(state: &State) -> Option<MaskPlanKey> {
+    let open = state.library.open.as_ref().filter(|_| state.export.asking_masks)?;
+    let revision = Revision(state.document.last_revision);
+    Some(MaskPlanKey { dataset: open.seq, choice: state.export.masks, revision })
+}
+
+pub(crate) fn want_mask_plan(wants: &mut Demands<'_>) {
+    if let Some(key) = mask_plan_key(wants.state).filter(|_| wants.state.document.stroke.is_none()) {
+        wants.ask(key);
+    }
+}
+
+impl Computes for ImportPlanKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Import>> {
+        let source = state.library.open.as_ref()?.source.clone();
+        let setup = import_setup(state)?;
+        Some(Job::new(Lane::Files, "Plan of an import", move |cx| {
+            plan_import(source.on_disk("Plan of an import")?, &setup, cx)
+        }))
+    }
+
+    /// The form says it.
+    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
+        false
+    }
+}
+
+/// The plan of the import that the form describes, while the form is open.
+pub fn import_plan_key(state: &State) -> Option<ImportPlanKey> {
+    let (open, form) = (state.library.open.as_ref()?, state.export.importing.clone()?);
+    Some(ImportPlanKey { dataset: open.seq, form, revision: Revision(state.document.last_revision) })
+}
+
+pub(crate) fn want_import_plan(wants: &mut Demands<'_>) {
+    // Over what is on the disk: a stroke must have come there first.
+    let at_rest = wants.state.document.stroke.is_none() && wants.state.document.unsaved.is_empty();
+    if let Some(key) = import_plan_key(wants.state).filter(|_| at_rest) {
+        wants.ask(key);
+    }
+}
+
+/// The setup of the import that the form describes, while it is open.
+pub(crate) fn import_setup(state: &State) -> Option<ImportSetup> {
+    let form = state.export.importing.as_ref()?;
+    let (from, over_drawn, person) = (form.from.clone(), form.over_drawn, state.settings.known_labeler());
+    Some(ImportSetup { from, format: None, over_drawn, person })
+}
+
+impl Computes for TrainPlanKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<TrainPlan>> {
+        let source = state.library.open.as_ref()?.source.clone();
+        let (changed, choice) = (state.document.labels.clone(), self.choice);
+        Some(Job::new(Lane::Files, "Plan of a training", move |_| {
+            let dataset = source.on_disk("Plan of a training")?;
+            plan(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }, choice)
+        }))
+    }
+
+    /// The pane says it.
+    fn failed(&self, _: &mut State, _: &TaskError) -> bool {
+        false
+    }
+}
+
+/// The plan of the training that the pane describes.
+pub(crate) fn train_plan_key(state: &State) -> Option<TrainPlanKey> {
+    let open = state.library.open.as_ref()?;
+    let revision = Revision(state.document.last_revision);
+    Some(TrainPlanKey { dataset: open.seq, choice: state.learn.form.choice, revision })
+}
+
+pub(crate) fn want_train_plan(wants: &mut Demands<'_>) {
+    let state = wants.state;
+    if !state.needs(Demand::Training)
+        || state.learn.shown != Network::Masks
+        || state.document.stroke.is_some()
+        || state.tasks.of_kind(TaskKind::Learn).is_some()
+    {
+        return;
+    }
+    if let Some(key) = train_plan_key(state) {
+        wants.ask(key);
+    }
+}
+
+impl Computes for AboutKey {
+    fn job(&self, state: &State, _: &SharedServices) -> Option<Job<Vec<Fact>>> {
+        let source = state.library.open.as_ref()?.source.clone();
+        let changed = state.document.labels.clone();
+        Some(Job::new(Lane::Compute, "About this data", move |_| {
+            let dataset = source.on_disk("About this data")?;
+            Ok(facts(dataset, &DrawnMasks { labels: &Labels::of(dataset), changed: &changed }))
+        }))
+    }
+}
+
+/// The key of the lines about the open data set.
+pub(crate) fn doctor_key(state: &State) -> Option<AboutKey> {
+    let open = state.library.open.as_ref()?;
+    let (pairs, revision) = (open.index().pairs.len(), Revision(state.document.last_revision));
+    Some(AboutKey { dataset: open.seq, pairs, revision, units_named: state.library.units_named })
+}
+
+/// Asks for them while the panel is looked at.
+pub(crate) fn want_doctor(wants: &mut Demands<'_>) {
+    if wants.state.doctor.shown
+        && wants.state.document.stroke.is_none()
+        && let Some(key) = doctor_key(wants.state)
+    {
+        wants.ask(key);
+    }
+}
