@@ -69,9 +69,9 @@ enum Verb {
     Simulate(simulate::SimulateArgs),
     /// Predict Soft Bubble imprints from GelSlim images and compare them with the measured ones.
     Generate(generate::GenerateArgs),
-    /// Any two imprints of a pair against each other: measured, predictions, the mean of seeds, a stored picture.
+    /// Compare any two imprints of a pair: measured, predictions, the mean of several seeds, a stored picture.
     Compare(Box<compare::CompareArgs>),
-    /// Statistics of a data set's predictions and measurements, for the shift `--shift refit`.
+    /// Compute the depth statistics of a data set's predictions and measurements, for `--shift refit:FILE`.
     Stats(stats::StatsArgs),
     /// Follow a folder: predict and pose each GelSlim touch that appears, and write the result beside it.
     ///
@@ -80,25 +80,25 @@ enum Verb {
     Watch(Box<watch::WatchArgs>),
     /// Estimate in-hand poses from measured or predicted imprints.
     Pose(pose::PoseArgs),
-    /// The paper's results table of a data set: generators side by side, with the measured imprints as the upper bound.
+    /// Make the paper's results table of a data set: generators side by side, the measured imprints as the upper bound.
     Evaluate(Box<evaluate::EvaluateArgs>),
     /// Draw a pair in 3D, as a PNG of any size, or as the frames of a turntable.
     Still(Box<still::StillArgs>),
     /// Write a pair for other programs: its cloud (PLY), pose (JSON) and CAD model in the hand (STL).
     Export(Box<export::ExportArgs>),
-    /// Fit a generator to pairs of your own sensors, and say what it is worth on pairs that were left out.
+    /// Fit a generator to pairs of your own sensors, and score it on pairs that were left out.
     Adapt(Box<adapt::AdaptArgs>),
-    /// List what people said about the pairs, or say it: corrected masks, review states, accepted poses.
+    /// List or change labels: hand-drawn masks, review states, notes, accepted poses.
     Label(Box<label::LabelArgs>),
     /// Contact masks.
     #[command(subcommand)]
     Masks(masks::MasksVerb),
-    /// Open a data set and list what is wrong with it, or say for good how it is read.
+    /// Check a data set and list its problems, or set how it is read.
     Doctor(doctor::DoctorArgs),
     /// Model bundles.
     #[command(subcommand)]
     Bundle(models::BundleVerb),
-    /// Say which model runtime is used and why, and which GPUs it can use.
+    /// Show which engine runs the models and why, and which GPUs it can use.
     Runtime(models::RuntimeArgs),
 }
 

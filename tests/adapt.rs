@@ -70,7 +70,7 @@ fn a_fit_is_scored_on_what_was_left_out_and_becomes_a_bundle_of_its_own() {
     assert!(tried["bundle"].is_null() && !Path::new(out).exists());
     // The tiny generator draws the same whatever it sees, which is said of its fit.
     let refused = adapt(&["--out", out]);
-    assert!(!refused.status.success() && said(&refused).contains("do not know their own"), "{}", said(&refused));
+    assert!(!refused.status.success() && said(&refused).contains("do not match their own"), "{}", said(&refused));
     assert!(!Path::new(out).exists());
     let made = json(&adapt(&["--out", out, "--force"]));
     assert_eq!((&made["pairs"], &made["touches"], &made["bundle"]), (&12.into(), &12.into(), &out.into()));
@@ -200,7 +200,7 @@ fn a_run_that_is_stopped_goes_on_to_the_same_last_bit() {
     let models = Models::new(None);
     let straight = adapt(&dataset, &setup(None), &models, &JobCx::unwatched()).unwrap();
     assert_eq!((straight.steps, straight.curves.len()), (2, 5), "{:?}", straight.curves);
-    assert!(straight.warnings.iter().any(|w| w.contains("2 steps of tuning are few")), "{:?}", straight.warnings);
+    assert!(straight.warnings.iter().any(|w| w.contains("2 tuning steps are few")), "{:?}", straight.warnings);
     // Stopped in the first part and in the run on all.
     let kept = dir.path().join("unfinished");
     for stop_at in [1, 5] {

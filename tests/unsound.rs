@@ -49,7 +49,7 @@ type Spoiling = (&'static str, fn(&Path), &'static [&'static str]);
 
 const SPOILT: [Spoiling; 2] = [
     ("fingers swapped", |set| each_bubble(set, swap_halves), &["fingers are swapped"]),
-    ("GelSlims of other pairs", other_gelslims, &["do not know their own imprints"]),
+    ("GelSlims of other pairs", other_gelslims, &["do not match their own imprints"]),
 ];
 
 fn each_bubble(set: &Path, spoil: impl Fn(&mut [f32])) {

@@ -103,7 +103,7 @@ impl Errand for Score {
             state.log.info("The evaluation was stopped: the table holds what was scored until then");
         }
         if let Some(first) = evaluation.skipped.first() {
-            let text = format!("{} things could not be scored", evaluation.skipped.len());
+            let text = format!("{} items could not be scored", evaluation.skipped.len());
             let why = format!("the first: {}: {}", first.what, first.why);
             state.log.push(Level::Warning, text, Some(why), None);
         }

@@ -95,7 +95,7 @@ fn take_up(state: &mut State, network: Network, effects: &mut Vec<Effect>) {
         // What is on screen is of the model before.
         Network::Generator if results::can_generate(state).is_ok() => predict::same_seed(state, effects),
         Network::Generator => {}
-        Network::Masks => state.log.info(format!("Automatic masks are made by {name} from now on")),
+        Network::Masks => state.log.info(format!("Automatic masks now come from {name}")),
     }
 }
 
@@ -189,16 +189,15 @@ impl Errand for Learn {
             Learned::Masks(trained, bundle) => {
                 let scores = match (trained.before, trained.after) {
                     (Some(before), Some(after)) => {
-                        format!(", IoU {:.3} instead of {:.3} on other pairs", after.iou, before.iou)
+                        format!(", IoU {:.3} → {:.3} on other pairs", before.iou, after.iou)
                     }
                     _ => String::new(),
                 };
                 state.log.saved(format!("Trained: {}{scores}", bundle.name), trained.bundle.clone());
                 add(state, Network::Masks, bundle);
                 if trained.is_worse() {
-                    let hint =
-                        "Train it for longer or on more masks; \"Use the trained mask model\" takes it all the same.";
-                    let text = "The trained mask model is worse on other pairs, and was not taken into use";
+                    let hint = "Train longer or on more masks; \"Use the trained mask model\" uses it anyway.";
+                    let text = "The trained mask model is worse on other pairs and is not used";
                     state.log.push(Level::Warning, text, None, Some(hint.into()));
                 } else {
                     take_up(state, Network::Masks, effects);

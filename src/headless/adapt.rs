@@ -19,10 +19,10 @@ use touch2touch_pipeline::learn::adapt::{AdaptSetup, Adapted, Scored, Tuning, ad
 pub(super) struct AdaptArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// The folder of the new bundle. Without it the fit is only tried.
+    /// The folder of the fitted bundle. Without it the fit is scored and not saved.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Write the new bundle even where its figures or the data speak against the fit.
+    /// Save the fit even if its scores or the data speak against it.
     #[arg(long, requires = "out")]
     force: bool,
     /// Replace a fit to other data in that folder.
@@ -31,16 +31,15 @@ pub(super) struct AdaptArgs {
     /// Only these pairs: their names, separated by commas.
     #[arg(long, value_name = "NAME,NAME", value_delimiter = ',')]
     pairs: Vec<String>,
-    /// In how many parts the pairs are left out in turn, for the score on pairs that were not fitted; whole tools are
-    /// left out where at least three are known.
-    /// 0 leaves nothing out: the fit is made at once, and what it is worth is not known.
+    /// Folds of the cross-validation; whole tools are left out where at least three are known.
+    /// 0: no cross-validation, and so no score on other pairs.
     #[arg(long, value_name = "K", default_value_t = 3, value_parser = parse_parts)]
     validate: usize,
-    /// After the closed form tune the networks themselves with so many steps, such as 50: once for each part that is left
-    /// out, and once on all pairs. A run that was stopped goes on when the same is asked for again.
+    /// After the fit, also tune the networks for this many steps, such as 50: once for each fold, and once on all pairs.
+    /// A run that was stopped continues when you run the same command again.
     #[arg(long, value_name = "STEPS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(..=100_000))]
     tune: u32,
-    /// Tune for so long, all these runs together; a few steps are timed first.
+    /// Tune for this many minutes, all runs together; a few steps are timed first.
     #[arg(long, value_name = "M", conflicts_with = "tune", value_parser = parse_minutes)]
     minutes: Option<Duration>,
     #[command(flatten)]
@@ -92,7 +91,7 @@ pub(super) fn run(args: &AdaptArgs) -> VerbResult {
     let adapted = adapt(&dataset, &setup, &models, &output.job())?;
     super::notes::say_found(&output, &dataset, &adapted.notes);
     for remark in &adapted.left_out {
-        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+        output.note(&format!("not used: {}: {}", remark.name, remark.why));
     }
     for remark in &adapted.doubtful {
         output.note(&format!("look at {}: {}", remark.name, remark.why));
@@ -115,7 +114,7 @@ fn text(report: &Report) -> String {
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
         "{:<28} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-        "on pairs that were left out", "PSNR dB", "SSIM", "raw dB", "line dB", "seen dB", "inv. dB", "angle °"
+        "on pairs left out", "PSNR dB", "SSIM", "unscaled", "shape", "inside", "outside", "angle °"
     );
     let mut row = |name: &str, s: &Scored| {
         text += &format!(
@@ -129,15 +128,15 @@ fn text(report: &Report) -> String {
             number(s.angle.as_ref().and_then(|a| a.mean_deg), 2)
         );
     };
-    row("unfitted", &a.before);
-    for (name, scored) in [("closed form", &a.closed_form), ("tuned", &a.after)] {
+    row("before", &a.before);
+    for (name, scored) in [("fitted", &a.closed_form), ("tuned", &a.after)] {
         if let Some(scored) = scored {
             row(name, scored);
         }
     }
     for pad in &a.pads {
         text += &format!(
-            "\n{} ({} touches): moved {:+.2} px right and {:+.2} px down, {:.3} · d {:+.2} mm",
+            "\n{} ({} touches): shifted {:+.2} px right, {:+.2} px down; depth {:.3} · d {:+.2} mm",
             pad.pad,
             pad.touches,
             pad.offset_px[0],
@@ -147,7 +146,7 @@ fn text(report: &Report) -> String {
         );
     }
     text += &format!(
-        "\n\n{} pairs, {} touches, {} left out, {} doubtful; {:.1} s ({:.2} s for the fit) on {}\n",
+        "\n\n{} pairs, {} touches, {} not used, {} doubtful; {:.1} s ({:.2} s for the fit) on {}\n",
         a.pairs,
         a.touches,
         a.left_out.len(),
@@ -157,13 +156,13 @@ fn text(report: &Report) -> String {
         report.engine
     );
     match (&a.bundle, &a.in_place_of) {
-        (Some(bundle), _) => text + &format!("{} was fitted: the new bundle is {}\n", report.from, bundle.display()),
+        (Some(bundle), _) => text + &format!("fitted {}, saved as {}\n", report.from, bundle.display()),
         (None, Some(other)) => {
-            text + &format!("not written: {other}; --replace writes over it, or name a new folder\n")
+            text + &format!("not saved: {other}; overwrite it with --replace, or name a new folder\n")
         }
         (None, None) if a.unwritten.is_some() => {
-            text + "not written, because of what is said against this fit; --force writes it all the same\n"
+            text + "not saved, because of the objections above; --force saves it anyway\n"
         }
-        (None, None) => text + "tried only: name a folder with --out to keep the fit\n",
+        (None, None) => text + "not saved: name a folder with --out to keep the fit\n",
     }
 }

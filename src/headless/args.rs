@@ -86,7 +86,7 @@ impl<T: FromStr<Err = String> + Clone + Send + Sync + 'static> TypedValueParser 
 /// The registration, or several where a verb takes them.
 #[derive(Debug, Clone, Args)]
 pub(super) struct RegistrationArgs {
-    /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which contacts are let go.
+    /// The registration. `distance_field` may be followed by `:gate=MM`, beyond which points are ignored.
     #[arg(long = "engine", value_name = "ENGINE", default_value = Registration::default().key(), value_parser = registrations())]
     chosen: Registrations,
 }
@@ -127,7 +127,7 @@ impl RegistrationArgs {
 /// Limit on how much of a data set is taken.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct LimitArgs {
-    /// Take only this many, spread evenly over the data set.
+    /// Use only this many pairs, spread evenly over the data set.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     limit: Option<usize>,
 }
@@ -142,7 +142,7 @@ impl LimitArgs {
 /// One pair, or a number of them.
 #[derive(Debug, Clone, Args)]
 pub(super) struct PairArgs {
-    /// Only this pair, by its name or a part of it that no other has.
+    /// Only this pair, by its name or a unique part of it.
     #[arg(long, conflicts_with = "limit")]
     pair: Option<String>,
     #[command(flatten)]

@@ -37,18 +37,18 @@ const DIFFERENCE_M: f32 = 0.004;
 pub(super) struct CompareArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// The pair, by its name or a part of it that no other has.
+    /// The pair, by its name or a unique part of it.
     #[arg(long)]
     pair: String,
-    /// One: `measured`, `prediction`, `mean` (of seeds) or `stored` (a picture of another program's prediction beside the
+    /// First imprint: `measured`, `prediction`, `mean` (of seeds) or `stored` (a picture of another program's prediction beside the
     /// pair), with what differs from the other options: `prediction:bundle=DIR,seed=7,steps=50,shift=raw`,
     /// `mean:seeds=4`. A shift is `exact`, `unfitted` (without a bundle's fit), `paper` or `raw`.
     #[arg(long, default_value = "prediction")]
     a: Subject,
-    /// The other, in the same words.
+    /// Second imprint, given in the same way.
     #[arg(long, default_value = "measured")]
     b: Subject,
-    /// A folder for the difference of each finger, A minus B: meters as .npy, and a picture from -4 to 4 mm; created if
+    /// Folder for the difference A minus B of each finger, in meters (.npy) and as a picture from -4 to 4 mm; created if
     /// missing.
     #[arg(long)]
     out: Option<PathBuf>,

@@ -31,10 +31,10 @@ use touch2touch_pipeline::steps::recipe::Recipe;
 pub(super) struct DoctorArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// Load every pair of a large data set, not 2000 that are spread evenly.
+    /// Check every pair, not 2000 spread evenly over a large data set.
     #[arg(long)]
     all: bool,
-    /// Compare no predictions with what was measured and try no models: faster, but swapped GelSlims are not seen.
+    /// Run no models: faster, but swapped GelSlims are not noticed.
     #[arg(long)]
     no_predictions: bool,
     /// The generator's bundle (default: the shipped one).
@@ -97,7 +97,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
             kinds => format!(" of {kinds} kinds"),
         };
         let some = if examined < pairs {
-            format!(" ({examined} read, spread evenly; --all reads all)")
+            format!(" ({examined} checked, spread evenly; --all checks all)")
         } else {
             String::new()
         };
@@ -106,7 +106,7 @@ pub(super) fn run(args: &DoctorArgs) -> VerbResult {
         for p in &report.problems {
             text += &format!("\n{}\n  {}\n  {}\n", p.file.display(), p.what, p.hint);
             if p.count > 1 {
-                text += &format!("  {} times like this, but for file, finger and numbers", p.count);
+                text += &format!("  {} times like this, with other files, fingers or numbers", p.count);
                 text += &also(p);
             }
         }

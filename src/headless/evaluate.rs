@@ -34,14 +34,13 @@ pub(super) struct EvaluateArgs {
     mask: MaskArgs,
     #[command(flatten)]
     registration: RegistrationArgs,
-    /// Whose images are compared: right, left (or as the data set names it), both. Angles always come from the contact of
-    /// both fingers.
+    /// Finger whose images are scored: right, left (or as the data set names it), both. Angles always use both fingers.
     #[arg(long, value_name = "FINGER", default_value = "both")]
     fingers: FingerArg,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    /// Predict everything anew and keep nothing: ignores earlier predictions, also those of the studio.
     #[arg(long)]
     no_cache: bool,
-    /// Take only this many grasps of each tool, spread evenly.
+    /// Use only this many grasps per tool, spread evenly.
     #[arg(long, value_name = "N", value_parser = at_least_one::<usize>)]
     grasps: Option<usize>,
     /// Sampling steps (default: each bundle's; a bundle that draws in one step keeps it).
@@ -50,29 +49,29 @@ pub(super) struct EvaluateArgs {
     /// Seed of the noise, the same for every image (default: each bundle's).
     #[arg(long)]
     seed: Option<u64>,
-    /// The way from noise to an image (default: each bundle's).
+    /// Sampler (default: each bundle's).
     #[arg(long, value_parser = keyed::<Sampler>())]
     sampler: Option<Sampler>,
     #[command(flatten)]
     mapping: MappingArgs,
     #[command(flatten)]
     runtime: RuntimeArg,
-    /// Images that go through a generator at once.
+    /// Batch size of a generator.
     #[arg(long, default_value_t = Setup::default().batch, value_parser = batch)]
     batch: usize,
-    /// Drawings for the 95 % intervals; 0 leaves them out.
+    /// Bootstrap samples for the 95 % confidence intervals; 0 for no intervals.
     #[arg(long, default_value_t = Setup::default().resamples)]
     resamples: usize,
-    /// Add what the paper and the lab published on real data.
+    /// Add the rows that the paper and the lab published, on real data.
     #[arg(long)]
     paper: bool,
-    /// Write the figures and their intervals to this file, one line per method and group.
+    /// Write the scores and their intervals to this file, one line per method and group.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write evaluation.csv and .json (with every grasp) into this folder, as the studio's button does.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Add the figures of every grasp to the JSON.
+    /// Add the scores of every grasp to the JSON.
     #[arg(long)]
     pairs: bool,
     #[command(flatten)]
@@ -120,11 +119,11 @@ fn text(evaluation: &Evaluation, rows: &[Row]) -> String {
         text += &format!("- {note}\n");
     }
     if rows.iter().any(|r| r.published) {
-        text += "- rows of the paper and the lab were published on real data: compare the form, not the decimals\n";
+        text += "- rows of the paper and the lab were published on real data: not directly comparable\n";
     }
     text += &format!("- {}; {:.0} s in all", evaluation.runtime, evaluation.seconds);
     if !evaluation.skipped.is_empty() {
-        text += &format!("\n- {} things could not be scored, see above", evaluation.skipped.len());
+        text += &format!("\n- {} items could not be scored, see above", evaluation.skipped.len());
     }
     text
 }

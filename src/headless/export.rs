@@ -25,13 +25,13 @@ use touch2touch_pipeline::steps::tool::load_tool;
 pub(super) struct ExportArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// The pair, by its name or a part of it that no other has.
+    /// The pair, by its name or a unique part of it.
     #[arg(long)]
     pair: String,
     /// Imprint to export.
     #[arg(long, value_parser = keyed::<ImprintSource>(), default_value = "measured")]
     imprint: ImprintSource,
-    /// The folder, which is made if it is not there.
+    /// The folder; created if missing.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     #[command(flatten)]

@@ -42,7 +42,7 @@ pub(super) struct GenerateArgs {
     /// The folder for the predictions; created if missing.
     #[arg(long)]
     out: PathBuf,
-    /// Finger whose GelSlim image is taken: right, left (or as the data set names it), both.
+    /// Finger to predict from: right, left (or as the data set names it), both.
     #[arg(long, default_value = "right")]
     finger: FingerArg,
     #[command(flatten)]

@@ -25,9 +25,9 @@ use touch2touch_pipeline::steps::recipe::Recipe;
 /// Verbs of masks.
 #[derive(Debug, Subcommand)]
 pub(super) enum MasksVerb {
-    /// Write masks for training, and check what was written by the rules of its form.
+    /// Write masks for training, and check what was written.
     Export(ExportArgs),
-    /// Take masks over that lie in one of these forms. What was painted by hand stays, and no pair is marked.
+    /// Read masks in one of the export formats. Hand-drawn masks stay, and no pair is marked done.
     Import(import::ImportArgs),
     /// Train a mask model on the masks of pairs marked "done", or on masks from CAD models at true poses, and score it on
     /// pairs that were left out.
@@ -42,30 +42,30 @@ pub(super) struct ExportArgs {
     /// The folder to write; empty, missing, or a previous export.
     #[arg(long)]
     out: PathBuf,
-    /// The form: a folder as the lab's UNet loader reads it, or masks alone as pictures.
+    /// The format: a folder for the lab's UNet loader, or only masks as pictures.
     #[arg(long, default_value = Format::default().key(), value_parser = keyed::<Format>())]
     format: Format,
-    /// Pairs that go along: those marked "done" with a mask drawn by hand, those begun too, or all (`--mask` makes the
-    /// missing masks). Pairs marked "skip" or "flagged" never do.
+    /// Pairs to write: those marked "done" with a hand-drawn mask, also those begun, or all (`--mask` makes the missing
+    /// masks). Pairs marked "skip" or "flagged" are never written.
     #[arg(long, default_value = Which::default().key(), value_parser = keyed::<Which>())]
     pairs: Which,
-    /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they go to test.
+    /// Split pairs reserved for tests (test_only) like the rest; otherwise they go to test.
     #[arg(long)]
     test_in_train: bool,
-    /// Count only pixels that a person painted: all others are ignored, in `ignore/` beside the masks.
+    /// Use only hand-drawn pixels; all others are marked as ignored, in `ignore/` beside the masks.
     #[arg(long)]
     manual_checked: bool,
-    /// Sends all pairs of a tool to the same part.
+    /// Keep each tool in one split.
     #[arg(long)]
     by_tool: bool,
-    /// Says what would go where, and writes nothing.
+    /// Show the split and write nothing.
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
     model: ModelArgs,
-    /// Decides which pair lands in which part.
+    /// Seed of the split.
     #[arg(long, default_value_t = 0)]
     split_seed: u64,
     #[command(flatten)]

@@ -13,8 +13,7 @@ use touch2touch_pipeline::infer::{runtime, sandbox};
 /// Verbs of a bundle.
 #[derive(Debug, Subcommand)]
 pub(super) enum BundleVerb {
-    /// Check a bundle's manifest, files and shapes, then load and run it once on every engine that is present, and list
-    /// everything that is wrong.
+    /// Check a bundle's manifest, files and shapes, run it once on every available engine, and list all problems.
     Check(BundleArgs),
     /// Try a bundle: `check` starts this in a process of its own.
     #[command(hide = true)]
@@ -84,11 +83,11 @@ fn check(args: &BundleArgs) -> VerbResult {
         let folder = args.path.display();
         let labels: Vec<&str> = report.engines.iter().map(|engine| engine.label()).collect();
         match (sound, labels.is_empty()) {
-            (true, true) => format!("{folder}: sound, but this build has no engine to run it"),
-            (true, false) => format!("{folder}: sound; taken by {}", labels.join(" and ")),
-            (false, true) => format!("{folder} is refused:\n  {}", report.problems.join("\n  ")),
+            (true, true) => format!("{folder}: valid, but this build has no engine to run it"),
+            (true, false) => format!("{folder}: valid; runs on {}", labels.join(" and ")),
+            (false, true) => format!("{folder} is not valid:\n  {}", report.problems.join("\n  ")),
             (false, false) => {
-                format!("{folder} is taken by {} alone:\n  {}", labels.join(" and "), report.problems.join("\n  "))
+                format!("{folder} runs only on {}:\n  {}", labels.join(" and "), report.problems.join("\n  "))
             }
         }
     })?;

@@ -71,7 +71,7 @@ fn problems(dataset: &Dataset) -> Findings {
 }
 
 fn times(kind: &Finding) -> String {
-    format!("{} times, but for file, finger and numbers: {}", kind.count, kind.what)
+    format!("{} times, with other files, fingers or numbers: {}", kind.count, kind.what)
 }
 
 /// A note as a line of its own.

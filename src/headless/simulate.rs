@@ -30,11 +30,11 @@ pub(super) struct SimulateArgs {
     /// Seed of grasps and noise: the same seed writes the same files.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Writes the test set in the paper's form instead: 46 grasps of each tool within the paper's grid, none of them
+    /// Write the paper's test set instead: 46 grasps of each tool within the paper's grid, none of them
     /// trained on. The same as the built-in data set `test-set`, which needs no files.
     #[arg(long, conflicts_with_all = ["grasps", "seed", "faults", "part"])]
     test_set: bool,
-    /// Fault of the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft; mixed:
+    /// Condition of the pairs, as in the paper's Table I. ambiguous: the GelSlims close on the tool's bare shaft; mixed:
     /// every other pair does; misaligned: the bubbles grasp up to 8 mm away; noise: on the GelSlim image.
     #[arg(long, default_value = "plain", conflicts_with = "faults", value_parser = condition())]
     condition: Condition,
@@ -44,8 +44,8 @@ pub(super) struct SimulateArgs {
     /// Simulate with GelSlims in other colors and with other dots, drawn by this seed beyond what training draws.
     #[arg(long, value_name = "SEED")]
     gelslims: Option<u64>,
-    /// Writes five touches with one known fault each (wrong CAD, foreign body, blank finger, straight rod, STL in
-    /// millimeters) instead: to learn what each looks like in the studio.
+    /// Write five touches with one known fault each instead (wrong CAD, foreign body, blank finger, straight rod, STL in
+    /// millimeters), to see how each looks in the studio.
     #[arg(long, conflicts_with_all = ["tools", "grasps", "seed", "sensors", "gelslims"])]
     faults: bool,
     /// Part of the lab's layout that it is written as: `train/...`, `test/test_only/...` or `test/train_only/...`; or its other

@@ -27,10 +27,10 @@ use touch2touch_pipeline::steps::predict::Generating;
 pub(super) struct StatsArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// The file to write; use it with `--shift refit --stats FILE`.
+    /// The file to write; use it with `--shift refit:FILE`.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Finger whose touches are taken: right, left (or as the data set names it), both.
+    /// Fingers to include: right, left (or as the data set names it), both.
     #[arg(long, default_value = "both")]
     finger: FingerArg,
     /// Take only this many pairs, spread evenly over the data set.

@@ -21,7 +21,7 @@ use touch2touch_pipeline::still::{StillFiles, StillSetup, WIDTH_PX, still};
 pub(super) struct StillArgs {
     #[command(flatten)]
     dataset: DatasetArgs,
-    /// The pair, by its name or a part of it that no other has.
+    /// The pair, by its name or a unique part of it.
     #[arg(long)]
     pair: String,
     /// The imprint to show: `measured`, `predicted` or `both`.
@@ -30,22 +30,22 @@ pub(super) struct StillArgs {
     /// The file to write (`.png`), or with `--turntable` the folder.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// So many times 960 pixels along both sides.
+    /// Size as a multiple of 960 x 960 pixels.
     #[arg(long, value_name = "N", default_value_t = 2)]
     scale: u32,
     /// Width and height in pixels, instead of a scale; up to 8192.
     #[arg(long, value_name = "PX", conflicts_with = "scale")]
     width: Option<u32>,
-    /// White for papers, black for slides, or none.
+    /// Background: white for papers, black for slides, or none.
     #[arg(long, value_parser = keyed::<Ground>(), default_value = "white")]
     ground: Ground,
-    /// Direction of the view, degrees: about the vertical from the right finger's side, and above the horizontal.
+    /// Viewing direction in degrees: azimuth from the right finger's side, and elevation.
     #[arg(long, value_name = "YAW,PITCH", value_parser = parse_view, default_value = "51.6,20", allow_hyphen_values = true)]
     view: ViewAngles,
-    /// Color CAD and contact points by their signed distances; the colors end at so many millimeters.
+    /// Color CAD model and contact points by signed distance, up to this many millimeters.
     #[arg(long, value_name = "MM")]
     distance: Option<f64>,
-    /// Turn once around the pair in so many frames, which go into a folder as frame_0001.png and so on.
+    /// Write a turntable of this many frames, as frame_0001.png and so on in a folder.
     #[arg(long, value_name = "N")]
     turntable: Option<u32>,
     #[command(flatten)]

@@ -36,15 +36,15 @@ pub(super) struct WatchArgs {
     /// Write the results into this folder instead of beside the touches.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The tool held: an .stl file, or the name of a tool of the data set or the demo. Without it, the tool that the
-    /// file's name says; if that says none, there is no pose.
+    /// The tool in the hand: an .stl file, or a tool of the data set or the demo (default: from the file name; without a
+    /// tool there is no pose).
     #[arg(long, value_name = "NAME|FILE.stl")]
     tool: Option<String>,
     #[command(flatten)]
     mask: MaskArgs,
     #[command(flatten)]
     registration: RegistrationArgs,
-    /// Take up what lies there, unless it was done with the same recipe, and end.
+    /// Process what is in the folder, skip what was done with the same settings, and exit.
     #[arg(long)]
     once: bool,
     #[command(flatten)]

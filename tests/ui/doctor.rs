@@ -99,7 +99,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     let [before, after] = [&found.before, found.closed_form.as_ref().unwrap()].map(|scored| scored.psnr_db.unwrap());
     assert!(found.pairs == 36 && after > before + 5.0, "{before} {after}");
     // In the table and over the pictures of a touch that was left out.
-    assert_eq!(rig.harness.get_all_by_label("As it was trained").count(), 2);
+    assert_eq!(rig.harness.get_all_by_label("Before").count(), 2);
     rig.harness.get_by_label("Fitted to the others");
     // Used at once: what is on screen is predicted anew.
     assert!(state.results.predictions.iter().next().is_none());

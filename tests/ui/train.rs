@@ -107,10 +107,8 @@ fn nothing_to_learn_from_has_its_reason_and_its_tick() {
         assert!(stored.masks.values().all(|mask| mask.base().starts_with("Accepted")), "{name}");
     }
     rig.send(LearnCommand::Show(Network::Masks));
-    rig.harness.get_by_label_contains(
-        "all pairs with masks to learn from are kept for tests by the data set (2 pairs, 4 masks)",
-    );
-    rig.harness.get_by_label("Train on pairs kept for tests").click();
+    rig.harness.get_by_label_contains("all pairs with masks to train on are reserved for tests (2 pairs, 4 masks)");
+    rig.harness.get_by_label("Train on pairs reserved for tests").click();
     rig.harness.step();
     rig.settle();
     assert!(rig.harness.state().state().learn.form.choice.test_in_train);

@@ -19,7 +19,7 @@ use touch2touch_pipeline::masks::propose::ProposalSource;
 pub(in super::super) struct LabelArgs {
     #[command(flatten)]
     pub(super) dataset: DatasetArgs,
-    /// The pair to label, by its name or a part of it that no other has; without it, all labels are listed.
+    /// The pair to label, by its name or a unique part of it; without it, all labels are listed.
     #[arg(long)]
     pub(super) pair: Option<String>,
     /// Set the review state.
@@ -28,7 +28,7 @@ pub(in super::super) struct LabelArgs {
     /// Write a note about the pair; an empty one removes it.
     #[arg(long, value_name = "TEXT", requires = "pair")]
     pub(super) note: Option<String>,
-    /// Accept the pose of this imprint: what the registration answers, or `--pose`.
+    /// Save a pose for this imprint: the registered one, or `--pose`.
     #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
     pub(super) accept: Option<ImprintSource>,
     /// The pose to accept instead, or that of `--propose cad_hand`: `DEGREES,Y_MM,Z_MM` of the tool in the hand, such as
@@ -38,17 +38,17 @@ pub(in super::super) struct LabelArgs {
     /// Withdraw the accepted pose of this imprint.
     #[arg(long, value_name = "IMPRINT", requires = "pair", value_parser = keyed::<ImprintSource>())]
     pub(super) withdraw: Option<ImprintSource>,
-    /// Make the mask of `--mask` the corrected one.
+    /// Copy the automatic mask of `--mask` as the hand-drawn one.
     #[arg(long, requires = "pair", conflicts_with = "remove_mask")]
     pub(super) adopt: bool,
     /// Propose a mask and accept it: what was painted by hand stays, unless `--over-drawn`. Numbers of it
     /// are those of `--mask`, such as `--mask cad:mm=1`.
     #[arg(long, value_name = "SOURCE", requires = "pair", conflicts_with_all = ["adopt", "remove_mask"], value_parser = keyed::<ProposalSource>())]
     pub(super) propose: Option<ProposalSource>,
-    /// Let the proposal replace what was painted by hand as well.
+    /// Let the proposal also replace hand-drawn pixels.
     #[arg(long, requires = "propose")]
     pub(super) over_drawn: bool,
-    /// Clean the mask up: `fill_holes`, `largest_island`, or with a size in millimeters `smooth=MM`, `grow=MM`, `shrink=MM`.
+    /// Clean up the mask: `fill_holes`, `largest_island`, or with a size in millimeters `smooth=MM`, `grow=MM`, `shrink=MM`.
     /// Several are done in turn.
     #[arg(long, value_name = "WHAT[=MM]", requires = "pair", conflicts_with = "remove_mask")]
     pub(super) clean: Vec<CleanUp>,
@@ -58,17 +58,17 @@ pub(in super::super) struct LabelArgs {
     /// or `all`), points are pixels of that picture of the points in space, as a drawing in 3D has it in the journal.
     #[arg(long, value_name = "JSON", requires = "pair", conflicts_with = "remove_mask")]
     pub(super) draw: Vec<Drawing>,
-    /// Remove the corrected mask: the automatic source is in force again.
+    /// Remove the hand-drawn mask and go back to the automatic one.
     #[arg(long, requires = "pair")]
     pub(super) remove_mask: bool,
     /// Take in labels that the studio saved to this folder because it could not write them beside the data. Masks that changed
     /// meanwhile are merged by pixel.
     #[arg(long, value_name = "FOLDER", conflicts_with = "pair")]
     pub(super) take_in: Option<PathBuf>,
-    /// Who labels; else whom the system says.
+    /// Name of the person who labels (default: the user of this computer).
     #[arg(long, requires = "pair")]
     pub(super) person: Option<String>,
-    /// Whose mask is changed: the name of one, or `both`.
+    /// The finger whose mask is changed: its name, or `both`.
     #[arg(long, default_value = "both")]
     pub(super) finger: FingerArg,
     /// The imprint whose mask is changed. A prediction is the one that `--bundle`, `--seed` and the like name.

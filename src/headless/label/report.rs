@@ -49,7 +49,7 @@ impl Stored {
     pub(super) fn text(&self) -> String {
         let mut masks: Vec<String> = self.masks.iter().map(|(pad, px)| format!("{pad} {px} px")).collect();
         masks.extend(self.predicted.iter().map(|(pad, px, _)| format!("{pad} {px} px on a prediction")));
-        let masks = if masks.is_empty() { "no corrected mask".to_owned() } else { masks.join(", ") };
+        let masks = if masks.is_empty() { "no hand-drawn mask".to_owned() } else { masks.join(", ") };
         let mut text = format!("{}: {}; {masks}", self.name, self.review);
         for Accepted { what, pose, .. } in &self.accepted {
             let place = pose.pose.inverse();

@@ -20,13 +20,13 @@ pub(in super::super) struct ImportArgs {
     /// Their form; else the one that lies there.
     #[arg(long, value_parser = keyed::<Format>())]
     format: Option<Format>,
-    /// Replace what was painted by hand as well, also of pairs marked "done", "flagged" or "skip".
+    /// Also replace hand-drawn masks, and those of pairs marked "done", "flagged" or "skip".
     #[arg(long)]
     over_drawn: bool,
     /// Who imports; else whom the system says.
     #[arg(long, value_name = "NAME")]
     person: Option<String>,
-    /// Says what would be taken over, and writes nothing.
+    /// Show what would be imported and write nothing.
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]

@@ -46,16 +46,16 @@ pub(in crate::headless) struct TrainArgs {
     /// not known.
     #[arg(long, value_name = "PERCENT", default_value_t = TrainChoice::default().held_out_percent, value_parser = clap::value_parser!(u8).range(0..=90))]
     held_out: u8,
-    /// Divides pairs that the data set keeps for tests (test_only) like the rest; else they are left out.
+    /// Use pairs reserved for tests (test_only) like the rest; otherwise they are left out.
     #[arg(long)]
     test_in_train: bool,
-    /// Decides which pairs are left out, and the order and variation of the masks.
+    /// Seed: decides which pairs are left out, and the order and augmentation of the masks.
     #[arg(long, default_value_t = TrainChoice::default().seed)]
     seed: u64,
     /// The folder of the new bundle, empty or new; else one among the models that the program looks for at its start.
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Says what would be learned from, and trains nothing.
+    /// Show what would be trained on and train nothing.
     #[arg(long)]
     dry_run: bool,
     #[command(flatten)]
@@ -124,7 +124,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
     let models = Models::new(if args.no_cache { None } else { kept() });
     let trained = train(&dataset, &masks, &setup, &models, &output.job())?;
     for remark in &trained.unusable {
-        output.note(&format!("left out: {}: {}", remark.name, remark.why));
+        output.note(&format!("not used: {}: {}", remark.name, remark.why));
     }
     for warning in &trained.warnings {
         output.note(&format!("note: {warning}"));
@@ -137,7 +137,7 @@ pub(super) fn run(args: &TrainArgs) -> VerbResult {
 fn text(trained: &Trained) -> String {
     let mut lines = Vec::new();
     if !trained.held_out.is_empty() {
-        lines.push(format!("{:>15} {:>15}  on pairs that were left out, the worst first", "IoU", "Dice"));
+        lines.push(format!("{:>15} {:>15}  on pairs left out, worst first", "IoU", "Dice"));
     }
     let change = |before: f64, after: f64| format!("{before:.3} -> {after:.3}");
     let row = |before: MaskScore, after: MaskScore, name: &str| {

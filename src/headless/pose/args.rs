@@ -16,13 +16,13 @@ use touch2touch_pipeline::steps::recipe::Recipe;
 pub(in crate::headless) struct PoseArgs {
     #[command(flatten)]
     pub(super) dataset: DatasetArgs,
-    /// Imprints to align.
+    /// Imprints to use.
     #[arg(long, value_enum, default_value_t = Imprints::Measured)]
     pub(super) imprint: Imprints,
     #[command(flatten)]
     pub(super) mask: MaskArgs,
-    /// Align another tool's CAD model than the pair's own: a tool of the data set, or `any`, which tries them all, answers
-    /// with the likeliest and lists the others.
+    /// Use the CAD model of another tool: a tool of the data set, or `any`, which tries all, takes the most likely and
+    /// lists the others.
     #[arg(long = "tool", value_name = "NAME")]
     pub(super) which: Option<String>,
     #[command(flatten)]

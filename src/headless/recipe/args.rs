@@ -23,29 +23,29 @@ pub struct ModelArgs {
     /// The mask model's bundle (default: the shipped one).
     #[arg(long)]
     pub(super) mask_bundle: Option<PathBuf>,
-    /// Sampling steps (default: the bundle's, as for the following).
+    /// Sampling steps (default: the bundle's, also for the options that follow).
     #[arg(long)]
     pub(super) steps: Option<u32>,
     /// Seed of the noise.
     #[arg(long)]
     pub(super) seed: Option<u64>,
-    /// Share of fresh noise per step, 0 to 1, for DDIM.
+    /// Fresh noise that DDIM adds per step, 0 to 1.
     #[arg(long)]
     pub(super) eta: Option<f64>,
     /// Scale of classifier-free guidance, 1 for none; only for a bundle that was trained for it.
     #[arg(long, value_parser = guidance)]
     pub(super) guidance: Option<f64>,
-    /// The training steps visited: `trailing` starts at the noisiest, `lab` is the public release's.
+    /// Spacing of the sampling steps: `trailing` starts at the noisiest one, `lab` is that of the public release.
     #[arg(long, value_parser = keyed::<Spacing>())]
     pub(super) spacing: Option<Spacing>,
-    /// The way from noise to an image.
+    /// Sampler: the algorithm from noise to an image.
     #[arg(long, value_parser = keyed::<Sampler>())]
     pub(super) sampler: Option<Sampler>,
     #[command(flatten)]
     pub(super) mapping: MappingArgs,
     #[command(flatten)]
     pub(super) runtime: RuntimeArg,
-    /// Neither look for predictions that were made before (by the studio, too), nor keep those made now.
+    /// Predict everything anew and keep nothing: ignores earlier predictions, also those of the studio.
     #[arg(long)]
     pub(super) no_cache: bool,
     /// The bundles that are there, looked for when first needed.

@@ -262,7 +262,8 @@ impl Done {
             (None, None) => "no pose".to_owned(),
         };
         let Latency { generate, total, .. } = self.latency;
-        let when = if self.fresh { format!("{total:.0} ms after it was closed") } else { "lay there".to_owned() };
+        let when =
+            if self.fresh { format!("{total:.0} ms after it was closed") } else { "was already there".to_owned() };
         format!("{}: {pose} ({when}; generator {generate:.0} ms)", self.name)
     }
 }

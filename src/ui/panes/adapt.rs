@@ -55,13 +55,13 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
 /// The buttons, or the progress of what is under way.
 fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
     let (action, start, go_on) = match network {
-        Network::Generator => (Action::FitPairs, "Fit to my pairs", "Go on with the fit"),
-        Network::Masks => (Action::StartTraining, "Start training", "Go on with the training"),
+        Network::Generator => (Action::FitPairs, "Fit to my pairs", "Continue the fit"),
+        Network::Masks => (Action::StartTraining, "Start training", "Continue training"),
     };
     let (take_up, tip) = match network {
-        Network::Generator => ((Action::UseFit, "Use the fitted model"), "The fitted model predicts now"),
+        Network::Generator => ((Action::UseFit, "Use the fitted model"), "Predictions now come from the fitted model"),
         Network::Masks => {
-            ((Action::UseTrained, "Use the trained model"), "The trained model makes the automatic masks now")
+            ((Action::UseTrained, "Use the trained model"), "Automatic masks now come from the trained model")
         }
     };
     ui.horizontal_wrapped(|ui| {
@@ -71,7 +71,7 @@ fn start(cx: &mut Cx<'_>, ui: &mut Ui, network: Network) {
         }
         if let Some(at) = cx.state.learn.stopped[network as usize].clone() {
             cx.action_button(ui, action, go_on);
-            ui.label(RichText::new(format!("stopped at {at}; it is kept")).color(cx.p.caution).size(SMALL));
+            ui.label(RichText::new(format!("stopped at {at}, can be continued")).color(cx.p.caution).size(SMALL));
         } else {
             cx.action_button(ui, action, start);
         }
@@ -90,13 +90,13 @@ fn how_it_goes(cx: &Cx<'_>, ui: &mut Ui, network: Network) {
         return;
     }
     let (unit, name) = match network {
-        Network::Generator => ("dB", "Raw dB on touches that were left out"),
+        Network::Generator => ("dB", "PSNR on touches left out, dB"),
         Network::Masks => ("Dice", "Dice on pairs left out"),
     };
     let of = |unit: &str| all.iter().filter(|curve| curve.unit == unit).collect::<Vec<_>>();
     let size = vec2(((ui.available_width() - 12.0) / 2.0).clamp(110.0, 420.0), 100.0);
     ui.horizontal_wrapped(|ui| {
-        curves::show(ui, size, "Loss (the strong line: the run under way, or the last)", &of("loss"));
+        curves::show(ui, size, "Loss (bold: the current or last run)", &of("loss"));
         curves::show(ui, size, name, &of(unit));
     });
 }

@@ -31,10 +31,10 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
         let rows = cx.state.table.rows();
         if rows.is_empty() {
             let (what, why) = match cx.state.tasks.of_kind(TaskKind::Evaluate) {
-                Some(_) => ("The table appears when all grasps are scored", "Cancel keeps what was scored until then"),
+                Some(_) => ("The table appears when all grasps are scored", "Cancel keeps the scores so far"),
                 None => (
                     "No results yet",
-                    "PSNR, SSIM, angle error and success of every chosen generator, as the paper's table has them",
+                    "The paper's table: PSNR, SSIM, angle error and success rate of each chosen generator",
                 ),
             };
             let action = Action::EvaluateDataset.command(cx.state);
@@ -54,18 +54,18 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
         let bundles: Vec<_> = results::evaluated(cx.state).map(|(b, chosen)| (b.clone(), chosen)).collect();
         if bundles.is_empty() {
-            ui.label(RichText::new("No generator was found").color(cx.p.caution));
+            ui.label(RichText::new("No generator found").color(cx.p.caution));
         }
         for (bundle, chosen) in bundles {
             let mut on = chosen;
-            let tip = format!("Give this generator a row ({})", bundle.origin);
+            let tip = format!("Include this generator ({})", bundle.origin);
             if ui.checkbox(&mut on, &bundle.name).on_hover_text(tip).changed() {
                 cx.push(Command::Evaluate(EvaluateCommand::Choose(bundle.id.clone(), on)));
             }
         }
     });
     ui.horizontal_wrapped(|ui| {
-        ui.label(caption("Grasps per tool", cx.p));
+        ui.label(caption("Grasps to use per tool", cx.p));
         let name = |n: Option<usize>| n.map_or_else(|| "all".to_owned(), |n| n.to_string());
         let now = cx.state.table.grasps_per_tool;
         let combo = egui::ComboBox::from_id_salt("grasps").width(48.0).selected_text(name(now));
@@ -76,14 +76,11 @@ fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
                 }
             }
         });
-        let tip = "Grasps of each tool, spread evenly; the paper has 46. All is the default; few are a quick look";
+        let tip = "Spread evenly over the grasps of each tool. Default: all; a few give a quick look. Each generator uses its own default steps and seed; `evaluate --steps N --seed N` sets the same for all";
         response.response.accessible_name("Grasps per tool").on_hover_text(tip);
-        let tip = "The table compares generators as they are meant to be used; the steps and the seed of the pane \
-                   Generate are for the other panes. `evaluate --steps N --seed N` gives all of them the same";
-        ui.label(caption("each with its own steps and seed", cx.p)).on_hover_text(tip);
         let mut published = cx.state.table.published;
         let tip =
-            "Adds what the paper and the lab's notebook printed, on real data: compare the form, not the decimals";
+            "Adds the numbers published on real data, by the paper and the lab; not directly comparable with yours";
         if ui.checkbox(&mut published, "published rows").on_hover_text(tip).changed() {
             cx.push(Command::Evaluate(EvaluateCommand::Published(published)));
         }
@@ -128,9 +125,8 @@ fn table(cx: &Cx<'_>, ui: &mut Ui, rows: &[Row]) {
         ui.spacing_mut().item_spacing.y = 2.0;
         let mut notes = vec![result.conventions.to_owned()];
         notes.extend(result.notes.iter().cloned());
-        notes.push(format!("{}; {:.0} s in all", result.runtime, result.seconds));
         if !result.complete {
-            ui.label(RichText::new("Stopped early: not all grasps are in").size(SMALL).color(cx.p.caution));
+            ui.label(RichText::new("Stopped early: not all grasps are scored").size(SMALL).color(cx.p.caution));
         }
         for note in notes {
             ui.add(egui::Label::new(caption(note, cx.p)).wrap());
@@ -234,7 +230,7 @@ fn line(cx: &Cx<'_>, ui: &mut Ui, row: &Row, figures: &TableMetrics, shown: &[&C
         let decimals = column.decimals;
         said += &format!("\n{} {:.decimals$}", column.heading, e.value);
         if let Some([low, high]) = e.interval {
-            said += &format!("   ({low:.decimals$} to {high:.decimals$} with 95 %)");
+            said += &format!("   (95 % CI {low:.decimals$} to {high:.decimals$})");
         }
     }
     if figures.without_pose > 0 {

@@ -49,7 +49,7 @@ pub(crate) fn show(cx: &mut Cx<'_>, ui: &mut Ui, (): &mut Memory, _: Pane) {
             if cx.state.tasks.of_kind(TaskKind::Evaluate).is_none() {
                 let action = Action::PredictAll.command(cx.state);
                 let action = action.map(|_| ("Predict all", Action::PredictAll.tooltip()));
-                let why = "Every pair by every source appears here: measured imprints and the chosen generators";
+                let why = "One row per pair: scores of the measured imprint and of each chosen generator";
                 if empty::show(ui, "No scores yet", why, action) {
                     cx.act(Action::PredictAll);
                 }
@@ -144,7 +144,7 @@ fn head(cx: &mut Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
             ui.painter().add(egui::Shape::convex_polygon(points, color, egui::Stroke::NONE));
         }
         let tip = format!(
-            "{}: {}\n{}. A click sorts the list, the worst first; another turns it round",
+            "{}: {}\n{}. Click to sort, worst first; click again to reverse",
             source.name,
             metric.name(),
             metric.tip()
@@ -193,7 +193,7 @@ fn means(cx: &Cx<'_>, ui: &mut Ui, columns: &[ScoreColumn<'_>]) {
         put(ui, cell, &text, cx.p.strong);
     }
     response.on_hover_text(
-        "Means over the pairs of the list that were scored, of verdicts the share that is good; grasps without a pose are \
+        "Means over the scored pairs of the list; for verdicts the share of good ones; grasps without a pose are \
          left out of those of the angle",
     );
 }

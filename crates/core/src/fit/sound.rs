@@ -77,35 +77,35 @@ impl fmt::Display for Objection {
         match self {
             Self::Gain { pad, gain } if *gain < 0.0 => write!(
                 f,
-                "{pad}: where more is predicted less is measured (gain {gain:.3}): the sign of the imprints, or which finger \
-                 is which, is wrong"
+                "{pad}: less is measured where more is predicted (gain {gain:.3}). Wrong sign of the imprints, or fingers \
+                 swapped?"
             ),
             Self::Gain { pad, gain } => write!(
                 f,
-                "{pad}: {gain:.3} mm are measured for each predicted mm, outside {} to {}: the imprints are in another \
-                 unit, or not of these GelSlim images",
+                "{pad}: measured depth is {gain:.3} times the predicted one (expected {} to {}). Imprints in another unit, or \
+                 not of these GelSlim images?",
                 GAINS.start(),
                 GAINS.end()
             ),
             Self::Offset { pad, offset_px: [x, y] } => write!(
                 f,
-                "{pad}: the predictions were moved by {x:+.1} px right and {y:+.1} px down, off the window of the sensor: the \
-                 imprints lie otherwise (turned, mirrored, of the other finger) or are not of these GelSlim images"
+                "{pad}: the fit would shift predictions {x:+.1} px right and {y:+.1} px down, off the window of the sensor. \
+                 Imprints turned, mirrored, of the other finger, or not of these GelSlim images?"
             ),
             Self::Angle { mean_rad: [before, after], failed: [lost_before, lost_after, all] } => {
                 let degrees = |rad: &Option<f64>| rad.map_or("none".to_owned(), |v| format!("{:.1}°", v.to_degrees()));
                 write!(
                     f,
-                    "the in-hand angle is worse with the fit: {} -> {} mean error, {lost_before} -> {lost_after} of {all} \
-                     grasps without a pose: these imprints do not go with these poses",
+                    "the in-hand angle gets worse: mean error {} -> {}, {lost_before} -> {lost_after} of {all} grasps \
+                     without a pose. Do these imprints belong to these poses?",
                     degrees(before),
                     degrees(after)
                 )
             }
             Self::Strangers { nearness, touches } => write!(
                 f,
-                "the fitted predictions of {touches} touches do not know their own imprints: each is nearer than {:.0} % of \
-                 the others' (50 % is chance): the GelSlim images are of other grasps or fingers, all grasps are alike, or the model sees nothing in them",
+                "predictions do not match their own imprints: over {touches} touches, the own imprint is closer than {:.0} % of \
+                 the others (50 % is chance). GelSlim images of other grasps or fingers, or all grasps alike?",
                 100.0 * nearness
             ),
         }
@@ -316,7 +316,7 @@ mod tests {
         assert!(said(objections(|i| bump(i, -0.004), None)).contains("less is measured"));
         assert!(said(objections(|i| bump(i, 0.004), Some([[20.0, 0.0], [9.0, 9.0]]))).contains("off the window"));
         let others = said(objections(|i| bump((i + 5) % 12, 0.004), None));
-        assert!(others.contains("do not know their own imprints"), "{others}");
+        assert!(others.contains("do not match their own imprints"), "{others}");
         assert_eq!(strangers(&[], &[]), None, "nothing is said of nothing");
     }
 

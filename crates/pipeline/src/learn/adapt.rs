@@ -220,21 +220,20 @@ fn warnings(
     let mut warnings = Vec::new();
     if pairs < ENOUGH_PAIRS {
         warnings.push(format!(
-            "{pairs} pairs are few: with fewer than {ENOUGH_PAIRS} the shapes that the model was trained on show through; \
-             expect about 1.5 dB less than with thirty"
+            "{pairs} pairs are few: below {ENOUGH_PAIRS} the shapes of the training data show through; expect about 1.5 dB \
+             less than with thirty"
         ));
     }
     if setup.folds == 0 {
-        warnings.push("nothing was left out, so what the fit is worth on other pairs is not known".into());
+        warnings.push("nothing was left out, so there is no score on other pairs".into());
     } else if closed.is_none() {
         let few = counted(pairs, "pair");
-        warnings
-            .push(format!("of {few} nothing could be left out, so what the fit is worth on other pairs is not known"));
+        warnings.push(format!("{few} are too few to leave any out, so there is no score on other pairs"));
     }
     if gain.is_some_and(|gain| gain < LEAST_GAIN_DB) {
         warnings.push(
-            "on pairs that were left out the closed form is no better than the model as it is: these sensors need no fit, or \
-             more pairs"
+            "on pairs that were left out the fit is no better than the shipped model: these sensors need no fit, or more \
+             pairs"
                 .into(),
         );
     }
@@ -244,9 +243,7 @@ fn warnings(
         );
     }
     if (1..ENOUGH_STEPS).contains(&steps) {
-        warnings.push(format!(
-            "{steps} steps of tuning are few: fewer than {ENOUGH_STEPS} are hardly worth more than the closed form"
-        ));
+        warnings.push(format!("{steps} tuning steps are few: below {ENOUGH_STEPS} tuning hardly improves on the fit"));
     }
     warnings
 }

@@ -184,15 +184,15 @@ impl TrainPlan {
         let [masks, pairs] = self.held_out;
         let for_tests = match self.for_tests {
             0 => String::new(),
-            n => format!(", {n} of them kept for tests by the data set"),
+            n => format!(", {n} of them reserved for tests"),
         };
         lines.push(format!(
             "left out for the score: {} of {}{for_tests}",
             counted(masks, "mask"),
             counted(pairs, "pair")
         ));
-        lines.extend(self.left_out.iter().map(|(why, n)| format!("no part: {} {}", counted(*n, "pair"), why.text())));
-        lines.extend(self.unreadable.iter().map(|remark| format!("no part: {}: {}", remark.name, remark.why)));
+        lines.extend(self.left_out.iter().map(|(why, n)| format!("not used: {} {}", counted(*n, "pair"), why.text())));
+        lines.extend(self.unreadable.iter().map(|remark| format!("not used: {}: {}", remark.name, remark.why)));
         lines
     }
 
@@ -202,7 +202,7 @@ impl TrainPlan {
         let masks = self.masks();
         if masks > 0 && masks < ENOUGH_MASKS {
             warnings.push(format!(
-                "{} are few: from {ENOUGH_MASKS} on the model gains on pairs that it did not see",
+                "{} are few: it takes {ENOUGH_MASKS} or more to improve on pairs the model did not see",
                 counted(masks, "mask")
             ));
         }
@@ -212,10 +212,10 @@ impl TrainPlan {
             warnings.push(format!("fewer than {ENOUGH_OF_A_TOOL} masks of {}", few.join(", ")));
         }
         if masks > 0 && self.held_out[0] == 0 {
-            warnings.push("nothing is left out, so what the training is worth on other pairs will not be known".into());
+            warnings.push("nothing is left out, so there will be no score on other pairs".into());
         }
         if masks > MOST_MASKS {
-            warnings.push(format!("only {MOST_MASKS} of the masks are learned from: no more fit into the memory"));
+            warnings.push(format!("only {MOST_MASKS} of the masks are used: more do not fit into memory"));
         }
         warnings
     }
@@ -231,11 +231,11 @@ impl TrainPlan {
             let (all, is) = if self.for_tests == 1 { ("the only pair", "is") } else { ("all pairs", "are") };
             (
                 format!(
-                    "{all} with masks to learn from {is} kept for tests by the data set ({}, {})",
+                    "{all} with masks to train on {is} reserved for tests ({}, {})",
                     pairs(self.for_tests),
                     counted(self.held_out[0], "mask")
                 ),
-                "Tick \"train on pairs kept for tests\" (--test-in-train): a share of them is still left out for the score.",
+                "Tick \"train on pairs reserved for tests\" (--test-in-train); a share of them is still left out for the score.",
                 Some(TrainCure::TestInTrain),
             )
         } else if left_out(LeftOut::NotDone) > 0 {
@@ -304,7 +304,7 @@ impl TrainCure {
     /// The words on its button.
     pub fn name(self) -> &'static str {
         match self {
-            Self::TestInTrain => "Train on pairs kept for tests",
+            Self::TestInTrain => "Train on pairs reserved for tests",
             Self::FromCad => "Take masks from CAD",
         }
     }

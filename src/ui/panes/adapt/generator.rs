@@ -38,11 +38,11 @@ pub(super) fn nothing_yet(cx: &mut Cx<'_>, ui: &mut Ui) {
         .of_kind(TaskKind::Learn)
         .filter(|_| cx.state.learn.started == Network::Generator)
     {
-        Some(_) => ("The scores appear when the fit was tried", "A second or two after the last prediction"),
+        Some(_) => ("Scores appear when the fit is done", ""),
         None => (
-            "The model is as it was trained, on simulated touches",
-            "Some pairs of your own sensors tell where their windows lie, their scale and their pattern: the model is \
-             fitted to them in seconds, and scored on pairs that were left out",
+            "Shipped model in use, trained on simulated touches",
+            "A few pairs of your own sensors are enough to fit the model to their alignment, scale and pattern. It takes \
+             seconds, and the score is on pairs that were left out",
         ),
     };
     let action = Action::FitPairs.command(cx.state).map(|_| ("Fit to my pairs", Action::FitPairs.tooltip()));
@@ -57,14 +57,14 @@ fn refusal(cx: &mut Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     if !refused && adapted.objections.is_empty() {
         return;
     }
-    let heading = if refused { "The fit was not kept" } else { "Kept, though this speaks against the fit" };
+    let heading = if refused { "The fit was not kept" } else { "Kept despite these objections" };
     ui.label(RichText::new(heading).strong().color(cx.p.wrong));
     for reason in adapted.objections.iter().chain(&adapted.in_place_of) {
         ui.add(egui::Label::new(RichText::new(reason).color(cx.p.wrong)).wrap());
     }
     if refused && cx.state.tasks.of_kind(TaskKind::Learn).is_none() {
-        let tip = "Writes the fitted model all the same, over whatever fit is in its folder";
-        if ui.button("Keep it all the same").on_hover_text(tip).clicked() {
+        let tip = "Saves the fitted model anyway, over any earlier fit in its folder";
+        if ui.button("Keep it anyway").on_hover_text(tip).clicked() {
             cx.push(LearnCommand::Keep);
         }
     }
@@ -76,14 +76,14 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
     let state = cx.state;
     let Some(held) = learn::held_back(state) else { return };
     ui.add_space(8.0);
-    ui.label(section("A touch that was left out", cx.p));
+    ui.label(section("A touch left out of the fit", cx.p));
     // A fit that was made again has other pictures.
     let fit = state.learn.adapted.as_ref().map(|adapted| adapted.seconds.to_bits());
     let (map, range) = (map_of(state), range_of(state));
     let scale = held.measured.height() as f32 / held.measured.width().max(1) as f32;
     let width = ((ui.available_width() - 2.0 * GAP) / 3.0).clamp(40.0, 260.0);
     let (area, _) = ui.allocate_exact_size(vec2(3.0 * width + 2.0 * GAP, CAPTION + width * scale), Sense::hover());
-    let all = [("Felt", &held.measured), ("As it was trained", &held.before), ("Fitted to the others", &held.after)];
+    let all = [("Measured", &held.measured), ("Before", &held.before), ("Fitted", &held.after)];
     for (i, (name, picture)) in all.into_iter().enumerate() {
         let corner = area.min + vec2(i as f32 * (width + GAP), 0.0);
         ui.painter().text(corner, Align2::LEFT_TOP, name, FontId::proportional(SMALL), cx.p.weak);
@@ -95,7 +95,7 @@ fn before_and_after(cx: &mut Cx<'_>, ui: &mut Ui) {
         thumbnail::readout(cx, &response, name, picture);
     }
     let pad = state.rig().pad_key(held.pad).into_owned();
-    let text = format!("{} {pad}, in the colors of the imprints; choose a pair in the list to see its own", held.name);
+    let text = format!("{} {pad}; choose another pair in the list to see it", held.name);
     ui.label(caption(text, cx.p));
 }
 
@@ -117,15 +117,15 @@ pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
         let text = RichText::new(format!("{count} pairs")).size(SMALL);
         let text = if count < ENOUGH_PAIRS { text.color(cx.p.caution) } else { text.color(cx.p.weak) };
         ui.label(text).on_hover_text(format!(
-            "From {ENOUGH_PAIRS} pairs on a fit is sound; about a tenth of a second each, the first time"
+            "A fit needs {ENOUGH_PAIRS} pairs or more to be reliable; about 0.1 s a pair, the first time"
         ));
-        let tip = "After the closed form, tune the networks themselves: four runs, because the score is of pairs that \
-                   were left out; a run that was cancelled goes on when the same is asked for again";
+        let tip = "Also tunes the networks, in four runs so that the score is on pairs left out; a cancelled run can be \
+                   continued";
         ui.checkbox(&mut form.tune, "tune the networks").on_hover_text(tip);
         if form.tune {
             let drag = egui::DragValue::new(&mut form.tuning_steps).speed(1.0).range(TUNING_STEPS).suffix(" steps");
-            let drag = ui.add(drag).accessible_name("Steps of tuning");
-            drag.on_hover_text("50 take about a minute on two free cores, for each of the four runs");
+            let drag = ui.add(drag).accessible_name("Tuning steps");
+            drag.on_hover_text("50 steps take about a minute on two free cores, in each of the four runs");
         }
     });
     if form != before {
@@ -137,29 +137,27 @@ pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
 type FitColumn = (&'static str, &'static str, fn(&Scored) -> Option<String>);
 
 const FIGURES: [FitColumn; 7] = [
-    (
-        "PSNR dB",
-        "Pictures whose scale was lost are both stretched to 0..1, where noise decides; else peak 22.5 mm",
-        |s| Some(format!("{:.1} ± {:.1}", s.psnr_db?, s.psnr_spread_db?)),
-    ),
-    ("SSIM", "Structural similarity, as PSNR", |s| Some(format!("{:.2}", s.ssim?))),
-    ("raw dB", "PSNR of the pictures as they are, not stretched", |s| Some(format!("{:.1}", s.psnr_raw_db?))),
-    ("line dB", "PSNR after the straight line that fits best: the worth of the shape alone", |s| {
+    ("PSNR dB", "Peak 22.5 mm; image pairs, which carry no scale, are both stretched to 0–1", |s| {
+        Some(format!("{:.1} ± {:.1}", s.psnr_db?, s.psnr_spread_db?))
+    }),
+    ("SSIM", "Structural similarity, on the same images as PSNR", |s| Some(format!("{:.2}", s.ssim?))),
+    ("unscaled dB", "PSNR of the images as they are, not stretched", |s| Some(format!("{:.1}", s.psnr_raw_db?))),
+    ("shape dB", "PSNR after the best linear fit of the values: how good the shape alone is", |s| {
         Some(format!("{:.1}", s.psnr_line_db?))
     }),
-    ("seen dB", "PSNR inside the GelSlim's window", |s| Some(format!("{:.1}", s.seen?.psnr_db?))),
-    ("invented dB", "PSNR outside the GelSlim's window", |s| Some(format!("{:.1}", s.invented?.psnr_db?))),
-    ("angle °", "Mean error of the in-hand angle, degrees; of pictures from the measured imprint's", |s| {
+    ("inside dB", "PSNR inside the GelSlim window", |s| Some(format!("{:.1}", s.seen?.psnr_db?))),
+    ("outside dB", "PSNR outside the GelSlim window", |s| Some(format!("{:.1}", s.invented?.psnr_db?))),
+    ("angle °", "Mean error of the in-hand angle; for image pairs against the angle from the measured imprint", |s| {
         Some(format!("{:.1}", s.angle.as_ref()?.mean_deg?))
     }),
 ];
 
 /// Before and after, on pairs that were left out.
 fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
-    ui.label(section("On pairs that were left out", cx.p));
+    ui.label(section("Scores on pairs left out", cx.p));
     let rows = [
-        ("As it was trained", Some(&adapted.before)),
-        ("Fitted (closed form)", adapted.closed_form.as_ref()),
+        ("Before", Some(&adapted.before)),
+        ("Fitted", adapted.closed_form.as_ref()),
         ("Tuned", adapted.after.as_ref()),
     ];
     egui::Grid::new("fit scores").num_columns(FIGURES.len() + 1).spacing(vec2(18.0, 4.0)).show(ui, |ui| {
@@ -178,7 +176,7 @@ fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
         }
     });
     let text = format!(
-        "{} pairs, {} touches; {:.1} s, {:.2} s of it for the fit",
+        "{} pairs, {} touches; {:.1} s, of which the fit {:.2} s",
         adapted.pairs, adapted.touches, adapted.seconds, adapted.fit_seconds
     );
     ui.label(caption(text, cx.p));
@@ -190,10 +188,10 @@ fn scores(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
 /// Correction of each pad.
 fn pads(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
     ui.add_space(8.0);
-    ui.label(section("What was found", cx.p));
+    ui.label(section("What the fit corrects", cx.p));
     for pad in &adapted.pads {
         let text = format!(
-            "{} ({} touches): moved {:+.1} px right and {:+.1} px down in the decoder's picture; {} · d {} mm",
+            "{} ({} touches): shifted {:+.1} px right, {:+.1} px down; depth {} · d {} mm",
             pad.pad,
             pad.touches,
             pad.offset_px[0],
@@ -203,7 +201,7 @@ fn pads(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
         );
         ui.add(egui::Label::new(text).wrap());
     }
-    ui.label(caption("Generate has a switch for each part", cx.p));
+    ui.label(caption("The Generate pane can switch each part off", cx.p));
 }
 
 fn signed(offset_m: f64) -> String {
@@ -222,6 +220,6 @@ fn remarks(cx: &Cx<'_>, ui: &mut Ui, adapted: &Adapted) {
             ui.add(egui::Label::new(format!("{}: {}", remark.name, remark.why)).wrap());
         }
     };
-    list("Pairs that contradict the others", &adapted.doubtful);
-    list("Pairs that could not be used", &adapted.left_out);
+    list("Pairs that disagree with the others", &adapted.doubtful);
+    list("Pairs not used", &adapted.left_out);
 }

@@ -28,8 +28,8 @@ fn form(cx: &mut Cx<'_>, ui: &mut Ui) {
     let before = cx.state.learn.form;
     let mut form = before;
     let begins = match recipe::bundle(cx.state, BundleKind::Mask) {
-        Ok(bundle) => format!("begins from {}", bundle.name),
-        Err(_) => "there is no mask model to begin from".to_owned(),
+        Ok(bundle) => format!("starts from {}", bundle.name),
+        Err(_) => "no mask model to start from".to_owned(),
     };
     ui.add(Label::new(caption(begins, cx.p)).wrap());
     ui.horizontal_wrapped(|ui| {
@@ -47,19 +47,18 @@ fn form(cx: &mut Cx<'_>, ui: &mut Ui) {
     });
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing = vec2(8.0, 4.0);
-        ui.label(caption("Left out", cx.p));
+        ui.label(caption("Leave out", cx.p));
         let percent = DragValue::new(&mut form.choice.held_out_percent).range(0..=MOST_HELD_OUT).suffix(" %");
         let percent = ui.add(percent).accessible_name("Pairs left out for the score");
-        percent
-            .on_hover_text("Of the pairs so many are not learned from, both fingers together: the score is of these");
+        percent.on_hover_text("This share of the pairs, with both fingers, is not trained on and gives the score");
         ui.label(caption("Seed", cx.p));
         let seed = ui.add(DragValue::new(&mut form.choice.seed).range(0..=999_999));
         seed.accessible_name("Seed of the training")
-            .on_hover_text("Decides which pairs are left out, and the order and variation of the masks");
+            .on_hover_text("Decides which pairs are left out, and the order and augmentation of the masks");
     });
-    let tip = "Else pairs that the data set keeps for tests (test_only) are left out, so that no score is of what was \
+    let tip = "Off: pairs reserved for tests (test_only) are left out, so that no model is scored on what it was \
                trained on";
-    ui.checkbox(&mut form.choice.test_in_train, "train on pairs kept for tests").on_hover_text(tip);
+    ui.checkbox(&mut form.choice.test_in_train, "train on pairs reserved for tests").on_hover_text(tip);
     if form != before {
         cx.push(LearnCommand::SetForm(form));
     }
@@ -68,19 +67,20 @@ fn form(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// For how long.
 fn budget(cx: &Cx<'_>, ui: &mut Ui, form: &mut LearnForm) {
     ui.label(caption("Train for", cx.p));
-    let tip = "A few steps are timed first; the rates fall toward the end of the time";
+    let tip = "A few steps are timed first; the learning rate falls toward the end";
     if ui.radio(!form.by_steps, "minutes").on_hover_text(tip).clicked() {
         form.by_steps = false;
     }
-    if ui.radio(form.by_steps, "steps").on_hover_text("The same result on any machine of a kind").clicked() {
+    if ui.radio(form.by_steps, "steps").on_hover_text("Gives the same result on any machine of the same kind").clicked()
+    {
         form.by_steps = true;
     }
     let drag = match form.by_steps {
         false => DragValue::new(&mut form.minutes).range(MINUTES).suffix(" min"),
         true => DragValue::new(&mut form.steps).range(STEPS).suffix(" steps"),
     };
-    let name = if form.by_steps { "Steps of training" } else { "Minutes of training" };
-    ui.add(drag).accessible_name(name).on_hover_text("Ten minutes are about right for twenty masks on two free cores");
+    let name = if form.by_steps { "Training steps" } else { "Training minutes" };
+    ui.add(drag).accessible_name(name).on_hover_text("About ten minutes for twenty masks on two free cores");
 }
 
 /// Plan of the training.
@@ -100,10 +100,10 @@ fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
                 say(warning, cx.p.caution);
             }
             if let Some(nothing) = nothing {
-                say(format!("Nothing to learn from yet: {}.", nothing.why), cx.p.caution);
+                say(format!("Nothing to train on yet: {}.", nothing.why), cx.p.caution);
                 say(nothing.hint, cx.p.caution);
                 if let Some(cure) = nothing.cure
-                    && ui.button(cure.name()).on_hover_text("Changes the choice above; nothing starts yet").clicked()
+                    && ui.button(cure.name()).on_hover_text("Changes the choice above; does not start yet").clicked()
                 {
                     let form = cx.state.learn.form;
                     cx.push(LearnCommand::SetForm(LearnForm { choice: cure.applied(form.choice), ..form }));
@@ -122,7 +122,7 @@ fn plan(cx: &mut Cx<'_>, ui: &mut Ui) {
 /// Scores of the new model on masks that were not trained on.
 pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     ui.add_space(6.0);
-    ui.label(section("On pairs that were left out", cx.p));
+    ui.label(section("Scores on pairs left out", cx.p));
     let mut say = |text: String, color| ui.add(Label::new(RichText::new(text).size(SMALL).color(color)).wrap());
     for warning in &trained.warnings {
         say(warning.clone(), cx.p.caution);
@@ -133,13 +133,13 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
         say(format!("{when}: {} on {}", worth.text(), counted(worth.grasps, "grasp")), cx.p.text);
     }
-    let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
+    let change = |before: f64, after: f64| format!("{before:.3} → {after:.3}");
     let mut select = None;
     egui::Grid::new("held out").num_columns(3).spacing(vec2(12.0, 3.0)).striped(true).show(ui, |ui| {
         for (heading, tip) in [
-            ("IoU", "Pixels in both masks over pixels in either: the model as it was, and the trained one"),
-            ("Dice", "Twice the pixels in both masks over the pixels of each together"),
-            ("pair, the worst first", "A click shows the pair"),
+            ("IoU", "Intersection over union, before → after training"),
+            ("Dice", "Dice coefficient, before → after training"),
+            ("pair, worst first", "A click shows the pair"),
         ] {
             ui.label(caption(heading, cx.p)).on_hover_text(tip);
         }
@@ -173,7 +173,7 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     }
     let by = if trained.persons.is_empty() { String::new() } else { format!(" by {}", trained.persons.join(", ")) };
     let text = format!(
-        "{} masks of {} pairs{by}, {} steps, {:.0} s; the bundle: {}",
+        "{} masks of {} pairs{by}, {} steps, {:.0} s; saved in {}",
         trained.masks,
         trained.pairs,
         trained.steps,
