@@ -37,7 +37,7 @@ fn a_folder_of_ones_own_says_what_it_is_and_esc_puts_that_away() {
     // The models were tried because it was looked at.
     let worth = rig.harness.state().state().doctor.worth.clone().expect("the models were tried");
     assert!(worth.fit.is_some() && worth.masks.is_some_and(|masks| masks.grasps == 4), "{worth:?}");
-    rig.harness.get_by_label_contains(" dB, pose ");
+    rig.harness.get_by_label_contains(" dB, angle error ");
     rig.harness.get_by_label_contains("with masks from CAD, angle error ");
     rig.shoot("about-simulated");
     // It takes no keyboard: the list is still gone through.
@@ -85,7 +85,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     let data = folder.path().join("pairs");
     copied(&pairs, &data);
     let Some(mut rig) = Rig::greeting(SIZE, Place::Path(data), true) else { return };
-    rig.harness.get_by_label_contains("36 pairs of pictures; pictures do not say their depth");
+    rig.harness.get_by_label_contains("36 pairs of images; images carry no depth scale");
     rig.harness.get_by_label_contains("fit to your 36 pairs: ");
     rig.harness.get_by_label_contains("expected about 2");
     rig.shoot("about-pairs");
@@ -100,7 +100,7 @@ fn real_pairs_are_fitted_from_the_panel_and_the_fit_is_used_at_once() {
     assert!(found.pairs == 36 && after > before + 5.0, "{before} {after}");
     // In the table and over the pictures of a touch that was left out.
     assert_eq!(rig.harness.get_all_by_label("Before").count(), 2);
-    rig.harness.get_by_label("Fitted to the others");
+    rig.harness.get_all_by_label("Fitted").next().expect("the picture of the fit");
     // Used at once: what is on screen is predicted anew.
     assert!(state.results.predictions.iter().next().is_none());
     rig.harness.get_by_label("Use the fitted model").click();

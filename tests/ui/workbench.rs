@@ -134,7 +134,7 @@ fn keys_nudge_the_tool_accept_is_one_undoable_change_and_is_stored() {
     };
     assert_eq!(results::by_hand(rig.model(), MEASURED), Some(pose));
     assert_eq!(stored(&rig).map(|a| (a.pose, a.by_hand)), Some((pose, true)));
-    assert!(rig.harness.query_all_by_label_contains("Accepted by hand").count() > 0, "the figures say so");
+    assert!(rig.harness.query_all_by_label_contains("Pose by hand").count() > 0, "the figures say so");
     rig.shoot("test-accepted");
     rig.press(Modifiers::CTRL, Key::Z);
     assert_eq!((results::by_hand(rig.model(), MEASURED), stored(&rig)), (None, None));

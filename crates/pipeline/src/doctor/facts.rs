@@ -83,7 +83,7 @@ fn pairs(dataset: &Dataset, looked_at: &[Sample], asked: usize) -> Fact {
         text += &format!("; {tests} reserved for tests");
     }
     if looked_at.iter().any(|sample| sample.scale == Scale::Assumed) {
-        text += "; pictures carry no depth scale: -6.3 to 18 mm is assumed";
+        text += "; images carry no depth scale: -6.3 to 18 mm is assumed";
     }
     let has = |sample: &&Sample, get: fn(&PadTouch) -> bool| sample.pads.iter().flatten().any(get);
     let blind = looked_at.iter().filter(|sample| !has(sample, |touch| touch.color().is_some())).count();
