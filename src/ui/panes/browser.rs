@@ -138,7 +138,7 @@ fn score_row(cx: &mut Cx<'_>, ui: &mut Ui) {
     let mut next = None;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        let direction = 52.0;
+        let direction = 80.0;
         let width = ui.available_width() - direction - 8.0;
         let combo = egui::ComboBox::from_id_salt("score").width(width).selected_text(metric.name());
         let response = combo.show_ui(ui, |ui| {

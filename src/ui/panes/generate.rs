@@ -1,4 +1,4 @@
-//! The generator: bundle, steps, seed, range mapping, run, and the results so far.
+//! The generator: bundle, steps, seed, depth scale, run, and the results so far.
 
 use crate::app::settings::prefer;
 use crate::app::{recipe, results};
@@ -16,7 +16,7 @@ use touch2touch_core::postprocess::{CorrectionPart, CorrectionParts};
 use touch2touch_pipeline::steps::bundles::{BundleInfo, BundleKind};
 
 /// Width of the captions at the left.
-const LABEL: f32 = 60.0;
+const LABEL: f32 = 72.0;
 
 /// A caption at the left of its control.
 fn row(ui: &mut Ui, weak: egui::Color32, name: &str, add: impl FnOnce(&mut Ui)) {
