@@ -40,6 +40,7 @@ pub use recipe::{ModelArgs, RuntimeArg};
 pub use simulate::condition;
 
 use touch2touch_core::rig::Rig;
+use touch2touch_pipeline::io::program::Program;
 use touch2touch_pipeline::steps::recipe::Recipe;
 
 /// From a GelSlim touch to the Soft Bubble imprint and the in-hand pose of the same grasp.
@@ -118,22 +119,32 @@ const PIPE_CLOSED: u8 = 141;
 
 /// Parses the arguments and runs the verb or the window.
 pub fn main() -> ExitCode {
-    program(|| parse(std::env::args_os()).and_then(run))
+    main_with(std::env::args_os(), Program::executable()).into()
 }
 
-/// A program of verbs: what it does, its exit code and what it says of errors.
-pub fn program(run: impl FnOnce() -> VerbResult) -> ExitCode {
+/// The program in another process than its own, such as Python's: `arguments` begin with its name. The exit code.
+pub fn main_with(arguments: impl IntoIterator<Item = OsString>, this: Option<Program>) -> u8 {
+    program(this, || parse(arguments).and_then(run))
+}
+
+/// A program of verbs: what it is, what it does, its exit code and what it says of errors.
+pub fn program(this: Option<Program>, run: impl FnOnce() -> VerbResult) -> u8 {
     output::start_log();
     touch2touch_pipeline::job::bound_threads();
-    touch2touch_pipeline::infer::sandbox::by_this_program();
+    match this {
+        Some(program) => program.declare(),
+        None => {
+            log::warn!("model bundles are not tried before their first use: the program does not know its own path")
+        }
+    }
     match run() {
-        Ok(true) => ExitCode::SUCCESS,
-        Ok(false) => ExitCode::from(1),
+        Ok(true) => 0,
+        Ok(false) => 1,
         Err(err) => match err.downcast_ref::<PrintError>() {
-            Some(PrintError::Closed) => ExitCode::from(PIPE_CLOSED),
+            Some(PrintError::Closed) => PIPE_CLOSED,
             _ => {
                 output::note(&format!("error: {}", says(&err)));
-                ExitCode::from(2)
+                2
             }
         },
     }

@@ -24,10 +24,10 @@ from ._native import (
     __version__,
     adapt,
     bundles,
-    evaluate,
-    export_masks,
     estimate,
     estimate_many,
+    evaluate,
+    export_masks,
     frechet,
     label,
     open,
@@ -39,11 +39,12 @@ from ._native import (
 )
 from ._arrays import from_arrays
 from ._many import predict, predict_many, table
+from ._studio import studio
 
 __all__ = [
     "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt", "bundles",
     "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "from_arrays", "label", "open", "predict", "predict_many", "psnr",
-    "register", "register_many", "simulate", "ssim", "table",
+    "register", "register_many", "simulate", "ssim", "studio", "table",
 ]
 
 

@@ -25,6 +25,7 @@ use touch2touch::headless::{VerbResult, program};
 use touch2touch_core::cloud::{CloudError, lift};
 use touch2touch_core::grid::{DepthMap, Mask};
 use touch2touch_core::sample::DepthCamera;
+use touch2touch_pipeline::io::program::Program;
 
 /// Command line: the benchmark to run.
 #[derive(Debug, Parser)]
@@ -57,7 +58,7 @@ fn main() -> ExitCode {
     if std::env::args_os().nth(1).is_some_and(|word| word == "bundle") {
         return touch2touch::headless::main();
     }
-    program(|| run(&Benchmark::parse()))
+    program(Program::executable(), || run(&Benchmark::parse())).into()
 }
 
 fn run(benchmark: &Benchmark) -> VerbResult {

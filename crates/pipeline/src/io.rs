@@ -21,6 +21,7 @@ pub mod names;
 pub mod npz;
 pub mod ply;
 pub mod predicted_id;
+pub mod program;
 pub mod pt;
 pub mod simulated;
 pub(crate) mod staging;

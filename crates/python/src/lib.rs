@@ -11,6 +11,7 @@ mod masks;
 mod measures;
 mod picture;
 mod process;
+mod program;
 mod recipe;
 mod tables;
 mod tool;
@@ -29,6 +30,8 @@ mod _native {
     use crate::measures::{frechet, psnr, ssim};
     #[pymodule_export]
     use crate::process::{Cancelled, Refused};
+    #[pymodule_export]
+    use crate::program::main;
     #[pymodule_export]
     use crate::recipe::Recipe;
     #[pymodule_export]

@@ -1,7 +1,6 @@
 //! A graphics device that is lost (its driver crashed or was changed, its memory is full): nothing can be drawn any more, so
 //! everything is saved, the window closes and the program starts again where it was.
 
-use std::process::Command;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
@@ -9,6 +8,7 @@ use eframe::egui::Context;
 
 use crate::gpu::wgpu;
 use touch2touch_pipeline::error::TaskError;
+use touch2touch_pipeline::io::program::Program;
 
 /// Tells the program that it was started again, and when: seconds since 1970.
 const STARTED_AGAIN: &str = "TOUCH2TOUCH_STARTED_AGAIN";
@@ -82,9 +82,8 @@ pub(crate) fn start_again(why: &str) -> String {
     if !may_start(std::env::var(STARTED_AGAIN).ok().as_deref(), now()) {
         return format!("{lost} once its driver works. It was lost twice within {} s.", TOO_SOON.as_secs());
     }
-    let mut program = match std::env::current_exe() {
-        Ok(program) => Command::new(program),
-        Err(err) => return format!("{lost}; it does not know its own path: {err}"),
+    let Some(mut program) = Program::declared().map(Program::command) else {
+        return format!("{lost}; it does not know its own path.");
     };
     // Not the arguments: another data set than theirs may have been open.
     program.env(STARTED_AGAIN, now().to_string());

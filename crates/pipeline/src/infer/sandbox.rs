@@ -15,15 +15,16 @@
 //! Bounded is loading, and one run of every graph with a batch of one, in time ([`TIME`]) and in memory
 //! ([`memory_limit`]: on Linux the address space, elsewhere on Unix what `ps` says is resident; on Windows nothing limits
 //! the memory, but it is the second process that ends; a provider that maps a device's memory has no bound). Not bounded is
-//! what a graph asks for on other values than zeros, and larger batches, which take their multiple. A program other than `touch2touch` that uses this library has no
-//! second process; it compares, and tries nothing else.
+//! what a graph asks for on other values than zeros, and larger batches, which take their multiple. Another program that uses this library has no
+//! second process ([`Program::declared`]); it compares, and tries nothing else.
 
 mod compare;
 mod watch;
 
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
 use super::bundle::contract::promised;
@@ -31,6 +32,7 @@ use super::bundle::{Bundle, Origin, TimestepType};
 use super::engine::{EngineChoice, EngineError, EngineKind, Graph, Input, Refusal, build, resolve};
 use crate::io::digest::sha256;
 use crate::io::folders;
+use crate::io::program::Program;
 use touch2touch_core::diffusion::{ModelError, Tensor};
 use watch::{End, Limits, ProcessEnd};
 
@@ -47,17 +49,6 @@ pub const VERB: [&str; 2] = ["bundle", "try"];
 const AT: &str = "at ";
 const REFUSED: &str = "refused ";
 const TAKEN: &str = "taken";
-
-/// The program that can be started for a trial.
-static PROGRAM: OnceLock<PathBuf> = OnceLock::new();
-
-/// Says that this program has the verb [`VERB`], so that bundles are tried from now on.
-pub fn by_this_program() {
-    match std::env::current_exe() {
-        Ok(program) => drop(PROGRAM.set(program)),
-        Err(err) => log::warn!("model bundles are not tried before their first use: {err}"),
-    }
-}
 
 /// The most memory a trial of the bundle may use, bytes.
 pub(crate) fn memory_limit(bundle: &Bundle) -> u64 {
@@ -86,7 +77,7 @@ fn known_or_tried(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
     static KNOWN: Mutex<BTreeMap<String, Result<(), Refusal>>> = Mutex::new(BTreeMap::new());
     // The manifests hold the checksums of the graphs; what a driver makes of them is another matter.
     let on_the_processor = !matches!(engine, EngineKind::On(_));
-    if on_the_processor && (Origin::ships(bundle.hash()) || PROGRAM.get().is_none()) {
+    if on_the_processor && (Origin::ships(bundle.hash()) || Program::declared().is_none()) {
         return Ok(());
     }
     let key = key(bundle, engine);
@@ -94,7 +85,7 @@ fn known_or_tried(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
     let verdict = match known {
         Some(verdict) => verdict,
         None if kept(&key).is_some_and(|file| file.is_file()) => Ok(()),
-        None => match PROGRAM.get().map(|program| start(program, bundle, engine)) {
+        None => match Program::declared().map(|program| start(program, bundle, engine)) {
             Some(Ok(seen)) => judge(bundle, engine, &seen),
             // The program was moved, say: no reason to give the bundle up.
             Some(Err(err)) => {
@@ -116,7 +107,7 @@ fn known_or_tried(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
 /// # Errors
 /// [`Refusal`], also if no trial could be made.
 pub fn check(bundle: &Bundle, engine: EngineKind) -> Result<(), Refusal> {
-    let program = PROGRAM.get().ok_or_else(|| refusal(bundle, engine, "there is no program to try it with"))?;
+    let program = Program::declared().ok_or_else(|| refusal(bundle, engine, "there is no program to try it with"))?;
     match start(program, bundle, engine) {
         Ok(seen) => judge(bundle, engine, &seen)?,
         Err(err) => return Err(refusal(bundle, engine, format!("it could not be tried: {err}"))),
@@ -181,17 +172,18 @@ fn as_inputs<'a>(bundle: &Bundle, tensors: &'a [(&str, Tensor)], step: &'a [i64]
     tensors.iter().map(input).collect()
 }
 
-fn start(program: &Path, bundle: &Bundle, engine: EngineKind) -> std::io::Result<ProcessEnd> {
+fn start(program: &Program, bundle: &Bundle, engine: EngineKind) -> std::io::Result<ProcessEnd> {
     let name = EngineChoice::from(engine).key();
     let place = match bundle.origin() {
         Origin::Folder(folder) => std::path::absolute(folder)?,
         built_in => built_in.path(),
     };
-    let [group, verb] = VERB.map(AsRef::as_ref);
-    let args = [group, verb, name.as_ref(), "--".as_ref(), place.as_os_str()];
+    let mut words = program.0.clone();
+    words.extend([VERB[0], VERB[1], name, "--"].map(OsString::from));
+    words.push(place.into());
     // Drivers reserve address space by the terabyte.
     let bounded = !matches!(engine, EngineKind::On(provider) if provider.has_own_memory());
-    watch::watch(program, &args, Limits { memory: bounded.then(|| memory_limit(bundle)), time: TIME })
+    watch::watch(&words, Limits { memory: bounded.then(|| memory_limit(bundle)), time: TIME })
 }
 
 fn refusal(bundle: &Bundle, engine: EngineKind, reason: impl Into<String>) -> Refusal {

@@ -1,8 +1,7 @@
 //! A process under a bound of memory and time.
 
-use std::ffi::OsStr;
+use std::ffi::OsString;
 use std::io::{self, Read};
-use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
@@ -41,9 +40,8 @@ pub(super) struct ProcessEnd {
 }
 
 /// Runs a program to its end, or to the end of its limits.
-pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Result<ProcessEnd> {
-    let mut child = command(program, limits.memory)
-        .args(args)
+pub(super) fn watch(words: &[OsString], limits: Limits) -> io::Result<ProcessEnd> {
+    let mut child = command(words, limits.memory)
         // An address space of its own for each thread's heap would count, though nothing is in it.
         .env("MALLOC_ARENA_MAX", "2")
         .stdin(Stdio::null())
@@ -65,14 +63,18 @@ pub(super) fn watch(program: &Path, args: &[&OsStr], limits: Limits) -> io::Resu
     })
 }
 
-/// The program, with a bound on its memory where the system has one for processes.
-fn command(program: &Path, memory: Option<u64>) -> Command {
-    let Some(memory) = memory.filter(|_| cfg!(unix)) else { return Command::new(program) };
+/// A program and its arguments, with a bound on its memory where the system has one for processes.
+fn command(words: &[OsString], memory: Option<u64>) -> Command {
+    let Some(memory) = memory.filter(|_| cfg!(unix)) else {
+        let mut command = Command::new(&words[0]);
+        command.args(&words[1..]);
+        return command;
+    };
     // Only the shell can set a limit without unsafe code. It is tried out first: where the system has no such limit, or a
     // lower one is in force, the program is started all the same.
     const LIMITED: &str = r#"(ulimit -v "$1") 2>/dev/null && ulimit -v "$1"; shift; exec "$@""#;
     let mut command = Command::new("/bin/sh");
-    command.args(["-c", LIMITED, "sh"]).arg((memory >> 10).to_string()).arg(program);
+    command.args(["-c", LIMITED, "sh"]).arg((memory >> 10).to_string()).args(words);
     command
 }
 
@@ -124,7 +126,7 @@ mod tests {
     use super::*;
 
     fn shell(script: &str, limits: Limits) -> ProcessEnd {
-        watch(Path::new("/bin/sh"), &["-c".as_ref(), script.as_ref()], limits).unwrap()
+        watch(&["/bin/sh", "-c", script].map(OsString::from), limits).unwrap()
     }
 
     #[test]
@@ -159,7 +161,7 @@ mod tests {
     #[test]
     fn a_program_that_is_not_there_is_an_end_with_words() {
         let limits = Limits { memory: Some(1 << 30), time: Duration::from_secs(60) };
-        let seen = watch(Path::new("/nowhere/at/all"), &[], limits).unwrap();
+        let seen = watch(&["/nowhere/at/all".into()], limits).unwrap();
         assert!(matches!(seen.end, End::Ended(status) if !status.success()) && !seen.errors.is_empty(), "{seen:?}");
     }
 }
