@@ -29,7 +29,7 @@ cargo build "${whole[@]}"
 step "the Python package in an environment of its own"
 python=target/python-venv/bin/python
 [ -x "$python" ] || python3 -m venv target/python-venv
-"$python" -m pip install --quiet numpy pytest mypy onnxruntime==1.31.1 pyarrow duckdb pandas polars "ray[data]"
+"$python" -m pip install --quiet numpy matplotlib pytest mypy onnxruntime==1.31.1 pyarrow duckdb pandas polars "ray[data]"
 site=$("$python" -c 'import sysconfig; print(sysconfig.get_path("platlib"))')
 rm -rf "$site/touch2touch"
 cp -r python/touch2touch "$site/"

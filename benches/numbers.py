@@ -314,24 +314,16 @@ def by_mask(laws):
 
 
 def masks_table(found):
-    """Joint registration and mask alone, by the mask."""
+    """Joint registration and mask alone, by the mask; errors of joint in its own standard deviations."""
     rows = []
     for words, *both in by_mask(found):
         cells = [f"{e['mean_deg']:.2f}°, {e['success_5']:.1f} %, {e['median_ms']:.2f} ms" for e in both]
-        rows.append([*words, str(both[0]["count"]), *cells])
-    heads = ["grasps of", "mask", "N", "mask alone: mean, ≤5°, median", "joint (default): mean, ≤5°, median"]
-    return "\n\n".join([markdown(heads, rows, 2), "Errors of the joint registration in its own standard deviations: root mean square "
-                        "(share within two); 1 and 95 % where they are right.", deviations(found)])
-
-
-def deviations(found):
-    """Errors of the joint registration in its own standard deviations, by the mask."""
-    rows = []
-    for words, _, joint in by_mask(found):
-        if "rms" in joint:
-            scores = zip(joint["rms"], joint["within_2"], strict=True)
-            rows.append([*words, str(joint["count"]), *(f"{rms:.2f} ({share:.0f} %)" for rms, share in scores)])
-    return markdown(["grasps of", "mask", "N", "angle", "y", "z"], rows, 2)
+        joint = both[1]
+        rms = [f"{rms:.2f} ({share:.0f} %)" for rms, share in zip(joint["rms"], joint["within_2"], strict=True)] if "rms" in joint else 3 * ["-"]
+        rows.append([*words, str(joint["count"]), *cells, *rms])
+    heads = ["grasps of", "mask", "N", "mask alone: mean, ≤5°, median", "joint (default)", "angle / σ", "y / σ", "z / σ"]
+    return markdown(heads, rows, 2) + ("\n\nThe last three: errors of joint in its own standard deviations, root mean square (share within "
+                                       "two); 1 and 95 % where they are right.")
 
 
 # What the benchmark calls the faults, where that is too short.
