@@ -276,7 +276,7 @@ def test_scores_are_a_table_and_filter_the_data(demo):
     assert {row["method"] for row in rows} >= {"Measured (upper bound)", "Paper: VQ-VAE"}
     row = next(row for row in rows if row["upper_bound"])
     assert row["angle_deg_low"] <= row["angle_deg"] <= row["angle_deg_high"]
-    assert "angle" in str(scores) and "<pre>" in scores._repr_html_() and "grasps by" in repr(scores)
+    assert "angle" in str(scores) and "iframe" in scores._repr_html_() and "grasps by" in repr(scores)
     worse = demo.filter("psnr<99", scores)
     assert 0 < len(worse) < len(demo), "only what was scored"
     assert len(demo.filter("measured:angle>90", scores)) == 0

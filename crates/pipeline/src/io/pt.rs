@@ -156,7 +156,7 @@ impl PtDict {
     /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
     pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
         let Some(tensor) = self.reader.get(key) else { return self.plain_number(key) };
-        let bad = |reason: String| self.bad(key, reason);
+        let bad = |reason: String| PtError::BadStorage { file: self.file.clone(), key: key.into(), reason };
         // A view can repeat one value of the file for ever.
         if tensor.shape().iter().fold(1usize, |product, &n| product.saturating_mul(n)) > MAX_VALUES {
             return Err(bad(format!("its shape {:?} has more than {MAX_VALUES} values", tensor.shape())));
@@ -213,14 +213,6 @@ impl PtDict {
                 Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found })
             }
         }
-    }
-
-    fn bad(&self, key: &str, reason: String) -> PtError {
-        PtError::BadStorage { file: self.file.clone(), key: key.into(), reason }
-    }
-
-    fn missing(&self, key: &str) -> PtError {
-        PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&self.keys().join(", ")) }
     }
 
     fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> PtError {

@@ -26,7 +26,7 @@ use super::{most_invalid, plausible, problem, same_name};
 use crate::io::caught::caught;
 use crate::io::files;
 use crate::io::names::is_output;
-use crate::io::pt::{PtDict, PtError, Rows, read_dict};
+use crate::io::pt::{PtError, Rows};
 use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -153,13 +153,13 @@ impl Found {
         });
         paths.sort();
         // The first file that can be read and is of either kind says what kind of folder it is.
-        let dicts = || paths.iter().take(MOST_TRIED).filter_map(|path| caught(|| read_dict(path)).ok()?.ok());
-        if !dicts().find(|dict| dict.has(TOUCHED) || dict.has("gelslim")).is_some_and(|dict| dict.has(TOUCHED)) {
+        let opened = || paths.iter().take(MOST_TRIED).filter_map(|path| caught(|| Rows::open(path)).ok()?.ok());
+        if !opened().find(|rows| rows.has(TOUCHED) || rows.has("gelslim")).is_some_and(|rows| rows.has(TOUCHED)) {
             return;
         }
         self.folders.push(folder.to_owned());
         for path in paths {
-            let read = caught(|| Ok(touches(&read_dict(&path)?)?));
+            let read = caught(|| Ok(touches(&mut Rows::open(&path)?)?));
             let failed = |message| Err(LoadError::Bug { files: vec![path.clone()], message });
             match read.unwrap_or_else(failed) {
                 Ok(touches) => self.add(path, touches),
@@ -214,25 +214,24 @@ impl Found {
 }
 
 /// The key of the depths, where there are any.
-fn depths_key(dict: &PtDict) -> Option<&'static str> {
-    DEPTHS.into_iter().find(|key| dict.has(key))
+fn depths_key(rows: &Rows) -> Option<&'static str> {
+    DEPTHS.into_iter().find(|key| rows.has(key))
 }
 
 /// The number of touches in a file, after every shape in it was checked.
-fn touches(dict: &PtDict) -> Result<usize, PtError> {
-    let shape = dict.shape(TOUCHED).unwrap_or_default();
+fn touches(rows: &mut Rows) -> Result<usize, PtError> {
+    let shape = rows.shape(TOUCHED).unwrap_or_default();
     let touches = shape.first().copied().unwrap_or(0).min(MOST_TOUCHES + 1);
     if touches > MOST_TOUCHES {
         let reason = format!("\"{TOUCHED}\" has the shape {shape:?}; at most {MOST_TOUCHES} touches are read");
-        return Err(PtError::TooLarge { file: dict.file().to_owned(), reason });
+        return Err(PtError::TooLarge { file: rows.file().to_owned(), reason });
     }
-    let mut rows = dict.rows()?;
     rows.check(TOUCHED, touches, &PICTURE)?;
-    if let Some(key) = depths_key(dict) {
+    if let Some(key) = depths_key(rows) {
         rows.check(key, touches, &DEPTH)?;
     }
     for (key, shape) in [(UNTOUCHED, &PICTURE[..]), (POSE, &[3])] {
-        if dict.has(key) {
+        if rows.has(key) {
             rows.check(key, touches, shape)?;
         }
     }
@@ -247,20 +246,19 @@ impl Depths {
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let (file, row) = *self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
         let (file, at) = (&self.files[file as usize], row as usize);
-        let dict = read_dict(&file.path)?;
-        let mut rows = dict.rows()?;
+        let mut rows = Rows::open(&file.path)?;
         let mut notes = Vec::new();
         let of = file.touches;
-        let colors = colors(&dict, &mut rows, at, of, &mut notes)?;
-        let depths = match depths_key(&dict) {
+        let colors = colors(&mut rows, at, of, &mut notes)?;
+        let depths = match depths_key(&rows) {
             Some(key) => Some((key, rows.read(key, at, of, &DEPTH)?.into_f32())),
             None => {
                 let what = format!("no key \"{}\": there is no measured imprint", DEPTHS[0]);
-                notes.push(problem(dict.file(), what, "save the depths with the pictures if the truth is wanted"));
+                notes.push(problem(rows.file(), what, "save the depths with the pictures if the truth is wanted"));
                 None
             }
         };
-        let half_m = 0.5e-3 * self.width_mm(&dict, file, at, &mut notes);
+        let half_m = 0.5e-3 * self.width_mm(&mut rows, file, at, &mut notes);
         let mut invalid = [InvalidPixels::default(); 2];
         let mut pads = [PadTouch::default(), PadTouch::default()];
         for ((pad, place), color) in PLACES.into_iter().zip(colors) {
@@ -274,21 +272,21 @@ impl Depths {
             let values = &depths[place * PIXELS..][..PIXELS];
             let imprint = imprint(values, &mut invalid[pad.index()]);
             let name = self.rig.pad_key(pad);
-            most_invalid(dict.file(), invalid[pad.index()].total(), PIXELS, || format!("pixels of the {name} depth"))?;
+            most_invalid(rows.file(), invalid[pad.index()].total(), PIXELS, || format!("pixels of the {name} depth"))?;
             if values.iter().any(|v| *v > 0.0) && !values.iter().any(|v| *v < 0.0) {
                 let what =
                     format!("key \"{key}\", {name} finger: the depths are positive, so that nothing is pushed in");
-                notes.push(problem(dict.file(), what, "store the distance as the lab does, negative where pushed in"));
+                notes.push(problem(rows.file(), what, "store the distance as the lab does, negative where pushed in"));
             }
             let deepest = values.iter().copied().fold(0f32, f32::min);
             if deepest < 0.0 && deepest > LEAST_MM {
                 let what = format!("key \"{key}\", {name} finger: nothing is deeper than {} mm: meters?", -deepest);
-                notes.push(problem(dict.file(), what, "store depths in millimeters"));
+                notes.push(problem(rows.file(), what, "store depths in millimeters"));
             }
             let camera = Some(camera(pad, half_m, self.px_per_m()));
             touch.set(sensor, DepthTouch { imprint, camera, truth: None });
         }
-        let grasp_from_object = pose(&dict, &mut rows, at, of, &mut notes)?;
+        let grasp_from_object = pose(&mut rows, at, of, &mut notes)?;
         let sample = Sample {
             rig: self.rig.clone(),
             pads: pads.map(Some).into(),
@@ -297,7 +295,7 @@ impl Depths {
             ..Sample::default()
         };
         let mut loaded = Loaded { sample, invalid: invalid.map(Some).into() };
-        plausible::notes_of(&mut loaded, dict.file(), depths.map_or(DEPTHS[0], |(key, _)| key), false);
+        plausible::notes_of(&mut loaded, rows.file(), depths.map_or(DEPTHS[0], |(key, _)| key), false);
         Ok(loaded)
     }
 
@@ -318,16 +316,16 @@ impl Depths {
     }
 
     /// Distance of the gels in a touch, millimeters.
-    fn width_mm(&self, dict: &PtDict, file: &File, at: usize, notes: &mut Vec<Problem>) -> f64 {
-        let own = || {
-            let values = dict.tensor(WIDTHS).ok()?.into_f32();
+    fn width_mm(&self, rows: &mut Rows, file: &File, at: usize, notes: &mut Vec<Problem>) -> f64 {
+        let mut own = || {
+            let values = rows.all(WIDTHS).ok()?.into_f32();
             values.get(if values.len() == 1 { 0 } else { at }).map(|width| f64::from(*width))
         };
         let width = own().or(file.width_mm).filter(|width| WIDTH_RANGE_MM.contains(width));
         width.unwrap_or_else(|| {
             let what = format!("no width of the grasp: the gels are taken to be {ASSUMED_WIDTH_MM} mm apart");
             let hint = format!("save \"{WIDTHS}\" in millimeters, or write {WIDTHS_FILE} with a line `tool: width`");
-            notes.push(problem(dict.file(), what, hint));
+            notes.push(problem(rows.file(), what, hint));
             ASSUMED_WIDTH_MM
         })
     }
@@ -335,25 +333,24 @@ impl Depths {
 
 /// The pictures of the right and the left finger.
 fn colors(
-    dict: &PtDict,
-    rows: &mut Rows<'_>,
+    rows: &mut Rows,
     at: usize,
     of: usize,
     notes: &mut Vec<Problem>,
 ) -> Result<[Option<ColorTouch>; 2], LoadError> {
     let raw = rows.read(TOUCHED, at, of, &PICTURE)?.into_f32();
-    if !dict.has(UNTOUCHED) {
+    if !rows.has(UNTOUCHED) {
         let what = format!("no key \"{UNTOUCHED}\": there is no GelSlim difference");
-        notes.push(problem(dict.file(), what, "save the picture without contact beside the others"));
+        notes.push(problem(rows.file(), what, "save the picture without contact beside the others"));
         return Ok([None, None]);
     }
     let reference = rows.read(UNTOUCHED, at, of, &PICTURE)?.into_f32();
     let bad = raw.iter().zip(&reference).filter(|(a, b)| !(a.is_finite() && b.is_finite())).count();
-    most_invalid(dict.file(), bad, raw.len(), || "values of the GelSlim images".into())?;
+    most_invalid(rows.file(), bad, raw.len(), || "values of the GelSlim images".into())?;
     if bad > 0 {
         let percent = 100.0 * bad as f64 / raw.len() as f64;
         let what = format!("keys \"{TOUCHED}\", \"{UNTOUCHED}\": {bad} values ({percent:.2} %) are NaN or infinite");
-        notes.push(problem(dict.file(), what, "these values count as no difference"));
+        notes.push(problem(rows.file(), what, "these values count as no difference"));
     }
     let value = |i: usize| {
         let (a, b) = (raw[i], reference[i]);
@@ -403,27 +400,21 @@ pub(super) fn assumed_camera(rig: &Rig, finger: PadId) -> Option<DepthCamera> {
 }
 
 /// The true pose of a touch, where the file says one.
-fn pose(
-    dict: &PtDict,
-    rows: &mut Rows<'_>,
-    at: usize,
-    of: usize,
-    notes: &mut Vec<Problem>,
-) -> Result<Option<PlanarPose>, PtError> {
-    if !dict.has(POSE) {
+fn pose(rows: &mut Rows, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, PtError> {
+    if !rows.has(POSE) {
         let what = format!("no key \"{POSE}\": this file says no true pose");
-        notes.push(problem(dict.file(), what, "save the poses if angle errors are wanted"));
+        notes.push(problem(rows.file(), what, "save the poses if angle errors are wanted"));
         return Ok(None);
     }
     let row = rows.read(POSE, at, of, &[3])?.into_f64();
     let [y, z, theta_rad] = row[..] else { return Ok(None) };
     if !row.iter().all(|v| v.is_finite()) {
         let what = format!("key \"{POSE}\", row {at} is {row:?}: it says no true pose");
-        notes.push(problem(dict.file(), what, "write the file again"));
+        notes.push(problem(rows.file(), what, "write the file again"));
         return Ok(None);
     }
     // The lab's page says millimeters, its scripts take meters.
-    let all = dict.tensor(POSE)?.into_f64();
+    let all = rows.all(POSE)?.into_f64();
     let far = all.chunks_exact(3).flat_map(|pose| &pose[..2]).fold(0f64, |far, v| far.max(v.abs()));
     let to_m = if far > LARGEST_IN_METERS { 1e-3 } else { 1.0 };
     Ok(Some(PlanarPose { theta_rad, y_m: y * to_m, z_m: z * to_m }))

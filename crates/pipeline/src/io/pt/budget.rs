@@ -127,7 +127,7 @@ enum End {
 }
 
 /// Walks through one pickle. What follows it, or `None` where it is malformed.
-fn pickle(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
+pub(super) fn pickle(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
     let mut walk = Walk { rest: bytes, stack: Vec::new(), marks: Vec::new(), memo: HashMap::new(), spent: 0 };
     loop {
         match walk.step() {

@@ -1,17 +1,21 @@
-//! One row of a large tensor, read from its own bytes: [`PtDict::rows`].
+//! One row of a large tensor, read from its own bytes: [`Rows`].
 //!
 //! `torch.save` stores tensors uncompressed, one after the other, so that a row lies where offset and strides say. The
-//! crate that reads whole tensors does not tell them, so the list of contents is read here once more.
+//! crate that reads whole tensors does not tell them, and looks for the list of contents through the whole file, so that it is
+//! read here by itself.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs::File;
 use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
+use std::path::{Path, PathBuf};
 use std::rc::Rc;
 
+use pytorch_reader::DType;
+use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
-use super::budget::MAX_PICKLE;
-use super::{PtDict, PtError, Tensor, decode};
+use super::budget::{self, MAX_PICKLE};
+use super::{PtError, Tensor, decode};
 use crate::io::files::{self, clip};
 
 /// Most values of a row: more than the pictures of a touch have.
@@ -23,42 +27,89 @@ const MOST_SPREAD: usize = 4;
 #[derive(Clone, Debug, PartialEq)]
 struct Place {
     storage: String,
+    dtype: DType,
     offset: usize,
+    shape: Vec<usize>,
     strides: Vec<usize>,
 }
 
-/// The rows of a file's tensors.
-pub(crate) struct Rows<'a> {
-    dict: &'a PtDict,
+/// An opened `.pt` file of which rows of tensors are read, however large it is.
+pub(crate) struct Rows {
+    file: PathBuf,
     archive: ZipArchive<BufReader<File>>,
     root: String,
-    places: HashMap<String, Place>,
+    places: BTreeMap<String, Place>,
 }
 
-impl PtDict {
-    /// Access to single rows of the tensors.
+impl Rows {
+    /// Opens a file and reads its list of contents.
     ///
     /// # Errors
     /// [`PtError`] if the file is none of the format that PyTorch has written since 1.6.
-    pub(crate) fn rows(&self) -> Result<Rows<'_>, PtError> {
-        let file = &self.file;
-        let io = |source| PtError::Io { file: file.clone(), what: "cannot read the file", source };
-        let old = |reason: String| PtError::NotADict { file: file.clone(), reason };
-        let opened = BufReader::new(files::open(file).map_err(io)?);
-        let archive = ZipArchive::new(opened);
-        let mut archive =
-            archive.map_err(|err| old(format!("no zip archive as PyTorch 1.6 and newer write: {err}")))?;
+    pub(crate) fn open(path: &Path) -> Result<Self, PtError> {
+        let file = || path.to_owned();
+        let io = |source| PtError::Io { file: file(), what: "cannot read the file", source };
+        let old = |reason: String| PtError::NotADict { file: file(), reason };
+        let mut opened = files::open(path).map_err(io)?;
+        let size = opened.metadata().map_err(io)?.len();
+        let mut head = [0; 2];
+        if size == 0 {
+            return Err(PtError::Damaged { file: file(), reason: "the file is empty".into() });
+        }
+        if opened.read_exact(&mut head).is_err() || &head != b"PK" {
+            return Err(old("no zip archive as PyTorch 1.6 and newer write".into()));
+        }
+        // From its beginning: else all of a large file is searched for what stands in front of it.
+        let config = Config { archive_offset: ArchiveOffset::Known(0) };
+        let damaged = |reason: String| PtError::Damaged { file: file(), reason: clip(&reason) };
+        let archive = ZipArchive::with_config(config, BufReader::new(opened));
+        let mut archive = archive.map_err(|err| damaged(err.to_string()))?;
         let name = archive.file_names().flatten().find(|name| name.ends_with("data.pkl")).map(|name| name.into_owned());
         let name = name.ok_or_else(|| old("it has no data.pkl".into()))?;
+        let entry = archive.by_name(&name).map_err(|err| damaged(err.to_string()))?;
         let mut pickle = Vec::new();
-        let entry = archive.by_name(&name).map_err(|err| old(clip(&err.to_string())))?;
-        entry.take(MAX_PICKLE).read_to_end(&mut pickle).map_err(io)?;
+        entry.take(MAX_PICKLE + 1).read_to_end(&mut pickle).map_err(|err| damaged(err.to_string()))?;
+        let too_large = |reason| PtError::TooLarge { file: file(), reason };
+        if pickle.len() as u64 > MAX_PICKLE {
+            return Err(too_large(format!("its list of contents is longer than {MAX_PICKLE} bytes")));
+        }
+        budget::pickle(&pickle).map_err(too_large)?;
         let root = name.trim_end_matches("data.pkl").to_owned();
-        Ok(Rows { dict: self, archive, root, places: places(&pickle).unwrap_or_default() })
+        let places = places(&pickle).ok_or_else(|| old("its list of contents is no dict of tensors".into()))?;
+        Ok(Self { file: file(), archive, root, places })
     }
-}
 
-impl Rows<'_> {
+    /// The file.
+    pub(crate) fn file(&self) -> &Path {
+        &self.file
+    }
+
+    /// True where the dict has a tensor under `key`.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        self.places.contains_key(key)
+    }
+
+    /// The shape of the tensor under `key`, if there is one.
+    pub(crate) fn shape(&self, key: &str) -> Option<&[usize]> {
+        self.places.get(key).map(|place| place.shape.as_slice())
+    }
+
+    /// All values of a tensor, as one row.
+    ///
+    /// # Errors
+    /// As [`Rows::read`].
+    pub(crate) fn all(&mut self, key: &str) -> Result<Tensor, PtError> {
+        let shape = self.shape(key).unwrap_or_default().to_vec();
+        let place = self.places.get_mut(key).filter(|place| place.strides.len() == shape.len());
+        let Some(place) = place else { return Err(self.missing(key)) };
+        let whole = place.clone();
+        place.shape.insert(0, 1);
+        place.strides.insert(0, 0);
+        let read = self.read(key, 0, 1, &shape);
+        self.places.insert(key.to_owned(), whole);
+        read
+    }
+
     /// Row `at` of the tensor under `key`, which must have this many rows (or one row for all) of this shape.
     ///
     /// # Errors
@@ -66,14 +117,11 @@ impl Rows<'_> {
     pub(crate) fn read(&mut self, key: &str, at: usize, of: usize, row: &[usize]) -> Result<Tensor, PtError> {
         let (start, spread) = self.span(key, of, row)?;
         let place = &self.places[key];
-        let found = self.dict.shape(key).map_or(1, |shape| shape[0]);
-        let at = if found == 1 { 0 } else { at.min(found - 1) };
-        let tensor = self.dict.reader.get(key);
-        let dtype = tensor.map_or(pytorch_reader::DType::U8, pytorch_reader::Tensor::dtype);
-        let size = dtype.size();
+        let at = if place.shape[0] == 1 { 0 } else { at.min(place.shape[0] - 1) };
+        let (dtype, size) = (place.dtype, place.dtype.size());
         let from = start + ((place.offset + at * place.strides[0]) * size) as u64;
         let mut bytes = vec![0; spread * size];
-        let file = files::open(&self.dict.file);
+        let file = files::open(&self.file);
         let read = file.and_then(|mut file| file.seek(SeekFrom::Start(from)).and_then(|_| file.read_exact(&mut bytes)));
         read.map_err(|err| self.bad(key, err.to_string()))?;
         let values: usize = row.iter().product();
@@ -93,15 +141,17 @@ impl Rows<'_> {
 
     /// The place in the file where the storage of a tensor begins, and how many values a row spans in it.
     fn span(&mut self, key: &str, of: usize, row: &[usize]) -> Result<(u64, usize), PtError> {
-        let Some(shape) = self.dict.shape(key) else { return Err(self.dict.missing(key)) };
+        let Some(place) = self.places.get(key) else { return Err(self.missing(key)) };
+        let shape = place.shape.as_slice();
         let rows = shape.first().copied().unwrap_or(0);
         if shape.get(1..) != Some(row) || (rows != of && rows != 1) || rows == 0 {
             let expected = [&[of], row].concat();
-            return Err(self.dict.wrong_shape(key, shape, format!("{expected:?}")));
+            let (file, found) = (self.file.clone(), shape.to_vec());
+            return Err(PtError::WrongShape { file, key: key.into(), found, expected: format!("{expected:?}") });
         }
-        let Some(place) = self.places.get(key).filter(|place| place.strides.len() == shape.len()) else {
+        if place.strides.len() != shape.len() {
             return Err(self.bad(key, "it is stored in a way of its own; save it with .contiguous()".into()));
-        };
+        }
         let reach = |shape: &[usize], strides: &[usize]| {
             let steps = shape.iter().zip(strides).map(|(n, stride)| n.saturating_sub(1).saturating_mul(*stride));
             steps.fold(1usize, usize::saturating_add)
@@ -111,10 +161,10 @@ impl Rows<'_> {
         if values > MOST_VALUES || spread > values.saturating_mul(MOST_SPREAD) {
             return Err(self.bad(key, "a row of it is spread over the file; save it with .contiguous()".into()));
         }
-        let size = self.dict.reader.get(key).map_or(1, |tensor| tensor.dtype().size());
-        let need = place.offset.saturating_add(all).saturating_mul(size) as u64;
+        let need = place.offset.saturating_add(all).saturating_mul(place.dtype.size()) as u64;
         let name = format!("{}data/{}", self.root, place.storage);
-        let bad = |reason: String| self.dict.bad(key, reason);
+        let file = self.file.clone();
+        let bad = |reason: String| PtError::BadStorage { file: file.clone(), key: key.into(), reason };
         let entry = self.archive.by_name(&name).map_err(|err| bad(clip(&err.to_string())))?;
         if entry.compression() != CompressionMethod::Stored {
             return Err(bad("it is compressed; save the file with torch.save, which does not".into()));
@@ -127,7 +177,12 @@ impl Rows<'_> {
     }
 
     fn bad(&self, key: &str, reason: String) -> PtError {
-        self.dict.bad(key, reason)
+        PtError::BadStorage { file: self.file.clone(), key: key.into(), reason }
+    }
+
+    fn missing(&self, key: &str) -> PtError {
+        let found: Vec<&str> = self.places.keys().map(String::as_str).collect();
+        PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&found.join(", ")) }
     }
 }
 
@@ -156,6 +211,8 @@ enum Value {
     Int(usize),
     Tuple(Rc<[Value]>),
     Dict(Rc<[(Value, Value)]>),
+    /// A class or function, by its name.
+    Name(Rc<str>),
     Tensor(Rc<Place>),
     /// Whatever else; its parts do not matter.
     Other,
@@ -163,7 +220,7 @@ enum Value {
 }
 
 /// Places of the tensors of a dict by key; `None` where the pickle is none that `torch.save` writes. Its cost was checked.
-fn places(pickle: &[u8]) -> Option<HashMap<String, Place>> {
+fn places(pickle: &[u8]) -> Option<BTreeMap<String, Place>> {
     let mut machine = Machine { rest: pickle, stack: Vec::new(), memo: HashMap::new() };
     while machine.step()? {}
     let Some(Value::Dict(items)) = machine.stack.pop() else { return None };
@@ -191,9 +248,10 @@ impl Machine<'_> {
         Some(self.take(bytes)?.iter().rev().fold(0, |value, byte| value << 8 | usize::from(*byte)))
     }
 
-    fn line(&mut self) -> Option<()> {
+    fn line(&mut self) -> Option<Value> {
         let end = self.rest.iter().position(|byte| *byte == b'\n')?;
-        self.take(end + 1).map(drop)
+        let line = self.take(end + 1)?;
+        Some(Value::Name(String::from_utf8_lossy(&line[..end]).into()))
     }
 
     fn text(&mut self, length_bytes: usize) -> Option<Value> {
@@ -246,8 +304,14 @@ impl Machine<'_> {
             b'G' => self.take(8).map(|_| Value::Other)?,
             b'X' => self.text(4)?,
             0x8c => self.text(1)?,
-            b'c' => self.line().and_then(|()| self.line()).map(|()| Value::Other)?,
-            0x93 => self.tuple(2).map(|_| Value::Other)?,
+            b'c' => self.line().and_then(|_| self.line())?,
+            0x93 => match self.tuple(2)? {
+                Value::Tuple(of) => match &of[1] {
+                    Value::Text(name) => Value::Name(name.clone()),
+                    _ => return None,
+                },
+                _ => return None,
+            },
             b't' => Value::Tuple(self.marked()?.into()),
             0x85 => self.tuple(1)?,
             0x86 => self.tuple(2)?,
@@ -294,19 +358,34 @@ impl Machine<'_> {
 /// The place that the arguments of `torch._utils._rebuild_tensor_v2` name: storage, offset, shape, strides.
 fn place(arguments: &Value) -> Option<Place> {
     let Value::Tuple(arguments) = arguments else { return None };
-    let [Value::Tuple(storage), Value::Int(offset), Value::Tuple(_), Value::Tuple(strides), ..] = &arguments[..] else {
+    let [Value::Tuple(storage), Value::Int(offset), Value::Tuple(shape), Value::Tuple(strides), ..] = &arguments[..]
+    else {
         return None;
     };
-    let [_, _, Value::Text(key), ..] = &storage[..] else { return None };
+    let [_, Value::Name(class), Value::Text(key), ..] = &storage[..] else { return None };
+    let dtype = match &**class {
+        "FloatStorage" => DType::F32,
+        "DoubleStorage" => DType::F64,
+        "HalfStorage" => DType::F16,
+        "BFloat16Storage" => DType::BF16,
+        "ByteStorage" => DType::U8,
+        "BoolStorage" => DType::Bool,
+        "CharStorage" => DType::I8,
+        "ShortStorage" => DType::I16,
+        "IntStorage" => DType::I32,
+        "LongStorage" => DType::I64,
+        _ => return None,
+    };
     let number = |value: &Value| if let Value::Int(number) = value { Some(*number) } else { None };
-    let strides = strides.iter().map(number).collect::<Option<_>>()?;
-    Some(Place { storage: key.to_string(), offset: *offset, strides })
+    let numbers = |values: &[Value]| values.iter().map(number).collect::<Option<Vec<usize>>>();
+    let (shape, strides) = (numbers(shape)?, numbers(strides)?);
+    Some(Place { storage: key.to_string(), dtype, offset: *offset, shape, strides })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::pt::{Values, read_dict, write_dict};
+    use crate::io::pt::{Values, write_dict};
 
     #[test]
     fn a_row_is_read_from_its_own_bytes() {
@@ -319,8 +398,8 @@ mod tests {
             ("plain", Tensor::f64(&[5], vec![0.5; 5]).into()),
         ];
         write_dict(&path, &items).unwrap();
-        let dict = read_dict(&path).unwrap();
-        let mut rows = dict.rows().unwrap();
+        let mut rows = Rows::open(&path).unwrap();
+        assert_eq!(rows.all("one").unwrap(), Tensor::u8(&[1, 2], vec![7, 8]));
         for at in 0..5 {
             let row = rows.read("a", at, 5, &[2, 3]).unwrap();
             assert_eq!(row, Tensor::f32(&[2, 3], values[6 * at..][..6].to_vec()));
@@ -341,7 +420,7 @@ mod tests {
         let mut longer = bytes;
         longer[at + 1] = 200;
         drop(std::fs::write(&path, longer));
-        assert!(read_dict(&path).and_then(|dict| dict.rows()?.check("a", 200, &[2, 3])).is_err());
+        assert!(Rows::open(&path).and_then(|mut rows| rows.check("a", 200, &[2, 3])).is_err());
     }
 
     #[test]
@@ -349,7 +428,7 @@ mod tests {
         assert!(contiguous(&[2, 1, 3], &[3, 99, 1]) && !contiguous(&[3, 2], &[1, 3]));
         assert_eq!(gathered(&[0, 1, 2, 3, 4, 5], 1, &[3, 2], &[1, 3]), [0, 3, 1, 4, 2, 5]);
         assert_eq!(gathered(&[0, 1, 2, 3], 2, &[2], &[1]), [0, 1, 2, 3]);
-        assert_eq!(places(b"\x80\x02}."), Some(HashMap::new()));
+        assert_eq!(places(b"\x80\x02}."), Some(BTreeMap::new()));
         for bytes in [&b""[..], b"N.", b"}h\x07.", b"t.", b"}(X\xff\xff\xff\xff"] {
             assert_eq!(places(bytes), None, "{bytes:?}");
         }

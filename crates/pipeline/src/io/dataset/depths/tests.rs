@@ -1,6 +1,6 @@
 use super::*;
 use crate::io::dataset::Dataset;
-use crate::io::pt::{PtItem, Tensor, write_dict};
+use crate::io::pt::{PtItem, Tensor, read_dict, write_dict};
 use crate::io::simulated::{Depths as Written, write_depths};
 use crate::job::JobCx;
 use crate::labels::PairLabels;
