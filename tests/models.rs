@@ -174,7 +174,6 @@ fn bundles_are_found_once_and_broken_ones_reported() {
         "Tiny mask UNet of the tests",
         "Tiny generator from Soft Bubble to GelSlim",
         "Tiny generator from DIGIT to Soft Bubble",
-        "Small features (test)",
         "Rounding of the tests",
     ];
     let each_once = |name: &&str| names.iter().filter(|found| *found == name).count() == 1;

@@ -189,7 +189,7 @@ impl Errand for Learn {
             Learned::Masks(trained, bundle) => {
                 let scores = match (trained.before, trained.after) {
                     (Some(before), Some(after)) => {
-                        format!(", IoU {:.3} → {:.3} on other pairs", before.iou, after.iou)
+                        format!(", IoU {:.3} (was {:.3}) on other pairs", after.iou, before.iou)
                     }
                     _ => String::new(),
                 };

@@ -104,5 +104,5 @@ fn every_verb_says_how_it_is_held_against_the_studio() {
             }
         }
     }
-    assert!(by_tests >= 17 && left_out >= 5, "{by_tests} by tests, {left_out} by reasons");
+    assert!(by_tests >= 14 && left_out >= 3, "{by_tests} by tests, {left_out} by reasons");
 }

@@ -386,7 +386,7 @@ fn a_polygon_counts_once_it_is_closed() {
     assert_eq!(bench.state.document.review("tool_a/data_0"), Review::Todo);
     assert!(bench.state.log.entries.iter().any(|e| e.text.contains("nothing was marked")));
     bench.send(LibraryCommand::Step(1));
-    assert_eq!(last_said(&bench), "The open polygon was given up");
+    assert_eq!(last_said(&bench), "The open polygon was dropped");
     bench.send(LibraryCommand::Step(-1));
     bench.settle();
     assert_eq!(mask(&bench, lab::RIGHT), before);

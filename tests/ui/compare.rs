@@ -189,5 +189,5 @@ fn in_3d_both_clouds_or_their_distance_and_the_choice_is_kept_per_workspace() {
     assert!(Action::SwapCompared.command(state(&rig)).is_some());
     // What is not there says so.
     set(&mut rig, "stored", "prediction:bundle=gone", VersusMode::Side);
-    assert!(rig.harness.query_all_by_label_contains("not there any more").next().is_some());
+    assert!(rig.harness.query_all_by_label_contains("is gone; choose another").next().is_some());
 }

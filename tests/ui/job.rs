@@ -98,7 +98,7 @@ fn browse_generate_shift_paint_undo() {
 
     // Another depth scale, by its button.
     let exact = results::imprint(state, ImprintSource::Predicted, lab::RIGHT).ready().unwrap().clone();
-    rig.click("Depth scale");
+    rig.click("Choice of depth scale");
     rig.click("As in the paper (paper shift)");
     let state = rig.harness.state().state();
     assert_eq!(state.settings.shift, ShiftMode::PaperShift);

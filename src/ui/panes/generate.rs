@@ -261,7 +261,7 @@ fn mapping(cx: &mut Cx<'_>, ui: &mut Ui) {
             }
         });
         let tip = format!("How the model's output becomes millimeters. {}", shift_tooltip(current));
-        response.response.accessible_name("Depth scale").on_hover_text(tip);
+        response.response.accessible_name("Choice of depth scale").on_hover_text(tip);
     });
 }
 

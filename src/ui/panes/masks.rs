@@ -265,11 +265,11 @@ fn effect(cx: &Cx<'_>, ui: &mut Ui) {
         (Lookup::Ready(pose), Some(before)) => {
             let (from, to) = (before.angle_rad, pose.angle_rad);
             let change = units::wrap_angle(to - from).to_degrees();
-            let mut text = format!("Angle {} → {} ({change:+.1}°)", deg(from), deg(to));
+            let mut text = format!("Angle {} (was {}, {change:+.1}°)", deg(to), deg(from));
             let mut color = cx.p.text;
             if let (Some(from), Some(to)) = (before.error_rad, pose.error_rad) {
                 let [before, now] = [from, to].map(deg);
-                text += &format!(", error {before} → {now}");
+                text += &format!(", error {now} (was {before})");
                 color = match before == now {
                     true => cx.p.text,
                     false if to < from => cx.p.good,

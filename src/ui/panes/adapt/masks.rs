@@ -133,12 +133,12 @@ pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui, trained: &Trained) {
     for (worth, when) in trained.poses.iter().flatten().zip(["before", "after"]) {
         say(format!("{when}: {} on {}", worth.text(), counted(worth.grasps, "grasp")), cx.p.text);
     }
-    let change = |before: f64, after: f64| format!("{before:.3} → {after:.3}");
+    let change = |before: f64, after: f64| format!("{before:.3} to {after:.3}");
     let mut select = None;
     egui::Grid::new("held out").num_columns(3).spacing(vec2(12.0, 3.0)).striped(true).show(ui, |ui| {
         for (heading, tip) in [
-            ("IoU", "Intersection over union, before → after training"),
-            ("Dice", "Dice coefficient, before → after training"),
+            ("IoU", "Intersection over union, before and after training"),
+            ("Dice", "Dice coefficient, before and after training"),
             ("pair, worst first", "A click shows the pair"),
         ] {
             ui.label(caption(heading, cx.p)).on_hover_text(tip);

@@ -3,6 +3,7 @@
 use eframe::egui::{self, DragValue, RichText, vec2};
 use strum::IntoEnumIterator as _;
 
+use crate::app::action::Action;
 use crate::app::command::ExportCommand;
 use crate::app::export::Output;
 use crate::app::results;
@@ -94,7 +95,7 @@ fn plan(cx: &Cx<'_>, ui: &mut egui::Ui) -> bool {
                 ui.add(egui::Label::new(RichText::new(line).size(12.0).color(cx.p.text)).wrap());
             }
             if plan.total() == 0 {
-                let what = "Nothing to write yet: edit a mask and mark its pair done (Ctrl+Enter).";
+                let what = Action::DoneAndNext.behind("Nothing to write yet: edit a mask and mark its pair done");
                 ui.label(RichText::new(what).size(12.0).color(cx.p.caution));
             }
             plan.total() > 0
