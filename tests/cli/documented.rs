@@ -33,7 +33,7 @@ static TABLE: &[(&str, How)] = &[
     ("touch2touch", How::Parse),
     ("touch2touch --version", How::Run(&[], "", &[0])),
     ("touch2touch simulate", How::Run(&[("all", "pattern_36,pattern_31_rod"), ("46", "1"), ("10", "1")], "", &[0])),
-    ("touch2touch simulate --faults", How::Run(&[], "", &[0])),
+    ("touch2touch simulate --faults --out faults", How::Run(&[], "", &[0])),
     ("touch2touch generate", How::Run(&[], "--limit 1 --steps 1", &[0])),
     ("touch2touch watch", How::Run(&[], "--once --steps 1", &[0])),
     ("touch2touch compare", How::Run(&[("seed=7,steps=50", "steps=2")], "--steps 1", &[0])),

@@ -47,7 +47,7 @@ fn nothing_in_the_mask_pane_moves_under_the_pointer() {
     rig.send(LabelsCommand::BeginStroke { finger, source, at_px: [60.0, 40.0], erase: false });
     rig.send(LabelsCommand::StrokeTo([100.0, 60.0]));
     rig.send(LabelsCommand::EndStroke);
-    assert!(rig.harness.query_all_by_label_contains("angle ").next().is_some(), "the effect of the stroke is said");
+    assert!(rig.harness.query_all_by_label_contains("Angle ").next().is_some(), "the effect of the stroke is said");
     assert_eq!(place(&rig), before, "after a stroke");
     for source in [MaskSource::Threshold, MaskSource::TopPercent, MaskSource::Cad] {
         rig.send(prefer(move |s| s.mask.choice.source = source));
