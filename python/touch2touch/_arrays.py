@@ -2,27 +2,14 @@
 
 import csv
 import json
-import struct
-import zlib
 from pathlib import Path
 
 import numpy as np
 
-from ._native import Refused, open as open_data
+from ._native import Refused, open as open_data, png
 
 # The lab's sensors: (height, width) of the GelSlim and the Soft Bubble.
 _LAB = (320, 427), (140, 175)
-
-
-def _png(file, picture):
-    """An 8-bit color PNG."""
-    height, width, _ = picture.shape
-    rows = np.concatenate([np.zeros((height, 1), np.uint8), picture.reshape(height, -1)], axis=1)
-    data = b"\x89PNG\r\n\x1a\n"
-    header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
-    for kind, body in ((b"IHDR", header), (b"IDAT", zlib.compress(rows.tobytes(), 6)), (b"IEND", b"")):
-        data += struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
-    file.write_bytes(data)
 
 
 def _pictures(name, values):
@@ -95,16 +82,16 @@ def from_arrays(color, reference, depth=None, *, out, names=None, tool=None, fin
         (out / "rig.json").write_text(json.dumps(rig, indent=2) + "\n")
     common = reference.size == color[0].size
     if common:
-        _png(out / "reference.png", reference.reshape(color.shape[1:]))
+        (out / "reference.png").write_bytes(png(reference.reshape(color.shape[1:])))
     if any(tools):
         with (out / "tools.csv").open("w", newline="") as file:
             write = csv.writer(file)
             write.writerow(["pair", "tool", *(["finger"] if any(fingers) else [])])
             write.writerows([name, tool, *([finger or ""] if any(fingers) else [])] for name, tool, finger in zip(names, tools, fingers) if tool)
     for at, name in enumerate(names):
-        _png(out / f"{name}_touch.png", color[at])
+        (out / f"{name}_touch.png").write_bytes(png(color[at]))
         if not common:
-            _png(out / f"{name}_reference.png", reference[at])
+            (out / f"{name}_reference.png").write_bytes(png(reference[at]))
         if depth is not None:
             np.save(out / f"{name}_{keys['depth']}.npy", depth[at])
     return open_data(out)

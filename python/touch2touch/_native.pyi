@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "Cancelled", "Dataset", "Estimate", "Pair", "Pose", "Recipe", "Refused", "Scores", "Tool", "__version__", "adapt",
-    "bundles", "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "label", "main", "open", "psnr", "register",
+    "bundles", "estimate", "estimate_many", "evaluate", "export_masks", "frechet", "label", "main", "open", "png", "psnr", "register",
     "register_many", "simulate", "ssim",
 ]
 __version__: str
@@ -229,4 +229,5 @@ def adapt(
     progress: _Progress = None,
 ) -> dict[str, Any]: ...
 def bundles() -> list[dict[str, Any]]: ...
+def png(picture: NDArray[np.uint8]) -> bytes: ...
 def main(arguments: Sequence[str], again: Sequence[str]) -> int: ...

@@ -175,21 +175,23 @@ def _view(pair, imprint, points, pose):
     return _VIEW.replace("SCENE", scene)
 
 
-def _shown(title, page, images):
+def _shown(title, page, caption, pngs):
     parts = [f"<div>{title}</div>"] + ([_frame(page, 365)] if page else [])
+    tags = (f'<img style="margin-right:4px" src="data:image/png;base64,{base64.b64encode(png).decode()}">' for png in pngs)
+    images = f"<div>{caption} imprint</div>" + "".join(tags)
     if sum(map(len, parts)) + len(images) < _MOST:
         parts.append(images)
     return "".join(parts)
 
 
-def pair_html(pair, images):
-    return _shown(html.escape(repr(pair)), _view(pair, pair.imprint, None, None), images)
+def pair_html(pair, pngs):
+    return _shown(html.escape(repr(pair)), _view(pair, pair.imprint, None, None), "Measured", pngs)
 
 
-def estimate_html(result, images):
+def estimate_html(result, source, pngs):
     pair, pose = result.pair, result.pose
     title = pose._repr_html_() if pose else html.escape(repr(result))
-    return _shown(title, _view(pair, result.imprint, result.points, pose.matrix if pose else None), images)
+    return _shown(title, _view(pair, result.imprint, result.points, pose.matrix if pose else None), source, pngs)
 
 
 def scores_html(scores):

@@ -466,7 +466,7 @@ impl Pair {
 
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let depth = slf.get().sample.pads.entries().filter_map(|(_, touch)| touch.depth());
-        let images = picture::html("Measured imprint", depth.map(|touch| &touch.imprint))?;
+        let images = picture::imprints(slf.py(), depth.map(|touch| &touch.imprint))?;
         slf.py().import("touch2touch._scene")?.call_method1("pair_html", (slf, images))
     }
 

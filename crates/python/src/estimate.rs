@@ -206,8 +206,9 @@ impl Estimate {
     fn _repr_html_<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
         let results = &slf.get().results;
         let imprints = results.imprints.entries().map(|(_, imprint)| imprint);
-        let images = picture::html(&format!("{} imprint", results.recipe().imprint.name()), imprints)?;
-        slf.py().import("touch2touch._scene")?.call_method1("estimate_html", (slf, images))
+        let images = picture::imprints(slf.py(), imprints)?;
+        let source = results.recipe().imprint.name();
+        slf.py().import("touch2touch._scene")?.call_method1("estimate_html", (slf, source, images))
     }
 
     fn __repr__(&self) -> String {

@@ -29,6 +29,8 @@ mod _native {
     #[pymodule_export]
     use crate::measures::{frechet, psnr, ssim};
     #[pymodule_export]
+    use crate::picture::png;
+    #[pymodule_export]
     use crate::process::{Cancelled, Refused};
     #[pymodule_export]
     use crate::program::main;

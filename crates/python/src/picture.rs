@@ -1,8 +1,10 @@
-//! Pictures of imprints as a notebook shows them.
+//! Pictures as PNG.
 
-use pyo3::PyResult;
+use numpy::{PyReadonlyArray3, PyUntypedArrayMethods as _};
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
 use touch2touch_core::colormap::{ColorMap, Range};
-use touch2touch_core::grid::DepthMap;
+use touch2touch_core::grid::{DepthMap, Grid};
 use touch2touch_core::picture::colored;
 use touch2touch_pipeline::io::images::png_bytes;
 
@@ -11,27 +13,27 @@ use crate::process::refused;
 /// The color range of imprints, meters.
 const RANGE: Range = Range { lo: 0.0, hi: 0.018 };
 
-/// Imprints side by side below a caption, as HTML with the pictures in it.
-pub(crate) fn html<'a>(caption: &str, imprints: impl Iterator<Item = &'a DepthMap>) -> PyResult<String> {
-    let mut out = format!("<div>{caption}</div>");
-    for imprint in imprints {
-        let png = png_bytes(&colored(imprint, ColorMap::Viridis, RANGE)).map_err(|err| refused(err.to_string()))?;
-        out += &format!("<img style=\"margin-right:4px\" src=\"data:image/png;base64,{}\">", base64(&png));
-    }
-    Ok(out)
+/// A color picture, (height, width, 3) bytes, as the bytes of a PNG file.
+#[pyfunction]
+pub(crate) fn png<'py>(py: Python<'py>, picture: PyReadonlyArray3<'py, u8>) -> PyResult<Bound<'py, PyBytes>> {
+    let &[height, width, 3] = picture.shape() else {
+        return Err(refused(format!("a picture must be (height, width, 3), not {:?}", picture.shape())));
+    };
+    let pixels = picture.as_array().iter().copied().collect::<Vec<u8>>();
+    let pixels = pixels.as_chunks::<3>().0.to_vec();
+    let picture = Grid::from_vec(width, height, pixels).map_err(|err| refused(err.to_string()))?;
+    encoded(py, &picture)
 }
 
-/// Bytes as text of 64 letters (RFC 4648).
-fn base64(bytes: &[u8]) -> String {
-    const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let mut out = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for group in bytes.chunks(3) {
-        let byte = |i: usize| u32::from(group.get(i).copied().unwrap_or(0));
-        let bits = byte(0) << 16 | byte(1) << 8 | byte(2);
-        for i in 0..4 {
-            let letter = char::from(LETTERS[(bits >> (18 - 6 * i) & 63) as usize]);
-            out.push(if i <= group.len() { letter } else { '=' });
-        }
-    }
-    out
+/// Imprints as PNG files, in the colors of the studio.
+pub(crate) fn imprints<'a, 'py>(
+    py: Python<'py>,
+    imprints: impl Iterator<Item = &'a DepthMap>,
+) -> PyResult<Vec<Bound<'py, PyBytes>>> {
+    imprints.map(|imprint| encoded(py, &colored(imprint, ColorMap::Viridis, RANGE))).collect()
+}
+
+fn encoded<'py>(py: Python<'py>, picture: &Grid<[u8; 3]>) -> PyResult<Bound<'py, PyBytes>> {
+    let png = png_bytes(picture).map_err(|err| refused(err.to_string()))?;
+    Ok(PyBytes::new(py, &png))
 }
