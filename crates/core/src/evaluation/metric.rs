@@ -271,7 +271,7 @@ mod tests {
         let passes = |word: &str, value: f64| Condition::parse(word).unwrap().passes(value);
         assert!(passes("angle>5", 0.1) && !passes("angle>5", 0.05) && passes("angle>5", f64::NAN));
         assert!(passes("psnr<20", 19.9) && !passes("psnr<20", 20.0) && passes("psnr<=20", 20.0));
-        assert!(passes("spread>0.5", 0.000_6) && passes("unsure<100%", 0.5) && !passes("angle<5", f64::NAN));
+        assert!(passes("disagreement>50", 0.6) && passes("unsure<100%", 0.5) && !passes("angle<5", f64::NAN));
         let [good, check, wrong] = Grade::iter().map(|grade| f64::from(grade as u8)).collect::<Vec<_>>()[..] else {
             panic!("three grades")
         };
