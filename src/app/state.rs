@@ -58,7 +58,7 @@ pub struct State {
     pub export: ExportState,
     /// The panel about the open data set.
     pub doctor: DoctorState,
-    /// What is fitted and trained.
+    /// Networks that are fitted and trained.
     pub learn: LearnState,
     /// The workbench: what the 3D panes do and show besides.
     pub workbench: Workbench,

@@ -9,7 +9,7 @@ use super::grid::Grid;
 /// one effect does not change the others.
 #[derive(Clone, Copy, Debug)]
 pub enum Stream {
-    /// How a tool is held.
+    /// The pose of a tool in the hand.
     Grasp = 1,
     /// Drawn tools.
     Tool = 2,
@@ -19,17 +19,17 @@ pub enum Stream {
     Rig = 4,
     /// Noise of the depth camera.
     Depth = 5,
-    /// Its texture.
+    /// Texture of an imprint.
     DepthTexture = 6,
     /// Traits of a gel.
     Gel = 7,
     /// Noise of its camera.
     GelNoise = 8,
-    /// Its picture without touch.
+    /// Picture of a gel without touch.
     GelReference = 9,
     /// Corrupted masks.
     Mask = 10,
-    /// What is wrong with a pair.
+    /// Faults of a pair.
     Condition = 11,
 }
 

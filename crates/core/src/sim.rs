@@ -73,7 +73,7 @@ pub(crate) fn simulate_apart(
 /// Depth that a tool is pressed into a gel in [`gelslim_depth`], meters.
 pub const GEL_PRESS_M: f64 = 0.001;
 
-/// How far a tool held at `grasp` comes into a finger's gel, meters, pixel by pixel of the GelSlim's own depth
+/// Depth that a tool held at `grasp` comes into a finger's gel, meters, pixel by pixel of the GelSlim's own depth
 /// ([`lab::GELSLIM_DEPTH`]): from its shape alone, as the lab made the depths of its data set. It is pressed in by
 /// [`GEL_PRESS_M`].
 pub fn gelslim_depth(tool: &ToolSpec, grasp: Grasp, finger: PadId) -> DepthMap {

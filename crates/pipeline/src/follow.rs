@@ -134,7 +134,7 @@ pub struct Following {
     /// Problems that kept the last look at the folder from finding all touches: it cannot be read, it holds none any more,
     /// or some are left out.
     troubles: Vec<Problem>,
-    /// Those of them that were said.
+    /// Problems that were said.
     said: Vec<Problem>,
     unsaid: VecDeque<FollowEvent>,
 }

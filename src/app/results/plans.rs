@@ -1,4 +1,4 @@
-//! What is said of the whole data set: plans of exports, imports and trainings of masks, and the doctor's lines.
+//! Results about the whole data set: plans of exports, imports and trainings of masks, and the doctor's lines.
 
 use super::super::jobs::{Job, Lane};
 use super::super::keys::{AboutKey, ImportPlanKey, MaskPlanKey, Revision, TrainPlanKey};

@@ -1,4 +1,4 @@
-//! What is looked at of a registration: recorded runs, their steps and layers, distances to the model, other tools.
+//! Results about a registration: recorded runs, their steps and layers, distances to the model, other tools.
 
 use std::sync::Arc;
 

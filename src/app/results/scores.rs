@@ -1,4 +1,4 @@
-//! What an evaluation of the open data set would score.
+//! Setups of an evaluation of the open data set.
 
 use super::super::keys::ImprintSource;
 use super::super::recipe;

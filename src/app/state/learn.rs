@@ -133,7 +133,7 @@ impl LearnForm {
     }
 }
 
-/// What is fitted and trained, and how it is asked for.
+/// Networks that are fitted and trained, with the form that asks for it.
 #[derive(Clone, Debug, Default)]
 pub struct LearnState {
     /// The choices.

@@ -31,7 +31,7 @@ pub struct Prediction {
     pub kept: bool,
 }
 
-/// What made predictions, in words.
+/// Model, settings and depth scale of a prediction, in words.
 pub fn predicted_by(bundle: &str, config: &GenerateConfig, shift: ShiftMode) -> String {
     format!("{bundle} · {} · {}", config.text(), shift.label().to_lowercase())
 }

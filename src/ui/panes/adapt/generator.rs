@@ -20,7 +20,7 @@ const GAP: f32 = 6.0;
 /// Height of a caption over a picture, points.
 const CAPTION: f32 = 16.0;
 
-/// What the last fit is worth, and a touch before and after.
+/// Scores of the last fit, and a touch before and after.
 pub(super) fn worth(cx: &mut Cx<'_>, ui: &mut Ui) {
     let Some(adapted) = cx.state.learn.adapted.clone() else { return };
     refusal(cx, ui, &adapted);

@@ -18,7 +18,7 @@ use touch2touch_pipeline::steps::bundles::BundleKind;
 /// Masks that are listed, the worst first.
 const LISTED: usize = 200;
 
-/// What is asked for, and what it would learn from.
+/// Form of a training, and the masks that it would learn from.
 pub(super) fn choices(cx: &mut Cx<'_>, ui: &mut Ui) {
     form(cx, ui);
     plan(cx, ui);

@@ -1,4 +1,4 @@
-//! What a folder holds that is no data set of ours, by name: [`kind`].
+//! Names of what a folder holds that is no data set of ours: [`kind`].
 
 use std::path::Path;
 

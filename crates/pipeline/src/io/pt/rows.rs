@@ -15,11 +15,9 @@ use zip::read::{ArchiveOffset, Config};
 use zip::{CompressionMethod, ZipArchive};
 
 use super::budget::{self, MAX_PICKLE};
-use super::{PtError, Tensor, decode};
+use super::{MAX_VALUES, PtError, Tensor, decode};
 use crate::io::files::{self, clip};
 
-/// Most values of a row: more than the pictures of a touch have.
-const MOST_VALUES: usize = 1 << 24;
 /// A row may be spread over so many times its values: channels that lie last are none, a row that lies last is.
 const MOST_SPREAD: usize = 4;
 
@@ -158,7 +156,7 @@ impl Rows {
         };
         let (spread, all) = (reach(row, &place.strides[1..]), reach(shape, &place.strides));
         let values = row.iter().fold(1usize, |product, n| product.saturating_mul(*n));
-        if values > MOST_VALUES || spread > values.saturating_mul(MOST_SPREAD) {
+        if values > MAX_VALUES || spread > values.saturating_mul(MOST_SPREAD) {
             return Err(self.bad(key, "a row of it is spread over the file; save it with .contiguous()".into()));
         }
         let need = place.offset.saturating_add(all).saturating_mul(place.dtype.size()) as u64;
@@ -204,7 +202,7 @@ fn gathered(bytes: &[u8], size: usize, shape: &[usize], strides: &[usize]) -> Ve
     places.iter().flat_map(|place| &bytes[place * size..][..size]).copied().collect()
 }
 
-/// What a pickle of a dict of tensors is made of.
+/// Part of a pickle of a dict of tensors.
 #[derive(Clone, Debug)]
 enum Value {
     Text(Rc<str>),
@@ -260,7 +258,7 @@ impl Machine<'_> {
         Some(Value::Text(text))
     }
 
-    /// What was pushed since the last mark.
+    /// Values pushed since the last mark.
     fn marked(&mut self) -> Option<Vec<Value>> {
         let at = self.stack.iter().rposition(|value| matches!(value, Value::Mark))?;
         let items = self.stack.split_off(at + 1);

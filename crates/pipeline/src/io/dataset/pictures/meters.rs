@@ -23,7 +23,7 @@ pub(super) fn has_any(path: &Path) -> bool {
 const EXPECTED: &str =
     "height x width floats, how far the membrane is pushed in, in meters, as the camera's picture lies";
 
-/// What a file of depths holds.
+/// Content of a file of depths.
 pub(super) enum Depth {
     /// Meters, raw orientation.
     Meters(DepthMap),
