@@ -87,7 +87,6 @@ fn how(action: Action) -> How {
         A::UseTrained => Options(&["label", "demo", "--pair", "a", "--adopt", "--mask-bundle", "trained"]),
         A::EvaluateDataset => Verb(&["evaluate", "demo"]),
         A::PredictAll => Verb(&["evaluate", "demo"]),
-        A::RankMasks => Verb(&["evaluate", "demo"]),
         A::ExportTable => Verb(&["evaluate", "demo", "--out", "folder", "--csv", "a.csv"]),
         A::NextShift => Options(&["pose", "demo", "--imprint", "predicted", "--shift", "raw"]),
         A::Refit => Verb(&["stats", "demo", "--out", "statistics.json"]),

@@ -187,8 +187,8 @@ fn can_use(state: &State, network: Network) -> Option<Command> {
     when(learn::made(state, network).is_some() && !learn::in_use(state, network), LearnCommand::Use(network))
 }
 
-/// True where the measured imprints of all pairs can be scored now.
-fn can_rank(state: &State) -> bool {
+/// True where every pair can be predicted and scored now.
+fn can_score_all(state: &State) -> bool {
     results::setup_of_all(state).is_some()
         && export::can_draw(state)
         && state.tasks.of_kind(TaskKind::Evaluate).is_none()

@@ -110,9 +110,7 @@ macro_rules! actions {
         EvaluateDataset, Generate, "Evaluate the data set", "Scores the chosen generators on the open data set, as the paper's results table does", [],
             state => when(results::evaluation_setup(state).is_some() && state.tasks.of_kind(TaskKind::Evaluate).is_none(), EvaluateCommand::Start);
         PredictAll, Generate, "Predict all", "Predicts and scores every pair of the open data set with the chosen generators; what was scored before is not computed again", [],
-            state => when(can_rank(state), EvaluateCommand::All);
-        RankMasks, Generate, "Rank by uncertainty", "Sorts the pairs by how unsure the mask model is, most unsure first", [],
-            state => when(can_rank(state), EvaluateCommand::Rank);
+            state => when(can_score_all(state), EvaluateCommand::All);
         ExportTable, Generate, "Export the results table…", "Writes the results table as CSV and JSON", [],
             state => when(state.table.result.is_some(), ViewCommand::Ui(UiRequest::PickTableFolder));
         CancelJobs, Generate, "Cancel", "Closes a dialog, drops a stroke, rejects a suggestion; else stops what is running", [plain(K::Escape)],
@@ -423,7 +421,6 @@ impl Action {
             Self::ExportMasks => "unet training labels png save",
             Self::ImportMasks => "unet labels png load read",
             Self::NextWorst => "bad largest error outlier failure hardest",
-            Self::RankMasks => "queue active learning doubt disagreement unsure probability hardest",
             Self::NextUnfinished => "todo open unlabeled remaining",
             Self::FindPair => "search list find samples",
             Self::Generate => "predict prediction run inference diffusion",

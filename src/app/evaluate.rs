@@ -10,10 +10,8 @@ use super::effect::{Access, Effect, Errand};
 use super::jobs::Lane;
 use super::source::DataSource;
 use super::state::State;
-use super::state::library::Sort;
 use super::state::tasks::{Level, TaskKind};
 use super::{results, tasks};
-use touch2touch_core::evaluation::Metric;
 use touch2touch_pipeline::error::TaskError;
 use touch2touch_pipeline::job::JobCx;
 use touch2touch_pipeline::scores::evaluate::{self, Evaluation, Setup};
@@ -31,8 +29,6 @@ pub enum EvaluateCommand {
     Start,
     /// Predicts and scores every pair of it.
     All,
-    /// Scores the measured imprints of every pair, so that the most uncertain masks are known; runs no generator.
-    Rank,
     /// Writes the table into a folder.
     Export(PathBuf),
 }
@@ -50,7 +46,6 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
         EvaluateCommand::Published(shown) => state.table.published = shown,
         EvaluateCommand::Start => start(state, results::evaluation_setup(state), "Evaluate", effects),
         EvaluateCommand::All => start(state, results::setup_of_all(state), "Predict all of", effects),
-        EvaluateCommand::Rank => rank(state, effects),
         EvaluateCommand::Export(folder) => {
             let Some(evaluation) = state.table.result.clone() else { return };
             let published = state.table.published;
@@ -63,16 +58,6 @@ pub(super) fn step(state: &mut State, command: EvaluateCommand, effects: &mut Ve
             tasks::start(state, what, write, effects);
         }
     }
-}
-
-/// Has the measured imprints of every pair scored, and the list ordered by how unsure the mask model is of them.
-fn rank(state: &mut State, effects: &mut Vec<Effect>) {
-    let setup = results::setup_of_all(state).map(|setup| Setup { bundles: Vec::new(), ..setup });
-    start(state, setup, "Rank the masks of", effects);
-    let measured = Some(evaluate::MEASURED.into());
-    state.table.chosen = ScoreChoice { source: measured, metric: Some(Metric::Unsure), best_first: false };
-    state.library.sort = Sort::Score;
-    state.reorder();
 }
 
 /// Has the open data set scored. One at a time: a second would only take the cores from the first.
@@ -107,10 +92,7 @@ impl Errand for Score {
             let why = format!("the first: {}: {}", first.what, first.why);
             state.log.push(Level::Warning, text, Some(why), None);
         }
-        // A ranking is no results table.
-        if !evaluation.setup.bundles.is_empty() {
-            state.table.result = Some(evaluation.clone());
-        }
+        state.table.result = Some(evaluation.clone());
         if let Some(open) = &state.library.open {
             state.table.take(evaluation, open.source.index());
             state.reorder();

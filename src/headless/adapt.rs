@@ -113,18 +113,16 @@ fn text(report: &Report) -> String {
     let a = &report.adapted;
     let number = |v: Option<f64>, digits: usize| v.map_or("-".to_owned(), |v| format!("{v:.digits$}"));
     let mut text = format!(
-        "{:<28} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
-        "on pairs left out", "PSNR dB", "SSIM", "unscaled", "shape", "inside", "outside", "angle °"
+        "{:<28} {:>8} {:>6} {:>8} {:>8} {:>8}\n",
+        "on pairs left out", "PSNR dB", "SSIM", "unscaled", "shape", "angle °"
     );
     let mut row = |name: &str, s: &Scored| {
         text += &format!(
-            "{name:<28} {:>8} {:>6} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
+            "{name:<28} {:>8} {:>6} {:>8} {:>8} {:>8}\n",
             number(s.psnr_db, 2),
             number(s.ssim, 3),
             number(s.psnr_raw_db, 2),
             number(s.psnr_line_db, 2),
-            number(s.seen.and_then(|p| p.psnr_db), 2),
-            number(s.invented.and_then(|p| p.psnr_db), 2),
             number(s.angle.as_ref().and_then(|a| a.mean_deg), 2)
         );
     };

@@ -155,11 +155,11 @@ pub(super) fn run(args: &CompareArgs) -> VerbResult {
         let (Some(a), Some(b), truth) = (a?, b?, truth?) else { continue };
         let against = |subject: &Subject, of: &Depicted<'_>| -> anyhow::Result<Option<Figures>> {
             match &truth {
-                Some(truth) if *subject != Subject::Measured => Ok(Some((&between(of, truth, &sample, pad)?).into())),
+                Some(truth) if *subject != Subject::Measured => Ok(Some((&between(of, truth, sample.scale)?).into())),
                 _ => Ok(None),
             }
         };
-        let apart = between(&a, &b, &sample, pad)?;
+        let apart = between(&a, &b, sample.scale)?;
         let finger = sample.rig.pad_key(pad);
         if let Some(out) = &args.out {
             write(out, &finger, &apart.error)?;

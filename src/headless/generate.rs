@@ -171,7 +171,7 @@ fn score(
     if let Some(tile) = tile
         && let Some(vqvae) = compare::beside(dataset, id, sample)?
     {
-        let theirs = compare::tiles(&vqvae.tile, &tile, sample, pad)?;
+        let theirs = compare::compare(&vqvae.tile, &tile, sample.scale)?;
         (pair.vqvae_psnr_db, pair.vqvae_ssim) = (theirs.psnr_db, theirs.ssim);
         pair.vqvae = theirs.unstretched.map(Stored);
     }

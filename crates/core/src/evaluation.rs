@@ -20,7 +20,6 @@ use serde::{Deserialize, Serialize};
 
 use super::catalog;
 use super::dataset::{PairEntry, Split};
-use super::label::Doubt;
 use super::metrics::AngleSummary;
 use super::sample::Scale;
 use super::verdict::Grade;
@@ -148,9 +147,6 @@ pub struct GraspScore {
     /// Reliance that the pose deserves, without the truth; `None` without a pose.
     #[serde(default)]
     pub verdict: Option<Grade>,
-    /// Reasons to look at its masks, of the measured imprints.
-    #[serde(default)]
-    pub doubt: Doubt,
 }
 
 fn null_is_nan<'de, D: serde::Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
@@ -332,7 +328,6 @@ mod tests {
             angle_error_rad: Some(angle_deg.to_radians()),
             position_error_m: Some(1e-3),
             verdict: Some(Grade::of_angle_error(angle_deg.to_radians())),
-            doubt: Doubt::default(),
         }
     }
 

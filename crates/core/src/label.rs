@@ -4,7 +4,6 @@
 
 mod agreement;
 mod clean_up;
-mod doubt;
 mod drawing;
 mod grow;
 mod marks;
@@ -23,7 +22,6 @@ use super::grid::Mask;
 
 pub use agreement::{Agreement, agreement, iou};
 pub use clean_up::{CleanKind, CleanUp};
-pub use doubt::{Doubt, unsure_share};
 pub use drawing::{DrawTool, Drawing, Ground};
 pub use grow::grow_from;
 pub use marks::Marks;

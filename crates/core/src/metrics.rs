@@ -7,7 +7,6 @@ mod color;
 mod frechet;
 mod image;
 mod line;
-mod split;
 mod ssim;
 mod unstretched;
 
@@ -16,6 +15,5 @@ pub use color::{LEVELS, color, planes};
 pub use frechet::frechet_distance;
 pub use image::{MetricError, Psnr, mse, psnr, unit_range};
 pub use line::{Line, line};
-pub use split::{PixelMetrics, Split, split};
 pub use ssim::{Ssim, SsimRange, ssim};
 pub use unstretched::{Unstretched, unstretched};

@@ -276,4 +276,19 @@ mod tests {
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, 0.0)), None);
         assert_eq!(crop.project(&k, DVec3::new(0.0, 0.0, f64::NAN)), None);
     }
+
+    #[test]
+    fn the_footprint_is_where_the_paper_draws_it() {
+        let rig = Rig::lab();
+        for finger in rig.pads() {
+            let mask = rig.seen_mask(finger, [lab::BUBBLE.width, lab::BUBBLE.height]).unwrap();
+            let [_, _, w, h] = rig.color_window(finger).unwrap().rectangle();
+            let count = mask.as_slice().iter().filter(|s| **s).count() as f64;
+            assert!((count / (w * h) - 1.0).abs() < 0.05, "{count}");
+            // The same part of an image of another size.
+            let small = rig.seen_mask(finger, [128, 128]).unwrap();
+            let share = small.as_slice().iter().filter(|s| **s).count() as f64 / (128.0 * 128.0);
+            assert!((share - w * h / (175.0 * 140.0)).abs() < 0.01, "{share}");
+        }
+    }
 }

@@ -11,8 +11,8 @@ use crate::io::dataset::{ASSUMED_IMPRINT_RANGE_M, Dataset, LoadError, assumed_me
 use crate::steps::imprint::picture_of;
 use crate::steps::prediction::Prediction;
 use touch2touch_core::dataset::PairId;
-use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::metrics::{self, Split, SsimRange, Unstretched};
+use touch2touch_core::grid::{DepthMap, Grid};
+use touch2touch_core::metrics::{self, SsimRange, Unstretched};
 use touch2touch_core::postprocess::ShiftMode;
 use touch2touch_core::resample::bilinear;
 use touch2touch_core::rig::{PadId, Rig};
@@ -36,8 +36,6 @@ pub struct Comparison {
     pub unstretched: Option<Unstretched>,
     /// Scale that PSNR and SSIM are of: meters, or (assumed scale) images stretched to 0..1 each.
     pub scale: Scale,
-    /// Figures inside and outside the GelSlim's footprint, errors in meters; `None` where nobody asked.
-    pub split: Option<Split>,
 }
 
 /// A prediction against the measurement. With an assumed scale both are stretched to 0..1 first.
@@ -77,35 +75,7 @@ pub fn compare(predicted: &DepthMap, measured: &DepthMap, scale: Scale) -> Resul
         mae_m: if count == 0 { f64::NAN } else { sum / count as f64 },
         unstretched,
         scale,
-        split: None,
     })
-}
-
-/// [`compare`] with the figures apart for what the GelSlim saw (`seen`) and for what the model made up.
-///
-/// # Errors
-/// As [`compare`].
-pub(crate) fn compare_parts(
-    predicted: &DepthMap,
-    measured: &DepthMap,
-    scale: Scale,
-    seen: Option<&Mask>,
-) -> Result<Comparison, TaskError> {
-    let fail = |err: metrics::MetricError| TaskError::from_error("Compare prediction and measurement", &err);
-    let whole = compare(predicted, measured, scale)?;
-    let Some(seen) = seen else { return Ok(whole) };
-    let mut split = metrics::split(predicted, measured, seen, LAB_PEAK_M).map_err(fail)?;
-    if scale == Scale::Assumed {
-        // Lengths stay in the assumed meters; PSNR and SSIM are of the stretched images, as those of the whole are.
-        let (p, m) = (metrics::unit_range(predicted), metrics::unit_range(measured));
-        let unit = metrics::split(&p, &m, seen, 1.0).map_err(fail)?;
-        for (part, unit) in
-            [(&mut split.whole, unit.whole), (&mut split.seen, unit.seen), (&mut split.invented, unit.invented)]
-        {
-            (part.psnr_db, part.ssim) = (unit.psnr_db, unit.ssim);
-        }
-    }
-    Ok(Comparison { split: Some(split), ..whole })
 }
 
 /// The picture that a pair's imprint was made from, in the assumed meters and as the file has it; `None` where imprints
@@ -140,20 +110,8 @@ pub fn beside(dataset: &Dataset, id: PairId, sample: &Sample) -> Result<Option<B
 
 /// An imprint as the picture of its sensor shows it: turned as that lies, and as large (`[width, height]`).
 pub(crate) fn as_tile(imprint: &DepthMap, rig: &Rig, [width, height]: [usize; 2]) -> DepthMap {
-    bilinear(&turned(imprint, rig), width, height)
-}
-
-fn turned<T: Copy>(image: &Grid<T>, rig: &Rig) -> Grid<T> {
-    if rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180) { image.rotated_180() } else { image.clone() }
-}
-
-/// A predicted picture against the picture of the same pad, both as files have them, in the assumed meters.
-///
-/// # Errors
-/// As [`compare`].
-pub fn tiles(predicted: &DepthMap, tile: &DepthMap, sample: &Sample, pad: PadId) -> Result<Comparison, TaskError> {
-    let seen = sample.rig.seen_mask(pad, tile.size()).map(|seen| turned(&seen, &sample.rig));
-    compare_parts(predicted, tile, sample.scale, seen.as_ref())
+    let turned = rig.depth().is_some_and(|sensor| sensor.rotation_deg == 180).then(|| imprint.rotated_180());
+    bilinear(turned.as_ref().unwrap_or(imprint), width, height)
 }
 
 /// An imprint that is compared.
@@ -193,14 +151,10 @@ impl<'a> Depicted<'a> {
 ///
 /// # Errors
 /// As [`compare`].
-pub fn between(a: &Depicted<'_>, b: &Depicted<'_>, sample: &Sample, pad: PadId) -> Result<Comparison, TaskError> {
-    let (Some(a_tile), Some(b_tile)) = (&a.tile, &b.tile) else {
-        let seen = sample.rig.seen_mask(pad, b.imprint.size());
-        return compare_parts(a.imprint, b.imprint, sample.scale, seen.as_ref());
-    };
-    let error = compare(a.imprint, b.imprint, sample.scale)?.error;
-    let figures = tiles(a_tile, b_tile, sample, pad)?;
-    Ok(Comparison { error, ..figures })
+pub fn between(a: &Depicted<'_>, b: &Depicted<'_>, scale: Scale) -> Result<Comparison, TaskError> {
+    let whole = compare(a.imprint, b.imprint, scale)?;
+    let (Some(a_tile), Some(b_tile)) = (&a.tile, &b.tile) else { return Ok(whole) };
+    Ok(Comparison { error: whole.error, ..compare(a_tile, b_tile, scale)? })
 }
 
 /// The predicted imprint of a pad (meters, raw orientation) against what was measured; see [`between`] and
@@ -218,7 +172,7 @@ pub fn of_pad(
     let Some(bubble) = sample.pad(pad).and_then(|touch| touch.depth()) else { return Ok(None) };
     let predicted = Depicted::predicted(imprint, drawn, sample, pad, tile)?;
     let measured = Depicted { imprint: &bubble.imprint, tile: tile.map(Cow::Borrowed) };
-    between(&predicted, &measured, sample, pad).map(Some)
+    between(&predicted, &measured, sample.scale).map(Some)
 }
 
 #[cfg(test)]

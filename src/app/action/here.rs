@@ -23,7 +23,7 @@ impl Action {
                 Self::Generate | Self::GenerateNewSeed | Self::NextPair | Self::PreviousPair | Self::NextWorst
             ),
             Workspace::Align => self.group() == Group::Pose,
-            Workspace::Label => self.group() == Group::Mask || matches!(self, Self::NextUnfinished | Self::RankMasks),
+            Workspace::Label => self.group() == Group::Mask || self == Self::NextUnfinished,
             Workspace::Evaluate => {
                 matches!(self, Self::EvaluateDataset | Self::PredictAll | Self::ExportTable | Self::NextWorst)
             }

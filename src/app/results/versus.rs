@@ -104,7 +104,7 @@ impl Computes for VersusKey {
                 None => None,
             };
             let [a, b] = parts.each_ref().map(|part| part.depicted(&sample, touch.finger, tile.as_ref()));
-            between(&a?, &b?, &sample, touch.finger)
+            between(&a?, &b?, sample.scale)
         }))
     }
 }

@@ -26,10 +26,6 @@ pub enum Metric {
     Ssim,
     /// As [`Metric::Psnr`] against the simulator's imprints without camera noise.
     PsnrNoiseFree,
-    /// One minus the Dice of the mask drawn by hand and the mask model's, of the worse finger, 0..1.
-    Disagreement,
-    /// Share of the pixels whose probability of contact is near one half, of the worse finger, 0..1.
-    Unsure,
 }
 
 /// A row of the table of metrics.
@@ -59,7 +55,6 @@ const PLAIN: Row = Row {
     larger_is_better: true,
     of: |_| None,
 };
-const PERCENT: Row = Row { unit: "%", factor: 100.0, decimals: 1, ..PLAIN };
 const DB: Row = Row { unit: "dB", decimals: 1, ..PLAIN };
 
 /// The table.
@@ -113,26 +108,6 @@ static ROWS: &[Row] = &[
         tip: "Against the simulator's imprint without camera noise, dB",
         of: |grasp| psnr(&[grasp], |image| image.noise_free),
         ..DB
-    },
-    Row {
-        metric: Metric::Disagreement,
-        name: "Hand against model",
-        short: "hand/model",
-        key: "disagreement",
-        tip: "What the mask drawn by hand and the mask model's do not share: 1 - Dice of the worse finger, percent",
-        larger_is_better: false,
-        of: |grasp| grasp.doubt.disagreement,
-        ..PERCENT
-    },
-    Row {
-        metric: Metric::Unsure,
-        name: "Model unsure",
-        short: "unsure",
-        key: "unsure",
-        tip: "Share of the pixels to which the mask model gives a probability of 0.25 to 0.75, worse finger, percent",
-        larger_is_better: false,
-        of: |grasp| grasp.doubt.unsure,
-        ..PERCENT
     },
 ];
 
@@ -249,7 +224,7 @@ impl Condition {
         let metric = Metric::iter().find(|metric| metric.key() == key)?;
         let bound = match (metric, Grade::from_str(number)) {
             (Metric::Verdict, Ok(grade)) => f64::from(grade as u8),
-            _ => number.trim_end_matches(['°', '%']).parse().ok().filter(|b: &f64| !b.is_nan())?,
+            _ => number.trim_end_matches('°').parse().ok().filter(|b: &f64| !b.is_nan())?,
         };
         Some(Self { source: source.to_owned(), metric, bound, passes: [side, or_equal] })
     }
@@ -271,7 +246,7 @@ mod tests {
         let passes = |word: &str, value: f64| Condition::parse(word).unwrap().passes(value);
         assert!(passes("angle>5", 0.1) && !passes("angle>5", 0.05) && passes("angle>5", f64::NAN));
         assert!(passes("psnr<20", 19.9) && !passes("psnr<20", 20.0) && passes("psnr<=20", 20.0));
-        assert!(passes("disagreement>50", 0.6) && passes("unsure<100%", 0.5) && !passes("angle<5", f64::NAN));
+        assert!(passes("ssim<0.5", 0.4) && passes("angle>5°", 0.1) && !passes("angle<5", f64::NAN));
         let [good, check, wrong] = Grade::iter().map(|grade| f64::from(grade as u8)).collect::<Vec<_>>()[..] else {
             panic!("three grades")
         };

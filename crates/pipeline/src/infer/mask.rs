@@ -6,7 +6,6 @@ use super::sandbox::admit;
 use touch2touch_core::contact::{ContactMask, settled_model};
 use touch2touch_core::diffusion::{ModelError, Tensor};
 use touch2touch_core::grid::{DepthMap, Grid, Mask};
-use touch2touch_core::label::unsure_share;
 use touch2touch_core::resample::{bilinear, nearest_mask};
 
 /// Why there is no mask.
@@ -121,6 +120,12 @@ impl MaskModel {
 /// The pixels of an imprint whose probability of contact is at least so much.
 fn at_least(probability: &Grid<f32>, imprint: &DepthMap, least: f32) -> Mask {
     nearest_mask(&probability.map(|&p| p >= least), imprint.width(), imprint.height())
+}
+
+/// Share of the pixels of a map of contact's probability that say neither yes nor no, 0..1; `None` for an empty map.
+fn unsure_share(probability: &Grid<f32>) -> Option<f64> {
+    let unsure = probability.as_slice().iter().filter(|p| (0.25..=0.75).contains(*p)).count();
+    (!probability.is_empty()).then(|| unsure as f64 / probability.len() as f64)
 }
 
 /// The contact mask of an imprint from its map of [`MaskModel::probability`].

@@ -119,7 +119,7 @@ pub fn adapt(dataset: &Dataset, setup: &AdaptSetup, models: &Models, cx: &JobCx)
     }
     let mut tools = Tools::new(dataset);
     let mut scored = |pictures: &[Option<&Grid<f32>>]| -> Result<Option<Scored>, TaskError> {
-        let mut scored = score::scored(&touches, pictures, &dataset.rig)?;
+        let mut scored = score::scored(&touches, pictures)?;
         if let Some(scored) = &mut scored {
             scored.angle = pose::angles(dataset, setup, models, &mut tools, &touches, pictures, cx)?;
         }

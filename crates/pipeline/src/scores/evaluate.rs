@@ -2,7 +2,6 @@
 //! lie by the data, all through one pipeline (imprint, contact mask, pose, classifier). The verb `evaluate` and the
 //! studio's Evaluate pane both call [`evaluate`].
 
-mod doubt;
 mod export;
 mod load;
 mod methods;

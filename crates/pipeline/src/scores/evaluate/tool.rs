@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 
 use rayon::prelude::*;
 
-use super::doubt::doubt;
 use super::load::LoadedPair;
 use super::methods::{Made, Method, Models};
 use super::{Setup, Skipped, ToolWork};
@@ -25,7 +24,7 @@ use touch2touch_core::contact::{ContactMask, MaskBasis};
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::evaluation::{GraspScore, ImageScore, PEAK_M, Scores, squared_error};
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
-use touch2touch_core::label::{Doubt, iou};
+use touch2touch_core::label::iou;
 use touch2touch_core::manual::PoseDifference;
 use touch2touch_core::metrics::{LEVELS, SsimRange, planes, ssim, unit_range};
 use touch2touch_core::pose::ToolModel;
@@ -107,8 +106,6 @@ struct Masked<'a> {
     otherwise: Vec<(String, usize)>,
     /// Intersection over union of each mask with the simulator's true contact.
     iou: PerPad<f64>,
-    /// Doubt of the mask model about the imprints.
-    doubt: Doubt,
 }
 
 /// The grasps of one tool, by method.
@@ -180,13 +177,8 @@ impl<'a> Tool<'a> {
                 }
                 let otherwise = otherwise(&estimate);
                 let iou = if estimate.has(Stage::Mask) { mask_iou(&estimate, &case.sample) } else { PerPad::default() };
-                let doubt = match upper && case.sample.scale == Scale::Measured {
-                    true => guarded(|| doubt(&mut estimate, touch.labels, by_models).map_err(|err| err.why)),
-                    false => Ok(Doubt::default()),
-                };
-                let doubt = doubt.map_err(|why| skip(case, format!("mask model: {why}"))).unwrap_or_default();
                 let estimate = Some(estimate).filter(|estimate| estimate.has(Stage::Mask));
-                kept.push(Masked { case, made, estimate, otherwise, iou, doubt });
+                kept.push(Masked { case, made, estimate, otherwise, iou });
             }
             // Poses on all cores; the models run one by one.
             let angles: Vec<Result<Judged, String>> = kept
@@ -199,7 +191,7 @@ impl<'a> Tool<'a> {
                     guarded(|| self.angle(estimate, self.touch(case, &labels), by_models, cx))
                 })
                 .collect();
-            for (Masked { case, made, otherwise, iou, doubt, .. }, angle) in kept.into_iter().zip(angles) {
+            for (Masked { case, made, otherwise, iou, .. }, angle) in kept.into_iter().zip(angles) {
                 let scored = angle.and_then(|angle| Ok((angle, guarded(|| Ok(images(case, &made, setup, upper)))?)));
                 let (judged, mut images) = match scored {
                     Ok(scored) => scored,
@@ -227,7 +219,6 @@ impl<'a> Tool<'a> {
                     angle_error_rad: judged.angle_error_rad,
                     position_error_m: judged.position_error_m,
                     verdict: judged.verdict,
-                    doubt,
                 };
                 let entry = Entry { score, notes: case.sample.notes.clone(), otherwise };
                 self.pending.entry(at).or_default().push(Pending { entry, images });
