@@ -222,7 +222,7 @@ fn masks_of_predictions_lie_beside_each_other_and_never_for_each_other() {
     let dir = tempfile::tempdir().unwrap();
     let store = MaskStore::in_folder(dir.path().join("masks"));
     let mask = |n: usize| stored(Mask::from_fn(175, 140, |x, y| x * y % (n + 7) == 0));
-    let id = |text: &str| PredictedId::verbatim(text.into());
+    let id = |text: &str| PredictedId::from(text.to_owned());
     store.save_predicted(PAIR, lab::RIGHT, &id("never"), None).unwrap();
     assert!(!dir.path().join("masks").exists(), "nothing is made for nothing");
     store.save_predicted(PAIR, lab::RIGHT, &id("seed 1"), Some(&mask(1))).unwrap();

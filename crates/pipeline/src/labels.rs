@@ -405,23 +405,13 @@ impl PairLabels {
         }
     }
 
-    /// The pose accepted of an imprint; for a prediction, else the one of which earlier versions did not write down which
-    /// prediction it is of.
+    /// The pose accepted of an imprint.
     pub fn accepted(&self, of: &ImprintOf) -> Option<AcceptedPose> {
-        let unknown = || self.accepted.get(&ImprintOf::unknown()).filter(|_| of.source() == ImprintSource::Predicted);
-        self.accepted.get(of).or_else(unknown).copied()
+        self.accepted.get(of).copied()
     }
 
-    /// Accepts a pose of an imprint, or withdraws the one that [`Self::accepted`] finds.
-    pub fn accept(&mut self, of: &ImprintOf, pose: Option<AcceptedPose>) {
-        let place = if pose.is_some() || self.accepted.contains_key(of) { of } else { &ImprintOf::unknown() };
-        if of.source() == place.source() {
-            self.put_accepted(place, pose);
-        }
-    }
-
-    /// Puts an accepted pose in its place, or takes it away; returns what was there.
-    pub fn put_accepted(&mut self, of: &ImprintOf, pose: Option<AcceptedPose>) -> Option<AcceptedPose> {
+    /// Accepts a pose of an imprint, or withdraws it; returns what was there.
+    pub fn accept(&mut self, of: &ImprintOf, pose: Option<AcceptedPose>) -> Option<AcceptedPose> {
         match pose {
             Some(pose) => self.accepted.insert(of.clone(), pose),
             None => self.accepted.remove(of),

@@ -79,7 +79,7 @@ impl Edit {
             Self::Note { pair, note } => *note = doc.set_note(pair, std::mem::take(note)),
             Self::Pose { pair, of, pose } => {
                 let labels = doc.labels.entry(pair.clone()).or_default();
-                *pose = labels.put_accepted(of, pose.take());
+                *pose = labels.accept(of, pose.take());
             }
         }
     }
@@ -349,7 +349,7 @@ mod tests {
         assert!(doc.drawn_mask("b", &MaskPlace::measured(lab::RIGHT)).unwrap().mask[(0, 1)]);
         // A prediction that is not on screen is not touched either.
         let predicted =
-            MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted(PredictedId::verbatim("a prediction".into())) };
+            MaskPlace { pad: lab::RIGHT, of: ImprintOf::Predicted(PredictedId::from("a prediction".to_owned())) };
         let mut edit = Edit::Mask { pair: "a".into(), place: predicted.clone(), mask: None };
         edit.swap(&mut doc);
         history.record(Gesture { name: "stroke".into(), edits: vec![edit] });

@@ -8,7 +8,7 @@
 use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, OnceLock, PoisonError};
+use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, SystemTime};
 
 use serde::{Deserialize, Serialize};
@@ -41,8 +41,6 @@ pub struct Store {
     budget: u64,
     /// Bytes in the folder, as far as known: counted at the first write.
     bytes: Mutex<Option<u64>>,
-    /// The predictions that there were when one was first missed.
-    at_first: OnceLock<Inputs>,
 }
 
 /// Prediction as it was stored.
@@ -74,23 +72,10 @@ pub fn user_folder() -> Option<PathBuf> {
     folders::program_cache().map(|folder| folder.join("predictions"))
 }
 
-/// The names of all stored predictions: they begin with the image they are of.
-#[derive(Clone, Debug, Default)]
-pub struct Inputs(Vec<String>);
-
-impl Inputs {
-    /// Names of the predictions of the image with the digest `input`.
-    pub fn of(&self, input: &str) -> impl Iterator<Item = &str> {
-        let prefix = format!("{}-", short(input));
-        let first = self.0.partition_point(|name| *name < prefix);
-        self.0[first..].iter().map(String::as_str).take_while(move |name| name.starts_with(&prefix))
-    }
-}
-
 impl Store {
     /// A store in `folder` (made when something is first written) of at most `budget` bytes; 0 keeps nothing.
     pub fn new(folder: PathBuf, budget: u64) -> Self {
-        Self { folder, budget, bytes: Mutex::new(None), at_first: OnceLock::new() }
+        Self { folder, budget, bytes: Mutex::new(None) }
     }
 
     /// Folder of the store.
@@ -111,28 +96,7 @@ impl Store {
     /// The prediction of a recipe, now the most recently used.
     pub fn get(&self, recipe: &KeptKey) -> Option<Stored> {
         let is_it = |stored: &Stored| stored.recipe.input == recipe.input && stored.recipe.id() == recipe.id();
-        let by_name = self.read(&self.file(recipe)).filter(is_it);
-        by_name.or_else(|| self.named_by_v1(&recipe.input).iter().filter_map(|file| self.read(file)).find(is_it))
-    }
-
-    /// The files of an input whose names hold the hex digits of an earlier build's key in place of a recipe's id.
-    /// Nobody writes such files any more: one look at the folder is enough.
-    fn named_by_v1(&self, input: &str) -> Vec<PathBuf> {
-        let prefix = short(input).len() + 1;
-        let v1 = self
-            .at_first
-            .get_or_init(|| self.inputs())
-            .of(input)
-            .filter(|name| name[prefix..].starts_with(|c: char| c.is_ascii_hexdigit()));
-        v1.map(|name| self.folder.join(name)).collect()
-    }
-
-    /// Names of all predictions that there are, in one look.
-    pub fn inputs(&self) -> Inputs {
-        let mut names: Vec<String> =
-            self.files().into_iter().map(|found| found.name).filter(|name| name.ends_with(SUFFIX)).collect();
-        names.sort_unstable();
-        Inputs(names)
+        self.read(&self.file(recipe)).filter(is_it)
     }
 
     /// Every prediction of the image with the digest `input`, the most recently used first, at most `limit`.

@@ -114,7 +114,7 @@ pub struct StoredMask {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(bound(deserialize = "T: serde::de::DeserializeOwned"))]
 pub struct ByImprint<T> {
-    /// Value of the measured imprint, and value of a prediction that earlier versions did not name.
+    /// Value of the measured imprint, and value of a prediction by no known generator.
     #[serde(default = "neither")]
     pub accepted: [Option<T>; 2],
     /// Values of predictions, by the prediction.

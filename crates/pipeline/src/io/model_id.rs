@@ -1,11 +1,5 @@
 //! The identity of a model bundle: a digest of what decides its results, so that what was made or drawn under it is found
 //! again when the bundle is written anew with another name, note or folder.
-//!
-//! Builds before this one called a bundle by the digest of its whole manifest. [`current`] turns such a name into the
-//! identity, for every manifest that was seen.
-
-use std::collections::BTreeMap;
-use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use serde_json::Value;
 
@@ -14,21 +8,9 @@ use super::digest::sha256;
 /// Keys of a manifest that decide no result: who made it, how it is called and offered.
 const IDLE: [&str; 4] = ["defaults", "format_version", "name", "provenance"];
 
-/// Identities by the digests of the manifests.
-static SEEN: Mutex<BTreeMap<String, String>> = Mutex::new(BTreeMap::new());
-
-fn seen() -> MutexGuard<'static, BTreeMap<String, String>> {
-    SEEN.lock().unwrap_or_else(PoisonError::into_inner)
-}
-
-/// The identity that a manifest's bytes declare, lower-case hex; it holds the checksums of all files. From now on
-/// [`current`] knows the manifest.
+/// The identity that a manifest's bytes declare, lower-case hex; it holds the checksums of all files.
 pub(crate) fn identity(manifest: &[u8]) -> String {
-    let digest = sha256(manifest);
-    if let Some(known) = seen().get(&digest) {
-        return known.clone();
-    }
-    let Ok(Value::Object(mut keys)) = serde_json::from_slice(manifest) else { return digest };
+    let Ok(Value::Object(mut keys)) = serde_json::from_slice(manifest) else { return sha256(manifest) };
     keys.retain(|key, _| !IDLE.contains(&key.as_str()));
     if let Some(Value::Object(files)) = keys.get_mut("files") {
         files.values_mut().for_each(without_path);
@@ -37,9 +19,7 @@ pub(crate) fn identity(manifest: &[u8]) -> String {
         fit.remove("source");
         fit.get_mut("file").into_iter().for_each(without_path);
     }
-    let identity = sha256(Value::Object(keys).to_string().as_bytes());
-    seen().insert(digest, identity.clone());
-    identity
+    sha256(Value::Object(keys).to_string().as_bytes())
 }
 
 /// A file is known by its checksum, wherever it lies.
@@ -49,11 +29,6 @@ fn without_path(file: &mut Value) {
     if let Some(Value::String(digest)) = file.get_mut("sha256") {
         digest.make_ascii_lowercase();
     }
-}
-
-/// The identity of the bundle that a text names: the text itself, unless it is the digest of a manifest that was seen.
-pub(crate) fn current(id: &str) -> String {
-    seen().get(id).cloned().unwrap_or_else(|| id.to_owned())
 }
 
 #[cfg(test)]
@@ -84,6 +59,7 @@ mod tests {
             keys["fit"]["file"]["path"] = "f.npz".into();
         });
         assert_eq!(identity(&elsewhere), plain);
+        assert_eq!(identity(b"no JSON"), sha256(b"no JSON"));
     }
 
     #[test]
@@ -98,15 +74,5 @@ mod tests {
         for change in changes {
             assert_ne!(identity(&manifest(change)), plain);
         }
-    }
-
-    #[test]
-    fn a_manifest_that_was_seen_is_known_by_its_digest() {
-        let text = manifest(|keys| keys["name"] = "seen".into());
-        let digest = sha256(&text);
-        let identity = identity(&text);
-        assert_eq!((current(&digest), current(&identity)), (identity.clone(), identity));
-        assert_eq!(current("never seen"), "never seen");
-        assert_eq!(super::identity(b"no JSON"), sha256(b"no JSON"));
     }
 }

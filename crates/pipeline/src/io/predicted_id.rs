@@ -5,7 +5,6 @@ use std::sync::Arc;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-use super::model_id::current;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::postprocess::ShiftMode;
 
@@ -39,14 +38,9 @@ impl PredictedId {
         Self(format!("{bundle} {VERSION} {}", Value::Object(named)).into())
     }
 
-    /// Text that is not understood, or stands for something else, as it is.
-    pub fn verbatim(text: String) -> Self {
-        Self(text.into())
-    }
-
     /// A prediction of which nobody wrote down which one it is.
     pub fn unknown() -> Self {
-        Self::verbatim(String::new())
+        Self(Arc::default())
     }
 
     /// The text.
@@ -68,12 +62,8 @@ impl PredictedId {
 }
 
 impl From<String> for PredictedId {
-    /// Identity from the text of a file.
     fn from(text: String) -> Self {
-        match text.split_once(' ').filter(|(_, choices)| choices.starts_with(VERSION)) {
-            Some((bundle, choices)) => Self(format!("{} {choices}", current(bundle)).into()),
-            None => Self::verbatim(text),
-        }
+        Self(text.into())
     }
 }
 

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::model_id::current;
 use super::{atomic, files};
 use touch2touch_core::postprocess::{RefitShift, ShiftFit, ShiftStats};
 
@@ -155,7 +154,7 @@ impl ShiftStatistics {
     /// # Errors
     /// [`StatisticsError::OtherBundle`], naming both.
     pub fn shift_for(&self, name: &str, hash: &str) -> Result<RefitShift, StatisticsError> {
-        if current(&self.provenance.bundle_hash) != hash {
+        if self.provenance.bundle_hash != hash {
             return Err(StatisticsError::OtherBundle {
                 of: self.provenance.bundle.clone(),
                 of_hash: self.provenance.bundle_hash.clone(),

@@ -108,7 +108,7 @@ impl Change {
             labels.note.clone_from(after);
         }
         for (of, [_, after]) in &self.accepted {
-            labels.put_accepted(of, *after);
+            labels.accept(of, *after);
         }
     }
 

@@ -239,7 +239,7 @@ fn merge(now: &mut PairLabels, change: Change) {
     }
     for (of, [before, after]) in change.accepted {
         if now.accepted.get(&of).copied() == before {
-            now.put_accepted(&of, after);
+            now.accept(&of, after);
         }
     }
     if let Some([before, after]) = change.note

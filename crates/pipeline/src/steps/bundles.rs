@@ -6,7 +6,6 @@ use std::sync::Arc;
 use crate::error::TaskError;
 use crate::infer::bundle::{self, Bundle, BundleSpec, Ends, Misfit, Origin, SensorPair};
 use crate::infer::generator::GenerateError;
-use crate::io::model_id::current;
 use touch2touch_core::dataset::Problem;
 use touch2touch_core::diffusion::{GenerateConfig, Sampler};
 use touch2touch_core::fit::FitSource;
@@ -100,10 +99,7 @@ impl BundleInfo {
                 training_steps: spec.schedule.training_steps(),
                 guided: spec.guidance.is_some(),
                 sensors: spec.sensors(),
-                fit: spec.fit.as_ref().map(|fit| {
-                    let from_sha256 = current(&fit.source.from_sha256);
-                    FitSource { from_sha256, ..fit.source.clone() }
-                }),
+                fit: spec.fit.as_ref().map(|fit| fit.source.clone()),
             }),
             trained: bundle.provenance().get(TRAINED).is_some(),
         }
@@ -189,10 +185,9 @@ pub struct FoundBundles {
     pub problems: Vec<Problem>,
 }
 
-/// The bundle that a stored identity names, also as builds before this one wrote it.
+/// The bundle that a stored identity names.
 pub fn by_id<'a>(bundles: &'a [BundleInfo], id: &str) -> Option<&'a BundleInfo> {
-    let of = |id: &str| bundles.iter().find(|bundle| *bundle.id == *id);
-    of(id).or_else(|| of(&current(id)))
+    bundles.iter().find(|bundle| *bundle.id == *id)
 }
 
 /// All bundles there are: those of the user, those in the program, and those in `folders`.
