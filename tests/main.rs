@@ -15,7 +15,6 @@ mod apply;
 mod cli;
 #[cfg(feature = "onnx")]
 mod cli_generate;
-mod exchange;
 mod fuzz;
 mod io;
 mod kill;
