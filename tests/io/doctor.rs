@@ -14,7 +14,6 @@ use touch2touch_core::sim::{self, SimConfig};
 use touch2touch_pipeline::io::dataset::{Dataset, ToolUnit};
 use touch2touch_pipeline::io::doctor::{DoctorReport, MOST_PAIRS, examine};
 use touch2touch_pipeline::io::images;
-use touch2touch_pipeline::io::pt::read_text_lists;
 use touch2touch_pipeline::io::simulated::{Layout, WriteError, write_pair, write_tools};
 
 use super::touch;
@@ -259,8 +258,6 @@ fn what_the_simulator_writes_is_healthy() {
         let sample = demo.load(PairId(i)).unwrap();
         write_pair(dir.path(), Layout::Test, pair.tool.as_deref().unwrap(), pair.number, &sample).unwrap();
     }
-    let lists = read_text_lists(&dir.path().join("tools.pt")).unwrap();
-    assert_eq!((lists[0].1.len(), lists[1].1.len()), (3, 9));
     let report = doctor(dir.path());
     // Dropped pixels are the camera's, and summed up in one entry; nothing else may be odd.
     let odd: Vec<_> = report.problems.iter().filter(|p| !p.what.contains("without measurement")).collect();

@@ -1,24 +1,38 @@
 //! PyTorch's `.pt` files: a zip with a pickled dict and raw storages.
 //!
-//! Reading goes through the crate `pytorch-reader` and touches only the tensors that are asked for; what the file would
-//! cost is checked before (the submodule `budget`). [`write_dict`] is a small writer of the same container that
-//! `torch.load(weights_only=True)` accepts.
+//! Only the values that are asked for are read: of a tensor ([`PtDict::tensor`]), checked by its checksum, or of one row of it
+//! ([`PtDict::row`]), which lies where offset and strides say, however large the file is. [`write_dict`] is a small writer of
+//! the same container that `torch.load(weights_only=True)` accepts.
 
-mod budget;
 mod error;
-mod rows;
+mod pickle;
 mod write;
 
-use std::io::{Read as _, Seek as _};
+use std::cell::RefCell;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read as _, Seek as _, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use pytorch_reader::{DType, PickleValue, PytorchError, PytorchReader};
+use zip::read::{ArchiveOffset, Config};
+use zip::{CompressionMethod, ZipArchive};
 
+use self::pickle::{Item, Place, Refusal, contents};
 pub use error::PtError;
-pub(crate) use rows::Rows;
 pub use write::{PtItem, write_dict};
 
 use super::files::{self, clip};
+
+/// Most bytes of the pickle itself. A dict of the twelve tensors of a touch has two thousand.
+const MAX_PICKLE: u64 = 1 << 20;
+/// Most values of a tensor: a hundred times those of a touch.
+const MAX_VALUES: usize = 1 << 24;
+/// Most bytes of a storage that is unpacked; `torch.save` does not compress.
+const MAX_UNPACKED: u64 = 64 << 20;
+/// Most bytes of a storage that is read whole.
+const MAX_STORAGE: u64 = 256 << 20;
+/// A row may be spread over so many times its values: channels that lie last are none, a row that lies last is.
+const MOST_SPREAD: usize = 4;
 
 /// The values of a tensor, row-major, in the element type of the file where a type for it exists here.
 ///
@@ -81,45 +95,81 @@ impl Tensor {
     }
 }
 
+/// Type of the values of a storage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum DType {
+    F32,
+    F64,
+    F16,
+    BF16,
+    /// Truth values among them.
+    U8,
+    I8,
+    I16,
+    I32,
+    I64,
+}
+
+impl DType {
+    fn size(self) -> usize {
+        match self {
+            Self::U8 | Self::I8 => 1,
+            Self::F16 | Self::BF16 | Self::I16 => 2,
+            Self::F32 | Self::I32 => 4,
+            Self::F64 | Self::I64 => 8,
+        }
+    }
+}
+
 /// An opened `.pt` file: its keys and shapes. Values are read key by key.
 #[derive(Debug)]
 pub struct PtDict {
     file: PathBuf,
-    reader: PytorchReader,
+    archive: RefCell<ZipArchive<BufReader<File>>>,
+    root: String,
+    items: BTreeMap<String, Item>,
 }
 
 /// Opens `path` and reads the names and shapes of its tensors, not their values.
 ///
 /// # Errors
-/// [`PtError`] if the file cannot be read, is cut off, or does not hold a dict.
+/// [`PtError`] if the file cannot be read, is cut off, or does not hold a dict in the format of PyTorch 1.6 and newer.
 pub fn read_dict(path: &Path) -> Result<PtDict, PtError> {
-    let io = |source| PtError::Io { file: path.to_owned(), what: "cannot open the file", source };
-    let not_a_dict = |reason: String| PtError::NotADict { file: path.to_owned(), reason };
-    let damaged = |reason: String| PtError::Damaged { file: path.to_owned(), reason };
-    let mut head = [0u8; 2];
-    let mut file = match files::open(path) {
-        Err(err) if err.kind() == std::io::ErrorKind::IsADirectory => return Err(not_a_dict("it is a folder".into())),
+    let file = || path.to_owned();
+    let io = |source| PtError::Io { file: file(), what: "cannot open the file", source };
+    let not_a_dict = |reason: &str| PtError::NotADict { file: file(), reason: reason.into() };
+    let damaged = |reason: String| PtError::Damaged { file: file(), reason: clip(&reason) };
+    let mut opened = match files::open(path) {
+        Err(err) if err.kind() == std::io::ErrorKind::IsADirectory => return Err(not_a_dict("it is a folder")),
         other => other.map_err(io)?,
     };
-    if file.metadata().map_err(io)?.len() == 0 {
+    if opened.metadata().map_err(io)?.len() == 0 {
         return Err(damaged("the file is empty".into()));
     }
-    let is_zip = file.read_exact(&mut head).is_ok() && &head == b"PK";
-    file.rewind().map_err(io)?;
-    budget::check(file).map_err(|reason| PtError::TooLarge { file: path.to_owned(), reason })?;
-    match PytorchReader::new(path) {
-        Ok(reader) => Ok(PtDict { file: path.to_owned(), reader }),
-        Err(PytorchError::Zip(err)) if is_zip => Err(damaged(clip(&err.to_string()))),
-        Err(PytorchError::Io(err)) if is_zip => Err(damaged(clip(&err.to_string()))),
-        Err(err) => {
-            let reason = clip(&err.to_string());
-            Err(not_a_dict(if is_zip { reason } else { format!("no zip archive; {reason}") }))
-        }
+    let mut head = [0; 2];
+    if opened.read_exact(&mut head).is_err() || &head != b"PK" {
+        return Err(not_a_dict("no zip archive as PyTorch 1.6 and newer write"));
     }
+    // From its beginning: else all of a large file is searched for what stands in front of it.
+    let config = Config { archive_offset: ArchiveOffset::Known(0) };
+    let archive = ZipArchive::with_config(config, BufReader::new(opened));
+    let mut archive = archive.map_err(|err| damaged(err.to_string()))?;
+    let name = archive.file_names().flatten().find(|name| name.ends_with("data.pkl")).map(|name| name.into_owned());
+    let name = name.ok_or_else(|| not_a_dict("it has no data.pkl"))?;
+    let entry = archive.by_name(&name).map_err(|err| damaged(err.to_string()))?;
+    let mut pickle = Vec::new();
+    entry.take(MAX_PICKLE + 1).read_to_end(&mut pickle).map_err(|err| damaged(err.to_string()))?;
+    let too_large = |reason| PtError::TooLarge { file: file(), reason };
+    if pickle.len() as u64 > MAX_PICKLE {
+        return Err(too_large(format!("its list of contents is longer than {MAX_PICKLE} bytes")));
+    }
+    let items = contents(&pickle).map_err(|refusal| match refusal {
+        Refusal::NoDict => not_a_dict("its list of contents is no dict that torch.save writes"),
+        Refusal::TooLarge(reason) => too_large(reason),
+    })?;
+    let root = name.trim_end_matches("data.pkl").to_owned();
+    Ok(PtDict { file: file(), archive: RefCell::new(archive), root, items })
 }
-
-/// Most values of a tensor: a hundred times those of a touch.
-const MAX_VALUES: usize = 1 << 24;
 
 impl PtDict {
     /// The file it was read from.
@@ -129,25 +179,26 @@ impl PtDict {
 
     /// The tensors' keys, sorted.
     pub fn keys(&self) -> Vec<String> {
-        let mut keys = self.reader.keys();
-        keys.sort();
-        keys
+        self.items.keys().filter(|key| self.has(key)).cloned().collect()
     }
 
     /// The keys, among these, whose values are stored as bfloat16, which has three digits.
     pub(crate) fn coarse<'a>(&self, keys: &[&'a str]) -> Vec<&'a str> {
-        let coarse = |key: &&str| self.reader.get(key).is_some_and(|tensor| tensor.dtype() == DType::BF16);
-        keys.iter().copied().filter(coarse).collect()
+        keys.iter().copied().filter(|key| self.place(key).is_some_and(|place| place.dtype == DType::BF16)).collect()
     }
 
     /// The shape of the tensor under `key`, if there is one.
     pub fn shape(&self, key: &str) -> Option<&[usize]> {
-        self.reader.get(key).map(pytorch_reader::Tensor::shape)
+        self.place(key).map(|place| place.shape.as_slice())
     }
 
     /// True where the dict has a tensor under `key`.
     pub fn has(&self, key: &str) -> bool {
-        self.reader.get(key).is_some()
+        self.place(key).is_some()
+    }
+
+    fn place(&self, key: &str) -> Option<&Place> {
+        if let Some(Item::Tensor(place)) = self.items.get(key) { Some(place) } else { None }
     }
 
     /// Reads the tensor under `key`; a plain Python number counts as a 0-dimensional tensor.
@@ -155,14 +206,104 @@ impl PtDict {
     /// # Errors
     /// [`PtError::MissingKey`], [`PtError::NotATensor`] (numpy values among them), [`PtError::BadStorage`].
     pub fn tensor(&self, key: &str) -> Result<Tensor, PtError> {
-        let Some(tensor) = self.reader.get(key) else { return self.plain_number(key) };
-        let bad = |reason: String| PtError::BadStorage { file: self.file.clone(), key: key.into(), reason };
-        // A view can repeat one value of the file for ever.
-        if tensor.shape().iter().fold(1usize, |product, &n| product.saturating_mul(n)) > MAX_VALUES {
-            return Err(bad(format!("its shape {:?} has more than {MAX_VALUES} values", tensor.shape())));
+        match self.items.get(key) {
+            Some(Item::Tensor(place)) => self.whole(key, place),
+            Some(Item::Float(x)) => Ok(Tensor::f64(&[], vec![*x])),
+            Some(Item::Int(x)) => Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
+            Some(Item::Bool(x)) => Ok(Tensor::u8(&[], vec![u8::from(*x)])),
+            Some(Item::Other(found)) => {
+                Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found: clip(found) })
+            }
+            None => Err(self.missing(key)),
         }
-        let bytes = tensor.read().map_err(|err| bad(clip(&err.to_string())))?;
-        Ok(Tensor { shape: tensor.shape().to_vec(), values: decode(tensor.dtype(), &bytes) })
+    }
+
+    fn whole(&self, key: &str, Place { storage, dtype, offset, shape, strides }: &Place) -> Result<Tensor, PtError> {
+        let bad = |reason: String| self.bad(key, reason);
+        // A view can repeat one value of the file for ever.
+        let values = product(shape);
+        if values > MAX_VALUES {
+            return Err(bad(format!("its shape {shape:?} has more than {MAX_VALUES} values")));
+        }
+        let mut archive = self.archive.borrow_mut();
+        let entry = archive.by_name(&self.storage(storage)).map_err(|err| bad(clip(&err.to_string())))?;
+        let (size, stored) = (entry.size(), entry.compression() == CompressionMethod::Stored);
+        let most = if stored { MAX_STORAGE } else { MAX_UNPACKED };
+        if size > most {
+            return Err(bad(format!("its values would be unpacked to {size} bytes; at most {most} are")));
+        }
+        let mut bytes = Vec::new();
+        entry.take(most).read_to_end(&mut bytes).map_err(|err| bad(clip(&err.to_string())))?;
+        let end = if values == 0 { 0 } else { offset.saturating_add(reach(shape, strides)) };
+        let need = end.saturating_mul(dtype.size());
+        if bytes.len() < need {
+            return Err(bad(format!("it needs {need} bytes and has {}", bytes.len())));
+        }
+        let from = if values == 0 { bytes.len() } else { offset * dtype.size() };
+        Ok(Tensor {
+            shape: shape.clone(),
+            values: decode(*dtype, &gathered(&bytes[from..], dtype.size(), shape, strides)),
+        })
+    }
+
+    /// Row `at` of the tensor under `key`, which must have this many rows (or one row for all) of this shape.
+    ///
+    /// # Errors
+    /// [`PtError`], before anything is allocated where a size is wrong.
+    pub(crate) fn row(&self, key: &str, at: usize, of: usize, row: &[usize]) -> Result<Tensor, PtError> {
+        let (place, start) = self.check(key, of, row)?;
+        let at = if place.shape[0] == 1 { 0 } else { at.min(place.shape[0] - 1) };
+        let size = place.dtype.size();
+        let from = start + ((place.offset + at * place.strides[0]) * size) as u64;
+        let mut bytes = vec![0; reach(row, &place.strides[1..]) * size];
+        let file = files::open(&self.file);
+        let read = file.and_then(|mut file| file.seek(SeekFrom::Start(from)).and_then(|_| file.read_exact(&mut bytes)));
+        read.map_err(|err| self.bad(key, err.to_string()))?;
+        let values = decode(place.dtype, &gathered(&bytes, size, row, &place.strides[1..]));
+        Ok(Tensor { shape: row.to_vec(), values })
+    }
+
+    /// Checks what [`PtDict::row`] needs, of all rows. The tensor, and where its storage begins in the file.
+    ///
+    /// # Errors
+    /// As there.
+    pub(crate) fn check(&self, key: &str, of: usize, row: &[usize]) -> Result<(&Place, u64), PtError> {
+        let Some(place) = self.place(key) else { return Err(self.missing(key)) };
+        let bad = |reason: String| self.bad(key, reason);
+        let shape = place.shape.as_slice();
+        let rows = shape.first().copied().unwrap_or(0);
+        if shape.get(1..) != Some(row) || (rows != of && rows != 1) || rows == 0 {
+            return Err(self.wrong_shape(key, shape, format!("{:?}", [&[of], row].concat())));
+        }
+        let values = product(row);
+        if values > MAX_VALUES || reach(row, &place.strides[1..]) > values.saturating_mul(MOST_SPREAD) {
+            return Err(bad("a row of it is spread over the file; save it with .contiguous()".into()));
+        }
+        let all = place.offset.saturating_add(reach(shape, &place.strides));
+        let need = all.saturating_mul(place.dtype.size()) as u64;
+        let mut archive = self.archive.borrow_mut();
+        let entry = archive.by_name(&self.storage(&place.storage)).map_err(|err| bad(clip(&err.to_string())))?;
+        if entry.compression() != CompressionMethod::Stored {
+            return Err(bad("it is compressed; save the file with torch.save, which does not".into()));
+        }
+        if entry.size() < need {
+            return Err(bad(format!("it needs {need} bytes and has {}", entry.size())));
+        }
+        let start = entry.data_start().ok_or_else(|| bad("the archive does not say where it lies".into()))?;
+        Ok((place, start))
+    }
+
+    fn storage(&self, key: &str) -> String {
+        format!("{}data/{key}", self.root)
+    }
+
+    fn bad(&self, key: &str, reason: String) -> PtError {
+        PtError::BadStorage { file: self.file.clone(), key: key.into(), reason }
+    }
+
+    fn missing(&self, key: &str) -> PtError {
+        let found: Vec<&str> = self.items.keys().map(String::as_str).collect();
+        PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&found.join(", ")) }
     }
 
     /// Reads the tensor under `key`, which must have one of `shapes`, as 32-bit floats.
@@ -218,58 +359,44 @@ impl PtDict {
     fn wrong_shape(&self, key: &str, found: &[usize], expected: String) -> PtError {
         PtError::WrongShape { file: self.file.clone(), key: key.into(), found: found.to_vec(), expected }
     }
-
-    /// Looks `key` up among the values that are not tensors: only reached where no tensor has that name.
-    fn plain_number(&self, key: &str) -> Result<Tensor, PtError> {
-        let missing =
-            |found: String| PtError::MissingKey { file: self.file.clone(), key: key.into(), found: clip(&found) };
-        let Ok(PickleValue::Dict(dict)) = PytorchReader::read_pickle_data(&self.file, None) else {
-            return Err(missing(self.keys().join(", ")));
-        };
-        let found = match dict.get(key) {
-            Some(PickleValue::Float(x)) => return Ok(Tensor::f64(&[], vec![*x])),
-            Some(PickleValue::Int(x)) => return Ok(Tensor { shape: vec![], values: Values::I64(vec![*x]) }),
-            Some(PickleValue::Bool(x)) => return Ok(Tensor::u8(&[], vec![u8::from(*x)])),
-            Some(PickleValue::Unsupported(kind)) => format!("a value of type {}", clip(kind)),
-            Some(PickleValue::None) => "None".into(),
-            Some(PickleValue::String(_)) => "a text".into(),
-            Some(PickleValue::List(_)) => "a list".into(),
-            Some(PickleValue::Dict(_)) => "a dict".into(),
-            Some(PickleValue::Bytes(_)) => "bytes".into(),
-            None => {
-                let mut keys: Vec<&str> = dict.keys().map(String::as_str).collect();
-                keys.sort_unstable();
-                return Err(missing(keys.join(", ")));
-            }
-        };
-        Err(PtError::NotATensor { file: self.file.clone(), key: key.into(), found })
-    }
 }
 
-/// Reads a dict of lists of texts, such as the lab's `tools.pt`; other values are left out.
-///
-/// # Errors
-/// As [`read_dict`].
-pub fn read_text_lists(path: &Path) -> Result<Vec<(String, Vec<String>)>, PtError> {
-    drop(read_dict(path)?);
-    let damaged = |reason: String| PtError::NotADict { file: path.to_owned(), reason };
-    let value = PytorchReader::read_pickle_data(path, None).map_err(|err| damaged(clip(&err.to_string())))?;
-    let PickleValue::Dict(dict) = value else { return Err(damaged("the file holds no dict".into())) };
-    let mut lists: Vec<(String, Vec<String>)> = dict
-        .into_iter()
-        .filter_map(|(key, value)| match value {
-            PickleValue::List(items) => {
-                let texts = items.into_iter().map(|item| match item {
-                    PickleValue::String(text) => Some(text),
-                    _ => None,
-                });
-                Some((key, texts.collect::<Option<Vec<String>>>()?))
+/// The number of values of a shape.
+fn product(shape: &[usize]) -> usize {
+    shape.iter().fold(1, |product, &n| product.saturating_mul(n))
+}
+
+/// The number of values from the first to the last of a view.
+fn reach(shape: &[usize], strides: &[usize]) -> usize {
+    let steps = shape.iter().zip(strides).map(|(n, stride)| n.saturating_sub(1).saturating_mul(*stride));
+    steps.fold(1, usize::saturating_add)
+}
+
+/// The values of a view in row-major order, each of `size` bytes.
+fn gathered(bytes: &[u8], size: usize, shape: &[usize], strides: &[usize]) -> Vec<u8> {
+    let mut out = Vec::with_capacity(product(shape) * size);
+    if shape.contains(&0) {
+        return out;
+    }
+    // The innermost extents that lie together are copied at once.
+    let (mut outer, mut together) = (shape.len(), 1);
+    while outer > 0 && (shape[outer - 1] == 1 || strides[outer - 1] == together) {
+        outer -= 1;
+        together *= shape[outer];
+    }
+    let mut at = vec![0; outer];
+    for _ in 0..product(&shape[..outer]) {
+        let place: usize = at.iter().zip(strides).map(|(at, stride)| at * stride).sum();
+        out.extend_from_slice(&bytes[place * size..][..together * size]);
+        for (at, n) in at.iter_mut().zip(shape).rev() {
+            *at += 1;
+            if *at < *n {
+                break;
             }
-            _ => None,
-        })
-        .collect();
-    lists.sort();
-    Ok(lists)
+            *at = 0;
+        }
+    }
+    out
 }
 
 /// Splits `bytes` into arrays of `N`.
@@ -284,22 +411,18 @@ pub(super) fn each<const N: usize, T>(bytes: &[u8], f: impl Fn([u8; N]) -> T) ->
         .collect()
 }
 
-/// Turns native-endian bytes, as `pytorch-reader` hands them out, into values.
+/// Turns bytes of a storage into values.
 fn decode(dtype: DType, bytes: &[u8]) -> Values {
     match dtype {
-        DType::F32 => Values::F32(each(bytes, f32::from_ne_bytes)),
-        DType::F64 => Values::F64(each(bytes, f64::from_ne_bytes)),
-        DType::F16 => Values::F32(each(bytes, |b| f32_from_f16(u16::from_ne_bytes(b)))),
-        DType::BF16 => Values::F32(each(bytes, |b| f32::from_bits(u32::from(u16::from_ne_bytes(b)) << 16))),
-        DType::U8 | DType::Bool => Values::U8(bytes.to_vec()),
-        DType::I8 => Values::I64(each(bytes, |b| i64::from(i8::from_ne_bytes(b)))),
-        DType::I16 => Values::I64(each(bytes, |b| i64::from(i16::from_ne_bytes(b)))),
-        DType::I32 => Values::I64(each(bytes, |b| i64::from(i32::from_ne_bytes(b)))),
-        DType::I64 => Values::I64(each(bytes, i64::from_ne_bytes)),
-        DType::U16 => Values::I64(each(bytes, |b| i64::from(u16::from_ne_bytes(b)))),
-        DType::U32 => Values::I64(each(bytes, |b| i64::from(u32::from_ne_bytes(b)))),
-        // Above 2^63 the number does not fit; it saturates.
-        DType::U64 => Values::I64(each(bytes, |b| i64::try_from(u64::from_ne_bytes(b)).unwrap_or(i64::MAX))),
+        DType::F32 => Values::F32(each(bytes, f32::from_le_bytes)),
+        DType::F64 => Values::F64(each(bytes, f64::from_le_bytes)),
+        DType::F16 => Values::F32(each(bytes, |b| f32_from_f16(u16::from_le_bytes(b)))),
+        DType::BF16 => Values::F32(each(bytes, |b| f32::from_bits(u32::from(u16::from_le_bytes(b)) << 16))),
+        DType::U8 => Values::U8(bytes.to_vec()),
+        DType::I8 => Values::I64(each(bytes, |b| i64::from(i8::from_le_bytes(b)))),
+        DType::I16 => Values::I64(each(bytes, |b| i64::from(i16::from_le_bytes(b)))),
+        DType::I32 => Values::I64(each(bytes, |b| i64::from(i32::from_le_bytes(b)))),
+        DType::I64 => Values::I64(each(bytes, i64::from_le_bytes)),
     }
 }
 
@@ -336,5 +459,50 @@ mod tests {
             assert_eq!(f32_from_f16(bits), value, "{bits:#x}");
         }
         assert!(f32_from_f16(0x7e00).is_nan());
+    }
+
+    #[test]
+    fn a_row_is_read_from_its_own_bytes() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.pt");
+        let values: Vec<f32> = (0..5 * 2 * 3).map(|v| v as f32).collect();
+        let items = [
+            ("a", Tensor::f32(&[5, 2, 3], values.clone()).into()),
+            ("one", Tensor::u8(&[1, 2], vec![7, 8]).into()),
+            ("plain", Tensor::f64(&[5], vec![0.5; 5]).into()),
+        ];
+        write_dict(&path, &items).unwrap();
+        let dict = read_dict(&path).unwrap();
+        assert_eq!(dict.tensor("one").unwrap(), Tensor::u8(&[1, 2], vec![7, 8]));
+        for at in 0..5 {
+            let row = dict.row("a", at, 5, &[2, 3]).unwrap();
+            assert_eq!(row, Tensor::f32(&[2, 3], values[6 * at..][..6].to_vec()));
+            assert_eq!(dict.row("one", at, 5, &[2]).unwrap().values, Values::U8(vec![7, 8]));
+            assert_eq!(dict.row("plain", at, 5, &[]).unwrap().values, Values::F64(vec![0.5]));
+        }
+        for (key, of, row, says) in [
+            ("a", 4, &[2usize, 3][..], "has shape [5, 2, 3], expected [4, 2, 3]"),
+            ("a", 5, &[3, 2], "expected [5, 3, 2]"),
+            ("b", 5, &[2], "key \"b\" is missing; found a, one, plain"),
+        ] {
+            let why = dict.check(key, of, row).unwrap_err().to_string();
+            assert!(why.contains(says) && why.contains("a.pt"), "{why}");
+        }
+        // A storage shorter than its shape says.
+        let bytes = std::fs::read(&path).unwrap();
+        let at = bytes.windows(5).position(|w| w == [b'J', 5, 0, 0, 0]).unwrap();
+        let mut longer = bytes;
+        longer[at + 1] = 200;
+        drop(std::fs::write(&path, longer));
+        assert!(read_dict(&path).is_err_and(|err| err.to_string().contains("checksum")));
+    }
+
+    #[test]
+    fn views_are_gathered() {
+        assert_eq!(gathered(&[0, 1, 2, 3, 4, 5], 1, &[3, 2], &[1, 3]), [0, 3, 1, 4, 2, 5]);
+        assert_eq!(gathered(&[0, 1, 2, 3], 2, &[2], &[1]), [0, 1, 2, 3]);
+        assert_eq!(gathered(&[7, 8], 1, &[2, 1, 2], &[0, 99, 1]), [7, 8, 7, 8]);
+        assert_eq!((gathered(&[9], 1, &[], &[]), gathered(&[], 4, &[0, 3], &[3, 1])), (vec![9], vec![]));
+        assert_eq!(reach(&[4, 3], &[0, 1]), 3);
     }
 }

@@ -150,8 +150,8 @@ pub fn edit(labels: &PairLabels, edit: LabelEdit<'_>) -> Result<Option<Edited>, 
             now.review = Review::Done;
         }
         LabelEdit::Note(text) => now.note = note(text),
-        LabelEdit::AcceptPose(of, pose) => now.accept(&of, Some(pose)),
-        LabelEdit::WithdrawPose(of) => now.accept(&of, None),
+        LabelEdit::AcceptPose(of, pose) => drop(now.accept(&of, Some(pose))),
+        LabelEdit::WithdrawPose(of) => drop(now.accept(&of, None)),
     }
     let change = Change::between(labels, &now);
     Ok((!change.is_empty()).then_some(Edited { deed, change }))

@@ -26,7 +26,7 @@ use super::{most_invalid, plausible, problem, same_name};
 use crate::io::caught::caught;
 use crate::io::files;
 use crate::io::names::is_output;
-use crate::io::pt::{PtError, Rows};
+use crate::io::pt::{PtDict, PtError, read_dict};
 use touch2touch_core::dataset::{PairEntry, PairId, Problem, Split};
 use touch2touch_core::frames::PlanarPose;
 use touch2touch_core::grid::{DepthMap, Grid, RgbGrid};
@@ -153,13 +153,13 @@ impl Found {
         });
         paths.sort();
         // The first file that can be read and is of either kind says what kind of folder it is.
-        let opened = || paths.iter().take(MOST_TRIED).filter_map(|path| caught(|| Rows::open(path)).ok()?.ok());
+        let opened = || paths.iter().take(MOST_TRIED).filter_map(|path| caught(|| read_dict(path)).ok()?.ok());
         if !opened().find(|rows| rows.has(TOUCHED) || rows.has("gelslim")).is_some_and(|rows| rows.has(TOUCHED)) {
             return;
         }
         self.folders.push(folder.to_owned());
         for path in paths {
-            let read = caught(|| Ok(touches(&mut Rows::open(&path)?)?));
+            let read = caught(|| Ok(touches(&read_dict(&path)?)?));
             let failed = |message| Err(LoadError::Bug { files: vec![path.clone()], message });
             match read.unwrap_or_else(failed) {
                 Ok(touches) => self.add(path, touches),
@@ -214,12 +214,12 @@ impl Found {
 }
 
 /// The key of the depths, where there are any.
-fn depths_key(rows: &Rows) -> Option<&'static str> {
+fn depths_key(rows: &PtDict) -> Option<&'static str> {
     DEPTHS.into_iter().find(|key| rows.has(key))
 }
 
 /// The number of touches in a file, after every shape in it was checked.
-fn touches(rows: &mut Rows) -> Result<usize, PtError> {
+fn touches(rows: &PtDict) -> Result<usize, PtError> {
     let shape = rows.shape(TOUCHED).unwrap_or_default();
     let touches = shape.first().copied().unwrap_or(0).min(MOST_TOUCHES + 1);
     if touches > MOST_TOUCHES {
@@ -246,19 +246,19 @@ impl Depths {
     pub(super) fn load(&self, id: PairId) -> Result<Loaded, LoadError> {
         let (file, row) = *self.pairs.get(id.0 as usize).ok_or(LoadError::NoSuchPair { id })?;
         let (file, at) = (&self.files[file as usize], row as usize);
-        let mut rows = Rows::open(&file.path)?;
+        let rows = read_dict(&file.path)?;
         let mut notes = Vec::new();
         let of = file.touches;
-        let colors = colors(&mut rows, at, of, &mut notes)?;
+        let colors = colors(&rows, at, of, &mut notes)?;
         let depths = match depths_key(&rows) {
-            Some(key) => Some((key, rows.read(key, at, of, &DEPTH)?.into_f32())),
+            Some(key) => Some((key, rows.row(key, at, of, &DEPTH)?.into_f32())),
             None => {
                 let what = format!("no key \"{}\": there is no measured imprint", DEPTHS[0]);
                 notes.push(problem(rows.file(), what, "save the depths with the pictures if the truth is wanted"));
                 None
             }
         };
-        let half_m = 0.5e-3 * self.width_mm(&mut rows, file, at, &mut notes);
+        let half_m = 0.5e-3 * self.width_mm(&rows, file, at, &mut notes);
         let mut invalid = [InvalidPixels::default(); 2];
         let mut pads = [PadTouch::default(), PadTouch::default()];
         for ((pad, place), color) in PLACES.into_iter().zip(colors) {
@@ -286,7 +286,7 @@ impl Depths {
             let camera = Some(camera(pad, half_m, self.px_per_m()));
             touch.set(sensor, DepthTouch { imprint, camera, truth: None });
         }
-        let grasp_from_object = pose(&mut rows, at, of, &mut notes)?;
+        let grasp_from_object = pose(&rows, at, of, &mut notes)?;
         let sample = Sample {
             rig: self.rig.clone(),
             pads: pads.map(Some).into(),
@@ -316,9 +316,9 @@ impl Depths {
     }
 
     /// Distance of the gels in a touch, millimeters.
-    fn width_mm(&self, rows: &mut Rows, file: &File, at: usize, notes: &mut Vec<Problem>) -> f64 {
-        let mut own = || {
-            let values = rows.all(WIDTHS).ok()?.into_f32();
+    fn width_mm(&self, rows: &PtDict, file: &File, at: usize, notes: &mut Vec<Problem>) -> f64 {
+        let own = || {
+            let values = rows.tensor(WIDTHS).ok()?.into_f32();
             values.get(if values.len() == 1 { 0 } else { at }).map(|width| f64::from(*width))
         };
         let width = own().or(file.width_mm).filter(|width| WIDTH_RANGE_MM.contains(width));
@@ -332,19 +332,14 @@ impl Depths {
 }
 
 /// The pictures of the right and the left finger.
-fn colors(
-    rows: &mut Rows,
-    at: usize,
-    of: usize,
-    notes: &mut Vec<Problem>,
-) -> Result<[Option<ColorTouch>; 2], LoadError> {
-    let raw = rows.read(TOUCHED, at, of, &PICTURE)?.into_f32();
+fn colors(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<[Option<ColorTouch>; 2], LoadError> {
+    let raw = rows.row(TOUCHED, at, of, &PICTURE)?.into_f32();
     if !rows.has(UNTOUCHED) {
         let what = format!("no key \"{UNTOUCHED}\": there is no GelSlim difference");
         notes.push(problem(rows.file(), what, "save the picture without contact beside the others"));
         return Ok([None, None]);
     }
-    let reference = rows.read(UNTOUCHED, at, of, &PICTURE)?.into_f32();
+    let reference = rows.row(UNTOUCHED, at, of, &PICTURE)?.into_f32();
     let bad = raw.iter().zip(&reference).filter(|(a, b)| !(a.is_finite() && b.is_finite())).count();
     most_invalid(rows.file(), bad, raw.len(), || "values of the GelSlim images".into())?;
     if bad > 0 {
@@ -400,13 +395,13 @@ pub(super) fn assumed_camera(rig: &Rig, finger: PadId) -> Option<DepthCamera> {
 }
 
 /// The true pose of a touch, where the file says one.
-fn pose(rows: &mut Rows, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, PtError> {
+fn pose(rows: &PtDict, at: usize, of: usize, notes: &mut Vec<Problem>) -> Result<Option<PlanarPose>, PtError> {
     if !rows.has(POSE) {
         let what = format!("no key \"{POSE}\": this file says no true pose");
         notes.push(problem(rows.file(), what, "save the poses if angle errors are wanted"));
         return Ok(None);
     }
-    let row = rows.read(POSE, at, of, &[3])?.into_f64();
+    let row = rows.row(POSE, at, of, &[3])?.into_f64();
     let [y, z, theta_rad] = row[..] else { return Ok(None) };
     if !row.iter().all(|v| v.is_finite()) {
         let what = format!("key \"{POSE}\", row {at} is {row:?}: it says no true pose");
@@ -414,7 +409,7 @@ fn pose(rows: &mut Rows, at: usize, of: usize, notes: &mut Vec<Problem>) -> Resu
         return Ok(None);
     }
     // The lab's page says millimeters, its scripts take meters.
-    let all = rows.all(POSE)?.into_f64();
+    let all = rows.tensor(POSE)?.into_f64();
     let far = all.chunks_exact(3).flat_map(|pose| &pose[..2]).fold(0f64, |far, v| far.max(v.abs()));
     let to_m = if far > LARGEST_IN_METERS { 1e-3 } else { 1.0 };
     Ok(Some(PlanarPose { theta_rad, y_m: y * to_m, z_m: z * to_m }))
