@@ -15,21 +15,22 @@ pub use focus::{FILLED, focus};
 #[cfg(feature = "gui")]
 mod focus;
 
+use touch2touch_core::grid::Grid;
 use touch2touch_pipeline::error::TaskError;
-use touch2touch_pipeline::still::space::{InSpace, SpacePicture, SpaceView};
+use touch2touch_pipeline::still::space::{InSpace, SpaceView};
 
 /// The renderer of stills, on the best graphics device that there is; a software one will do.
 ///
 /// # Errors
 /// If there is no device, or the program was built without a renderer.
-pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, TaskError> {
+pub fn stills() -> Result<impl Fn(&InSpace, &SpaceView) -> Result<Grid<[u8; 4]>, TaskError>, TaskError> {
     #[cfg(feature = "gui")]
     {
         let stills = still::Stills::new()?;
         Ok(move |pair: &InSpace, view: &SpaceView| stills.draw(pair, view))
     }
     #[cfg(not(feature = "gui"))]
-    Err::<fn(&InSpace, &SpaceView) -> Result<SpacePicture, TaskError>, _>(
+    Err::<fn(&InSpace, &SpaceView) -> Result<Grid<[u8; 4]>, TaskError>, _>(
         TaskError::new("3D picture", "this program was built without the 3D renderer")
             .with_hint("Build it with the feature gui."),
     )

@@ -7,7 +7,6 @@ mod proposals;
 mod python;
 mod random;
 mod recipes;
-mod stills;
 mod verbs;
 mod verdicts;
 
