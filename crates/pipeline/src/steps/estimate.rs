@@ -228,20 +228,6 @@ impl Estimate {
         Ok(self)
     }
 
-    /// Asks the mask model of the imprints now, so that masks by other choices need not: models run one at a time.
-    pub fn see(&mut self, touch: Touch<'_>, models: &Models) {
-        let Some(model) = &self.recipe.mask_model else { return };
-        let of = self.recipe.imprint_of();
-        for (pad, imprint) in self.imprints.entries() {
-            if self.mask_inputs(touch, &of).drawn(pad, imprint).is_some() {
-                continue;
-            }
-            // What fails here fails again, and is said, where the mask is asked for.
-            let found = caught(|| models.probability(model, self.recipe.engine, imprint));
-            self.probabilities[pad] = found.ok().and_then(Result::ok).map(Arc::new);
-        }
-    }
-
     /// The pose by a registration that no recipe names, such as one with the traps of the lab's.
     ///
     /// # Errors
