@@ -206,22 +206,30 @@ pub(super) fn depth_arrays() -> Vec<Seed> {
 /// Imprints as TIFF files.
 pub(super) fn depth_tiffs() -> Vec<Seed> {
     let tiff = |width: u32, height: u32, compression: u32, data: &[u8]| {
-        let properties =
-            [(256, width), (257, height), (258, 32), (259, compression), (273, 98), (279, data.len() as u32), (339, 3)];
-        // The list is 8 + 2 + 7 * 12 + 4 = 98 bytes long; the values follow.
+        let properties = [
+            (256, width),
+            (257, height),
+            (258, 32),
+            (259, compression),
+            (262, 1),
+            (273, 110),
+            (279, data.len() as u32),
+            (339, 3),
+        ];
+        // The list is 8 + 2 + 8 * 12 + 4 = 110 bytes long; the values follow.
         let entry = |(tag, value): (u16, u32)| {
             [&tag.to_le_bytes()[..], &4u16.to_le_bytes(), &1u32.to_le_bytes(), &value.to_le_bytes()].concat()
         };
         let list: Vec<u8> = properties.into_iter().flat_map(entry).collect();
-        Content::Raw([b"II\x2a\0\x08\0\0\0\x07\0", &list[..], &[0; 4], data].concat())
+        Content::Raw([b"II\x2a\0\x08\0\0\0\x08\0", &list[..], &[0; 4], data].concat())
     };
     let zeros = vec![0; 4 * 140 * 175];
     vec![
         good("an imprint", tiff(175, 140, 1, &zeros)),
         bad("another size", tiff(3, 2, 1, &zeros[..24]), "3 x 2 values"),
         bad("too large", tiff(100_000, 100_000, 1, &zeros[..24]), "100000 x 100000"),
-        bad("compressed", tiff(175, 140, 5, &zeros), "compressed"),
-        bad("cut off", tiff(175, 140, 1, &zeros[..24]), "cut off"),
+        bad("compressed otherwise", tiff(175, 140, 9, &zeros), "no TIFF that can be read"),
+        bad("cut off", tiff(175, 140, 1, &zeros[..24]), "no TIFF that can be read"),
     ]
 }
 
