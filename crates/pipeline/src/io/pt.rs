@@ -251,7 +251,8 @@ impl PtDict {
     /// # Errors
     /// [`PtError`], before anything is allocated where a size is wrong.
     pub(crate) fn row(&self, key: &str, at: usize, of: usize, row: &[usize]) -> Result<Tensor, PtError> {
-        let (place, start) = self.check(key, of, row)?;
+        let start = self.check(key, of, row)?;
+        let Some(place) = self.place(key) else { return Err(self.missing(key)) };
         let at = if place.shape[0] == 1 { 0 } else { at.min(place.shape[0] - 1) };
         let size = place.dtype.size();
         let from = start + ((place.offset + at * place.strides[0]) * size) as u64;
@@ -263,11 +264,11 @@ impl PtDict {
         Ok(Tensor { shape: row.to_vec(), values })
     }
 
-    /// Checks what [`PtDict::row`] needs, of all rows. The tensor, and where its storage begins in the file.
+    /// Checks what [`PtDict::row`] needs, of all rows. The place in the file where the tensor's storage begins.
     ///
     /// # Errors
     /// As there.
-    pub(crate) fn check(&self, key: &str, of: usize, row: &[usize]) -> Result<(&Place, u64), PtError> {
+    pub(crate) fn check(&self, key: &str, of: usize, row: &[usize]) -> Result<u64, PtError> {
         let Some(place) = self.place(key) else { return Err(self.missing(key)) };
         let bad = |reason: String| self.bad(key, reason);
         let shape = place.shape.as_slice();
@@ -289,8 +290,7 @@ impl PtDict {
         if entry.size() < need {
             return Err(bad(format!("it needs {need} bytes and has {}", entry.size())));
         }
-        let start = entry.data_start().ok_or_else(|| bad("the archive does not say where it lies".into()))?;
-        Ok((place, start))
+        entry.data_start().ok_or_else(|| bad("the archive does not say where it lies".into()))
     }
 
     fn storage(&self, key: &str) -> String {

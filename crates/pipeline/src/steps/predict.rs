@@ -7,7 +7,6 @@ use crate::infer::engine::EngineChoice;
 use crate::job::JobCx;
 use crate::steps::bundles::BundleInfo;
 use crate::steps::models::{GenerateInput, Models};
-use crate::steps::on_pad::OnPad;
 use crate::steps::prediction::Prediction;
 use touch2touch_core::diffusion::GenerateConfig;
 use touch2touch_core::grid::RgbGrid;

@@ -44,6 +44,9 @@ pub(super) enum Refusal {
     TooLarge(String),
 }
 
+/// Keys and values of a dict.
+type Items = Vec<(Rc<str>, Value)>;
+
 /// Part of a pickle.
 #[derive(Clone, Debug)]
 enum Value {
@@ -54,7 +57,7 @@ enum Value {
     /// Its depth, and its parts, none of which is a dict.
     Tuple(usize, Rc<[Value]>),
     /// Texts to values, none of which is a dict.
-    Dict(Rc<RefCell<Vec<(Rc<str>, Value)>>>),
+    Dict(Rc<RefCell<Items>>),
     /// A class or function, by its name.
     Name(Rc<str>),
     Tensor(Rc<Place>),
