@@ -15,7 +15,6 @@ mod compare;
 mod daily;
 mod doctor;
 mod export;
-mod follow;
 mod frames;
 mod generate;
 mod inspect;
