@@ -7,7 +7,6 @@ use strum::IntoEnumIterator as _;
 
 use crate::error::TaskError;
 use crate::infer::mask::contact_of;
-use crate::io::caught::caught;
 use crate::io::dataset::Dataset;
 use crate::job::JobCx;
 use crate::labels::{ImprintOf, ImprintSource, PairLabels};
