@@ -3,6 +3,7 @@
 use std::sync::LazyLock;
 
 use glam::{DVec2, DVec3};
+use touch2touch_bench::random_tool::random_tool;
 use touch2touch_core::catalog::{self, ToolSpec};
 use touch2touch_core::grid::Grid;
 use touch2touch_core::mesh::TriMesh;
@@ -41,7 +42,7 @@ fn contact_pixels(sample: &Sample, finger: PadId) -> Vec<(usize, usize)> {
 /// One sample of each tool and of a few random ones, made once for all tests.
 fn a_few() -> &'static [(ToolSpec, Sample)] {
     static SAMPLES: LazyLock<Vec<(ToolSpec, Sample)>> = LazyLock::new(|| {
-        let tools = catalog::tools().iter().cloned().chain((0..3).map(catalog::random_tool));
+        let tools = catalog::tools().iter().cloned().chain((0..3).map(random_tool));
         tools
             .enumerate()
             .map(|(i, tool)| {
@@ -288,7 +289,7 @@ fn statistics_are_those_of_the_labs_data() {
 fn random_sensors_and_tools_give_finite_images() {
     for seed in 0..6 {
         let config = SimConfig::randomised(seed);
-        let sample = sim::simulate(&catalog::random_tool(seed), sim::random_grasp(seed), seed, &config);
+        let sample = sim::simulate(&random_tool(seed), sim::random_grasp(seed), seed, &config);
         for finger in lab::PADS {
             let touch = bubble_of(&sample, finger);
             assert!(touch.imprint.as_slice().iter().all(|v| v.is_finite() && v.abs() < 0.06));

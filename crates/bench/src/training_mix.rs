@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use rand::{Rng as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 
+use crate::random_tool::random_tool;
 use touch2touch_core::catalog;
 use touch2touch_core::sample::Sample;
 use touch2touch_core::sim::{BubbleConfig, Condition, SimConfig, random_grasp, random_grasp_within};
@@ -69,11 +70,11 @@ pub fn training_touch(seed: u64, index: u64, mix: Mix, condition: Condition) -> 
         Some(tools[rng.random_range(0..tools.len())])
     };
     let nominal = !train || rng.random_bool(if mix == Mix::Depths { 0.0 } else { NOMINAL });
-    let spec = tool.map_or_else(|| catalog::random_tool(rng.random()), |i| catalog[i].clone());
+    let spec = tool.map_or_else(|| random_tool(rng.random()), |i| catalog[i].clone());
     let mut config = if nominal { SimConfig::default() } else { SimConfig::randomised(rng.random()) };
     match mix {
         Mix::Depths => config.bubble = of_any_depth(config.bubble, &mut rng),
-        Mix::Train => config.bubble = config.bubble.of_nominal_shape(),
+        Mix::Train => config.bubble = of_nominal_shape(config.bubble),
         Mix::Seen | Mix::Unseen => {}
     }
     let any_angle = train && rng.random_bool(ANY_ANGLE);
@@ -81,6 +82,23 @@ pub fn training_touch(seed: u64, index: u64, mix: Mix, condition: Condition) -> 
     let grasp = if any_angle { random_grasp_within(grasp, PI, ANY_PLACE_M) } else { random_grasp(grasp) };
     let sample = condition.simulate(&condition.tool(&spec, index), grasp, noise, &config);
     Drawn { sample, tool, nominal }
+}
+
+/// A bubble's noise and errors on the nominal bubble's shape.
+fn of_nominal_shape(bubble: BubbleConfig) -> BubbleConfig {
+    let nominal = BubbleConfig::default();
+    BubbleConfig {
+        press_m: nominal.press_m,
+        dome_rise_m: nominal.dome_rise_m,
+        dome_fullness: nominal.dome_fullness,
+        rim_semi_axes_m: nominal.rim_semi_axes_m,
+        rim_centers_m: nominal.rim_centers_m,
+        rim_tilt: nominal.rim_tilt,
+        pressure_per_m: nominal.pressure_per_m,
+        stiffening: nominal.stiffening,
+        reference_m: nominal.reference_m,
+        ..bubble
+    }
 }
 
 /// The bubble in another size, pressed on as lightly or as hard as any gripper does; slower distortions weigh more where the

@@ -1,7 +1,6 @@
 //! Simulator of both sensors of the lab's rig and their ground truth.
 //!
-//! [`simulate`] presses a tool ([`tools()`](super::catalog::tools()),
-//! [`random_tool`](super::catalog::random_tool)) between two Soft Bubbles and two GelSlims at a
+//! [`simulate`] presses a tool ([`tools()`](super::catalog::tools())) between two Soft Bubbles and two GelSlims at a
 //! [`Grasp`] and returns what the lab's files hold, plus the truth. The same arguments give the same numbers on
 //! every machine and for every number of threads.
 //!

@@ -64,26 +64,6 @@ pub struct BubbleConfig {
     pub texture_seed: u64,
 }
 
-impl BubbleConfig {
-    /// This bubble's noise and errors on the nominal bubble's shape.
-    #[must_use]
-    pub fn of_nominal_shape(self) -> Self {
-        let nominal = Self::default();
-        Self {
-            press_m: nominal.press_m,
-            dome_rise_m: nominal.dome_rise_m,
-            dome_fullness: nominal.dome_fullness,
-            rim_semi_axes_m: nominal.rim_semi_axes_m,
-            rim_centers_m: nominal.rim_centers_m,
-            rim_tilt: nominal.rim_tilt,
-            pressure_per_m: nominal.pressure_per_m,
-            stiffening: nominal.stiffening,
-            reference_m: nominal.reference_m,
-            ..self
-        }
-    }
-}
-
 impl Default for BubbleConfig {
     fn default() -> Self {
         Self {
