@@ -174,9 +174,8 @@ macro_rules! define {
         at [$($workspace:ident $dock:expr),*]
     } )* } )*) => {
         /// A pane of the window. What is on screen decides what is computed.
-        #[derive(
-            Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, serde::Serialize, serde::Deserialize,
-        )]
+        #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+        #[derive(strum::EnumIter, serde::Serialize, serde::Deserialize)]
         #[serde(rename_all = "snake_case")]
         pub enum Pane {
             $($( #[doc = $tip] $pane, )*)*

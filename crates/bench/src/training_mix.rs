@@ -29,7 +29,7 @@ const ANY_PLACE_M: f64 = 0.015;
     serde::Serialize,
     strum::EnumIter,
     strum::EnumString,
-    strum::IntoStaticStr,
+    strum::IntoStaticStr
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]

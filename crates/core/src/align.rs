@@ -231,7 +231,18 @@ impl Stop {
 
 /// Rung of the ladder, cheapest first: how much was searched for an answer.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, strum::Display, strum::EnumIter,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    PartialOrd,
+    Ord,
+    Hash,
+    Serialize,
+    Deserialize,
+    strum::Display,
+    strum::EnumIter
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Rung {

@@ -59,7 +59,7 @@ impl Gate {
     Serialize,
     Deserialize,
     strum::EnumIter,
-    strum::IntoStaticStr,
+    strum::IntoStaticStr
 )]
 #[serde(try_from = "String", into = "String")]
 #[strum(serialize_all = "snake_case")]

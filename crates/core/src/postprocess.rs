@@ -78,9 +78,8 @@ pub enum Shift {
 }
 
 /// The user's choice between the three readings of a picture.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, strum::EnumIter,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(Serialize, Deserialize, strum::EnumIter)]
 #[serde(rename_all = "snake_case")]
 pub enum ShiftMode {
     /// The released script's result: `(depth + max) / 2`.

@@ -26,7 +26,7 @@ const PLACE_M: [f64; 2] = [1e-3, 5e-3];
     Deserialize,
     strum::EnumIter,
     strum::Display,
-    strum::EnumString,
+    strum::EnumString
 )]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]

@@ -43,7 +43,7 @@ const GATE_M: f64 = 0.015;
     strum::EnumIter,
     strum::EnumString,
     strum::IntoStaticStr,
-    strum::Display,
+    strum::Display
 )]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]

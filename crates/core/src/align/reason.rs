@@ -19,7 +19,7 @@ use crate::grid::{Grid, Mask};
     Deserialize,
     strum::EnumIter,
     strum::Display,
-    strum::EnumCount,
+    strum::EnumCount
 )]
 #[serde(rename_all = "snake_case")]
 pub enum Reason {

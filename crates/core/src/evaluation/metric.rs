@@ -10,9 +10,8 @@ use super::{GraspScore, mean, psnr};
 use crate::verdict::Grade;
 
 /// A metric of a grasp: a row of [`ROWS`]. Lists, filters and pictures follow; the most telling first.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord, strum::EnumIter, Serialize, Deserialize,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, PartialOrd, Ord)]
+#[derive(strum::EnumIter, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Metric {
     /// Error of the in-hand angle, radians.

@@ -15,20 +15,8 @@ pub(crate) const MISALIGNMENT_M: f64 = 0.008;
 const NOISE_STD: [f32; 3] = [0.5 * 0.0687 * 255.0, 0.5 * 0.0428 * 255.0, 0.5 * 0.0576 * 255.0];
 
 /// Condition of the pairs of a data set: what is wrong with them.
-#[derive(
-    Clone,
-    Copy,
-    Debug,
-    Default,
-    PartialEq,
-    Eq,
-    Hash,
-    Serialize,
-    Deserialize,
-    strum::EnumIter,
-    strum::EnumString,
-    strum::IntoStaticStr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[derive(Serialize, Deserialize, strum::EnumIter, strum::EnumString, strum::IntoStaticStr)]
 #[serde(rename_all = "snake_case")]
 #[strum(serialize_all = "snake_case")]
 pub enum Condition {
